@@ -1,0 +1,47 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PACKAGES := geometry data ekf smoother compare reports
+OUT ?= out/simulated
+
+.PHONY: run test lint types arrows install wheel clean
+
+run: install
+	$(BIN)/fgbaseline run --out $(OUT) --force
+	@echo "The report is in $(OUT)/report.html"
+
+test: install lint types arrows
+	$(BIN)/pytest -n 2
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: install
+	$(BIN)/mypy $(foreach p,$(PACKAGES),-p fgbaseline.$(p))
+
+arrows: install
+	$(BIN)/lint-imports
+
+# A strict editable install maps single files, so a new file needs a new install: the list of files is the stamp.
+FILES := $(sort $(shell find $(PACKAGES) -type f -not -name '*.pyc'))
+
+install: $(VENV)/tools.stamp
+	@echo "$(FILES)" | cmp -s - $(VENV)/files.stamp || { \
+	  rm -rf build/__editable__* && \
+	  $(BIN)/pip install --quiet --no-build-isolation --no-deps --config-settings editable_mode=strict -e . && \
+	  echo "$(FILES)" > $(VENV)/files.stamp; }
+
+$(VENV)/tools.stamp: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade 'pip>=25.1' 'setuptools>=77'
+	rm -rf build/__editable__*
+	$(BIN)/pip install --quiet --no-build-isolation --config-settings editable_mode=strict -e . --group dev
+	@rm -f $(VENV)/files.stamp
+	touch $@
+
+wheel: install
+	$(BIN)/python -m build
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info

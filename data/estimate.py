@@ -1,0 +1,96 @@
+"""What every estimator answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+
+from .observations import BoolArray, IntArray
+
+
+class Progress(Protocol):
+    """Told after every frame how many are done and how many there are."""
+
+    def __call__(self, done: int, total: int, /) -> None:
+        """`done` frames of `total` are estimated."""
+        ...
+
+
+class Status(StrEnum):
+    """How an estimator ended."""
+
+    OK = "ok"
+    RECOVERED = "recovered"
+    """it met trouble, gave something up (see its events), and finished"""
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something worth telling a person: where, what and why."""
+
+    frame: int
+    kind: str
+    """short and countable, such as 'landmark dropped'"""
+    reason: str
+    landmark: int | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Landmarks:
+    """m estimated landmarks, in the world frame."""
+
+    index: IntArray
+    """(m,) increasing indices of the sequence's landmarks"""
+    position: FloatArray
+    """(m, 3) m"""
+    covariance: FloatArray | None = None
+    """(m, 3, 3) m^2 in the world frame; NaN where the estimator cannot tell"""
+
+    @staticmethod
+    def none() -> "Landmarks":
+        """No landmark."""
+        return Landmarks(np.empty(0, np.int64), np.empty((0, 3)))
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Estimate:
+    """The answer of one estimator to one problem: T frames, n observations in its sequence."""
+
+    name: str
+    world_T_imu: FloatArray
+    """(T, 4, 4); all NaN from the frame on at which an estimator failed"""
+    used: BoolArray
+    """(n,) which of the sequence's observations took part"""
+    covariance: FloatArray | None = None
+    """(T, 6, 6) of the right perturbation [v, w] of each pose (m, rad); None where the estimator has none"""
+    landmarks: Landmarks = field(default_factory=Landmarks.none)
+    status: Status = Status.OK
+    reason: str = ""
+    """why the status is not ok, in a sentence"""
+    seconds: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(T,) time spent on each frame, s"""
+    seconds_total: float = 0.0
+    """time for all of it, set-up and covariances included, s"""
+    events: tuple[Event, ...] = ()
+    by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
+    """further answers that the same run gave at no cost, by the name they are registered under"""
+
+    @staticmethod
+    def failed(name: str, reason: str, n_frames: int, n_observations: int) -> "Estimate":
+        """The answer of an estimator that has none."""
+        return Estimate(
+            name=name,
+            world_T_imu=np.full((n_frames, 4, 4), np.nan),
+            used=np.zeros(n_observations, dtype=np.bool_),
+            status=Status.FAILED,
+            reason=reason,
+            seconds=np.zeros(n_frames),
+        )

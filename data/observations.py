@@ -1,0 +1,77 @@
+"""Stereo observations as flat arrays sorted by frame: never the dense 4 x N x T block."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.geometry import FloatArray, FgbaselineError
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Observations:
+    """n stereo observations, sorted by frame and within a frame by landmark; the arrays are read-only."""
+
+    frame: IntArray
+    """(n,) index of the frame"""
+    landmark: IntArray
+    """(n,) index of the landmark: the column of the recorded feature block"""
+    pixel: FloatArray
+    """(n, 4) uL, vL, uR, vR in pixels"""
+
+    def __post_init__(self) -> None:
+        n = len(self.frame)
+        if self.landmark.shape != (n,) or self.pixel.shape != (n, 4):
+            raise FgbaselineError(
+                f"observations need (n,), (n,) and (n, 4) arrays, not {self.frame.shape}, "
+                f"{self.landmark.shape} and {self.pixel.shape}"
+            )
+        step = np.diff(self.frame)
+        if np.any((step < 0) | ((step == 0) & (np.diff(self.landmark) <= 0))):
+            raise FgbaselineError("observations must be sorted by frame, then landmark, without repeats")
+        for array in (self.frame, self.landmark, self.pixel):
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @staticmethod
+    def sort(frame: IntArray, landmark: IntArray, pixel: FloatArray) -> "Observations":
+        """Observations of arrays in any order."""
+        order = np.lexsort((landmark, frame))
+        return Observations(
+            np.asarray(frame, dtype=np.int64)[order],
+            np.asarray(landmark, dtype=np.int64)[order],
+            np.ascontiguousarray(np.asarray(pixel, dtype=np.float64)[order]),
+        )
+
+    @staticmethod
+    def none() -> "Observations":
+        """No observation at all."""
+        return Observations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 4)))
+
+    def select(self, chosen: BoolArray | IntArray) -> "Observations":
+        """The observations where `chosen` (n,) is true, or those at the increasing indices `chosen`."""
+        return Observations(self.frame[chosen], self.landmark[chosen], self.pixel[chosen])
+
+    def frame_starts(self, n_frames: int) -> IntArray:
+        """(n_frames + 1,): the observations of frame k are those from `[k]` up to `[k + 1]`."""
+        return np.searchsorted(self.frame, np.arange(n_frames + 1)).astype(np.int64)
+
+    def by_frame(self, n_frames: int) -> Iterator[slice]:
+        """One slice into the arrays for each frame."""
+        starts = self.frame_starts(n_frames)
+        for k in range(n_frames):
+            yield slice(int(starts[k]), int(starts[k + 1]))
+
+    def counts(self, n_landmarks: int) -> IntArray:
+        """(n_landmarks,) how many observations each landmark has."""
+        return np.bincount(self.landmark, minlength=n_landmarks).astype(np.int64)
+
+    def by_track(self) -> IntArray:
+        """(n,) the indices that sort the observations by landmark, then frame."""
+        return np.lexsort((self.frame, self.landmark)).astype(np.int64)

@@ -1,0 +1,162 @@
+"""What was recorded: velocities, stereo tracks, calibration and, where it is known, the truth."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
+
+from .observations import BoolArray, Observations
+
+ROTATION_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Truth:
+    """Known poses (and landmarks) in the world frame: the IMU's frame at frame 0."""
+
+    world_T_imu: FloatArray
+    """(T, 4, 4); frames without truth are all NaN"""
+    landmarks: FloatArray | None = None
+    """(N, 3) m, one row per landmark of the sequence; NaN where it is not known"""
+    source: str = "in the recording"
+
+    @property
+    def known(self) -> BoolArray:
+        """(T,) which frames have a true pose."""
+        known: BoolArray = np.isfinite(self.world_T_imu).all(axis=(1, 2))
+        return known
+
+    @staticmethod
+    def from_any_world(
+        poses: FloatArray, landmarks: FloatArray | None = None, source: str = "in the recording"
+    ) -> "Truth":
+        """Truth re-expressed from the IMU at frame 0.
+
+        `poses` (T, 4, 4) and `landmarks` (N, 3) are in any common world. Raises InputError when frame 0 has no pose.
+        """
+        if not np.isfinite(poses[0]).all():
+            raise InputError(
+                f"the ground truth ({source}) has no pose for frame 0, which defines the world frame"
+            )
+        origin = se3.inverse(poses[0])
+        moved = None if landmarks is None else se3.transform(origin, landmarks)
+        world_T_imu = origin @ poses
+        world_T_imu[~np.isfinite(world_T_imu).all(axis=(1, 2))] = np.nan
+        return Truth(world_T_imu, moved, source)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sequence:
+    """A recording of T frames: body velocities and stereo tracks, as the recorder wrote them."""
+
+    name: str
+    t: FloatArray
+    """(T,) time stamps, s, strictly rising"""
+    linear_velocity: FloatArray
+    """(T, 3) m/s in the IMU's frame"""
+    angular_velocity: FloatArray
+    """(T, 3) rad/s in the IMU's frame"""
+    camera: StereoCamera
+    imu_T_cam: FloatArray
+    """(4, 4) extrinsic of the left camera"""
+    observations: Observations
+    n_landmarks: int
+    truth: Truth | None = None
+    up_imu: FloatArray | None = None
+    """(3,) unit vector: where up is in the IMU's frame at frame 0; by default the camera's -y axis"""
+    form: str = "fgbaseline"
+    """which file format it came from"""
+    source: str = ""
+    """the file it came from, or how it was simulated"""
+    remarks: tuple[str, ...] = ()
+    """what the reader has to say of it, one sentence each"""
+
+    def __post_init__(self) -> None:
+        if self.up_imu is None:
+            down = self.imu_T_cam[:3, 1]
+            object.__setattr__(self, "up_imu", -down / np.linalg.norm(down))
+        check_sequence(self)
+        for array in (self.t, self.linear_velocity, self.angular_velocity, self.imu_T_cam):
+            array.flags.writeable = False
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames there are: T."""
+        return len(self.t)
+
+    @property
+    def dt(self) -> FloatArray:
+        """(T-1,) the intervals between frames, s."""
+        return np.diff(self.t)
+
+    @property
+    def up(self) -> FloatArray:
+        """(3,) the unit vector that points up, in the world (the IMU's frame at frame 0)."""
+        assert self.up_imu is not None
+        return self.up_imu
+
+    def with_truth(self, truth: Truth) -> "Sequence":
+        """The same recording with this truth in place of its own."""
+        return replace(self, truth=truth)
+
+
+def check_sequence(s: Sequence) -> None:
+    """Raises InputError, naming field and value, where a sequence is not one that can be estimated from."""
+    T = s.n_frames
+    if T < 2:
+        raise InputError(f"time_stamps: a sequence needs at least 2 frames, this one has {T}")
+    for name, array in (("linear_velocity", s.linear_velocity), ("angular_velocity", s.angular_velocity)):
+        if array.shape != (T, 3):
+            raise InputError(
+                f"{name}: expected 3 values for each of the {T} time stamps, got shape {array.shape}"
+            )
+        _require_finite(name, array)
+    _require_finite("time_stamps", s.t[:, None])
+    step = np.diff(s.t)
+    if not np.all(step > 0):
+        k = int(np.argmin(step > 0))
+        raise InputError(
+            f"time_stamps: stamps must rise, but frame {k + 1} ({s.t[k + 1]!r} s) is not after frame {k} ({s.t[k]!r} s)"
+        )
+    defect = float(so3.rotation_defect(s.imu_T_cam[:3, :3])) if s.imu_T_cam.shape == (4, 4) else np.inf
+    if not (defect <= ROTATION_TOLERANCE and np.isfinite(s.imu_T_cam).all()):
+        raise InputError(
+            f"imu_T_cam: its upper left 3x3 is no rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
+            "write the extrinsic as a rigid motion"
+        )
+    if not np.array_equal(s.imu_T_cam[3], [0.0, 0.0, 0.0, 1.0]):
+        raise InputError(f"imu_T_cam: its last row is {s.imu_T_cam[3].tolist()}, expected [0, 0, 0, 1]")
+    camera = s.camera
+    for name, value in (("K[0, 0]", camera.fu), ("K[1, 1]", camera.fv), ("b", camera.baseline)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name}: expected a positive number, got {value!r}")
+    _require_finite("features", s.observations.pixel)
+    if len(s.observations) and (
+        s.observations.frame.max() >= T
+        or s.observations.landmark.max() >= s.n_landmarks
+        or s.observations.frame.min() < 0
+    ):
+        raise InputError("features: an observation names a frame or landmark that the sequence does not have")
+    if s.truth is not None and s.truth.world_T_imu.shape != (T, 4, 4):
+        raise InputError(f"ground_truth: expected shape ({T}, 4, 4), got {s.truth.world_T_imu.shape}")
+    if s.truth is not None:
+        _check_truth(s.truth, s.n_landmarks)
+
+
+def _check_truth(truth: Truth, n_landmarks: int) -> None:
+    defect = so3.rotation_defect(truth.world_T_imu[truth.known][:, :3, :3])
+    if defect.size and defect.max() > ROTATION_TOLERANCE:
+        k = int(np.flatnonzero(truth.known)[defect.argmax()])
+        raise InputError(
+            f"ground_truth: the pose of frame {k} is no rigid motion (rotation off by {defect.max():.3g})"
+        )
+    if truth.landmarks is not None and truth.landmarks.shape != (n_landmarks, 3):
+        raise InputError(f"landmarks: expected shape ({n_landmarks}, 3), got {truth.landmarks.shape}")
+
+
+def _require_finite(name: str, array: FloatArray) -> None:
+    finite = np.isfinite(array).all(axis=1)
+    if not finite.all():
+        k = int(np.argmin(finite))
+        raise InputError(f"{name}: row {k} is not finite: {array[k].tolist()}")

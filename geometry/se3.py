@@ -1,0 +1,107 @@
+"""Rigid motions on stacked arrays.
+
+Poses are 4x4 matrices `a_T_b`, taking coordinates in b to coordinates in a. Twists are `[v, w]`: translation (m)
+before rotation (rad), in the body frame. Perturbations are on the right, `T = mu @ exp(delta)`, as in equations 9
+and 13 of the report. The leading axes of every array are a batch.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .so3 import FloatArray, angle_coefficients, exp_so3, hat3, log_so3
+
+
+def hat(twist: ArrayLike) -> FloatArray:
+    """4x4 matrices (..., 4, 4) of twists (..., 6): [[hat3(w), v], [0, 0]] (equation 9)."""
+    xi = np.asarray(twist, dtype=np.float64)
+    matrix = np.zeros((*xi.shape[:-1], 4, 4))
+    matrix[..., :3, :3] = hat3(xi[..., 3:])
+    matrix[..., :3, 3] = xi[..., :3]
+    return matrix
+
+
+def curly_hat(twist: ArrayLike) -> FloatArray:
+    """6x6 matrices (..., 6, 6) of twists (..., 6): [[hat3(w), hat3(v)], [0, hat3(w)]] (equation 9)."""
+    xi = np.asarray(twist, dtype=np.float64)
+    matrix = np.zeros((*xi.shape[:-1], 6, 6))
+    matrix[..., :3, :3] = matrix[..., 3:, 3:] = hat3(xi[..., 3:])
+    matrix[..., :3, 3:] = hat3(xi[..., :3])
+    return matrix
+
+
+def exp(twist: ArrayLike) -> FloatArray:
+    """Poses (..., 4, 4) of twists (..., 6): the closed form of expm(hat(twist))."""
+    xi = np.asarray(twist, dtype=np.float64)
+    v, w = xi[..., :3], xi[..., 3:]
+    c = angle_coefficients(np.linalg.norm(w, axis=-1))
+    skew = hat3(w)
+    left_jacobian = np.eye(3) + c.cosine[..., None, None] * skew + c.cubic[..., None, None] * (skew @ skew)
+    pose = np.zeros((*xi.shape[:-1], 4, 4))
+    pose[..., :3, :3] = exp_so3(w)
+    pose[..., :3, 3] = (left_jacobian @ v[..., None])[..., 0]
+    pose[..., 3, 3] = 1.0
+    return pose
+
+
+def log(pose: ArrayLike) -> FloatArray:
+    """Twists (..., 6) of poses (..., 4, 4), with a rotation of at most pi: the inverse of `exp`."""
+    T = np.asarray(pose, dtype=np.float64)
+    w = log_so3(T[..., :3, :3])
+    angle = np.linalg.norm(w, axis=-1)
+    c = angle_coefficients(angle)
+    small = angle < 1e-4
+    # (1 - (sin x / x) / (2 (1 - cos x) / x^2)) / x^2, the quadratic coefficient of the inverse left Jacobian
+    quadratic = np.where(
+        small,
+        1.0 / 12.0 + angle**2 / 720.0,
+        (1.0 - c.sine / (2.0 * c.cosine)) / np.where(small, 1.0, angle) ** 2,
+    )
+    skew = hat3(w)
+    inverse_left_jacobian = np.eye(3) - 0.5 * skew + quadratic[..., None, None] * (skew @ skew)
+    v = (inverse_left_jacobian @ T[..., :3, 3, None])[..., 0]
+    return np.concatenate([v, w], axis=-1)
+
+
+def inverse(pose: ArrayLike) -> FloatArray:
+    """`b_T_a` (..., 4, 4) of poses `a_T_b` (..., 4, 4)."""
+    T = np.asarray(pose, dtype=np.float64)
+    result = np.zeros_like(T)
+    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
+    result[..., :3, :3] = Rt
+    result[..., :3, 3] = -(Rt @ T[..., :3, 3, None])[..., 0]
+    result[..., 3, 3] = 1.0
+    return result
+
+
+def adjoint(pose: ArrayLike) -> FloatArray:
+    """6x6 adjoints (..., 6, 6) of poses (..., 4, 4), with `T exp(xi) T^-1 == exp(adjoint(T) xi)`, order [v, w]."""
+    T = np.asarray(pose, dtype=np.float64)
+    R, p = T[..., :3, :3], T[..., :3, 3]
+    matrix = np.zeros((*T.shape[:-2], 6, 6))
+    matrix[..., :3, :3] = matrix[..., 3:, 3:] = R
+    matrix[..., :3, 3:] = hat3(p) @ R
+    return matrix
+
+
+def transform(pose: ArrayLike, points: ArrayLike) -> FloatArray:
+    """Points (..., 3) in frame a of points (..., 3) in frame b, moved by `a_T_b` (..., 4, 4); batches broadcast."""
+    T = np.asarray(pose, dtype=np.float64)
+    p = np.asarray(points, dtype=np.float64)
+    result: FloatArray = (T[..., :3, :3] @ p[..., None])[..., 0] + T[..., :3, 3]
+    return result
+
+
+def relative(poses: ArrayLike) -> FloatArray:
+    """`k_T_(k+1)` (n-1, 4, 4), the motion from each pose to the next, of poses (n, 4, 4)."""
+    T = np.asarray(poses, dtype=np.float64)
+    return inverse(T[:-1]) @ T[1:]
+
+
+def compose(increments: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
+    """Poses (n+1, 4, 4) reached from `start` (4, 4; identity by default) by increments (n, 4, 4)."""
+    steps = np.asarray(increments, dtype=np.float64)
+    poses = np.empty((len(steps) + 1, 4, 4))
+    poses[0] = np.eye(4) if start is None else start
+    for k, step in enumerate(steps):
+        poses[k + 1] = poses[k] @ step
+    return poses

@@ -1,0 +1,123 @@
+"""Rotations on stacked arrays.
+
+Rotation vectors are in radians; a rotation matrix `a_R_b` takes coordinates in b to coordinates in a.
+The last one (vectors) or two (matrices) axes hold the object, every axis before them is a batch.
+Formulas: T. Barfoot, *State Estimation for Robotics* (2017), chapter 7; below an angle of 1e-4 the
+closed forms lose digits and their Taylor series, exact to machine precision there, take over.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+_SMALL_ANGLE = 1e-4
+
+
+def hat3(vector: ArrayLike) -> FloatArray:
+    """Skew-symmetric matrices (..., 3, 3) with `hat3(a) @ b == cross(a, b)` of vectors (..., 3)."""
+    a = np.asarray(vector, dtype=np.float64)
+    matrix = np.zeros((*a.shape[:-1], 3, 3))
+    matrix[..., 0, 1], matrix[..., 0, 2] = -a[..., 2], a[..., 1]
+    matrix[..., 1, 0], matrix[..., 1, 2] = a[..., 2], -a[..., 0]
+    matrix[..., 2, 0], matrix[..., 2, 1] = -a[..., 1], a[..., 0]
+    return matrix
+
+
+class AngleCoefficients(NamedTuple):
+    """The four scalar functions of a rotation angle that closed forms of SO(3) and SE(3) are made of."""
+
+    sine: FloatArray
+    """sin(x) / x"""
+    cosine: FloatArray
+    """(1 - cos(x)) / x^2"""
+    cubic: FloatArray
+    """(x - sin(x)) / x^3"""
+
+
+def angle_coefficients(angle: FloatArray) -> AngleCoefficients:
+    """The coefficients of angles (...,) in radians, each (...,)."""
+    small = angle < _SMALL_ANGLE
+    x = np.where(small, 1.0, angle)
+    x2 = angle * angle
+    return AngleCoefficients(
+        sine=np.where(small, 1.0 - x2 / 6.0, np.sin(x) / x),
+        # 2 sin^2(x/2) has no cancellation where 1 - cos(x) has.
+        cosine=np.where(small, 0.5 - x2 / 24.0, 2.0 * np.sin(0.5 * x) ** 2 / (x * x)),
+        cubic=np.where(small, 1.0 / 6.0 - x2 / 120.0, (x - np.sin(x)) / (x * x * x)),
+    )
+
+
+def exp_so3(rotation_vector: ArrayLike) -> FloatArray:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in radians (Rodrigues)."""
+    phi = np.asarray(rotation_vector, dtype=np.float64)
+    c = angle_coefficients(np.linalg.norm(phi, axis=-1))
+    skew = hat3(phi)
+    result: FloatArray = (
+        np.eye(3) + c.sine[..., None, None] * skew + c.cosine[..., None, None] * (skew @ skew)
+    )
+    return result
+
+
+def log_so3(rotation: ArrayLike) -> FloatArray:
+    """Rotation vectors (..., 3), of length at most pi, of rotation matrices (..., 3, 3).
+
+    Goes through the unit quaternion, which is accurate at every angle, pi included.
+    """
+    q = quaternion_xyzw(rotation)
+    vector, scalar = q[..., :3], q[..., 3]
+    length = np.linalg.norm(vector, axis=-1)
+    small = length < 1e-9
+    half_angle = np.arctan2(length, scalar)
+    factor = np.where(small, 2.0, 2.0 * half_angle / np.where(small, 1.0, length))
+    result: FloatArray = factor[..., None] * vector
+    return result
+
+
+def quaternion_xyzw(rotation: ArrayLike) -> FloatArray:
+    """Unit quaternions (..., 4), ordered x y z w with w >= 0, of rotation matrices (..., 3, 3).
+
+    The largest of the four components is found first and the others from it, so that no
+    orientation loses digits (Shepperd, 1978).
+    """
+    R = np.asarray(rotation, dtype=np.float64)
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(R, axis1=-2, axis2=-1)
+    squares = np.concatenate([1.0 - trace[..., None] + 2.0 * diagonal, 1.0 + trace[..., None]], axis=-1)
+    x, y, z = 0, 1, 2
+    products = np.empty((*R.shape[:-2], 4, 4))
+    products[..., np.arange(4), np.arange(4)] = squares
+    for i, j in ((x, y), (x, z), (y, z)):
+        products[..., i, j] = products[..., j, i] = R[..., i, j] + R[..., j, i]
+    for i, j, k in ((x, y, z), (y, z, x), (z, x, y)):
+        products[..., i, 3] = products[..., 3, i] = R[..., k, j] - R[..., j, k]
+    largest = np.argmax(squares, axis=-1)
+    q = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    result: FloatArray = np.where(q[..., 3:] < 0.0, -q, q)
+    return result
+
+
+def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), x y z w, normalised here."""
+    q = np.asarray(xyzw, dtype=np.float64)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    skew = hat3(q[..., :3])
+    result: FloatArray = np.eye(3) + 2.0 * q[..., 3, None, None] * skew + 2.0 * (skew @ skew)
+    return result
+
+
+def rotation_angle(rotation: ArrayLike) -> FloatArray:
+    """Angles (...,) in radians, 0 to pi, of rotation matrices (..., 3, 3)."""
+    result: FloatArray = np.linalg.norm(log_so3(rotation), axis=-1)
+    return result
+
+
+def rotation_defect(matrix: ArrayLike) -> FloatArray:
+    """How far matrices (..., 3, 3) are from proper rotations: the largest entry of |R^T R - I| and |det R - 1|."""
+    R = np.asarray(matrix, dtype=np.float64)
+    gram = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+    result: FloatArray = np.maximum(gram, np.abs(np.linalg.det(R) - 1.0))
+    return result
