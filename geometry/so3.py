@@ -55,9 +55,7 @@ def exp_so3(rotation_vector: ArrayLike) -> FloatArray:
     phi = np.asarray(rotation_vector, dtype=np.float64)
     c = angle_coefficients(np.linalg.norm(phi, axis=-1))
     skew = hat3(phi)
-    result: FloatArray = (
-        np.eye(3) + c.sine[..., None, None] * skew + c.cosine[..., None, None] * (skew @ skew)
-    )
+    result: FloatArray = np.eye(3) + c.sine[..., None, None] * skew + c.cosine[..., None, None] * (skew @ skew)
     return result
 
 

@@ -1,4 +1,4 @@
-"""The rectified stereo camera: four pixel rows `[uL, vL, uR, vR]` of a point in the left camera's frame (equation 10)."""
+"""The rectified stereo camera: pixel rows `[uL, vL, uR, vR]` of a point in the left camera's frame (equation 10)."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class StereoCamera:
         return np.stack([uL, v, uL - self.fu * self.baseline / z, v], axis=-1)
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
-        """Derivatives (..., 4, 3) of `project` with respect to the points (..., 3): K_s dpi/dq of equations 11 to 13."""
+        """Derivatives (..., 4, 3) of `project` with respect to points (..., 3): K_s dpi/dq in equations 11, 13."""
         p = np.asarray(points, dtype=np.float64)
         x, y, z = p[..., 0], p[..., 1], p[..., 2]
         J = np.zeros((*p.shape[:-1], 4, 3))
