@@ -29,14 +29,14 @@ FILES := $(sort $(shell find $(PACKAGES) -type f -not -name '*.pyc'))
 install: $(VENV)/tools.stamp
 	@echo "$(FILES)" | cmp -s - $(VENV)/files.stamp || { \
 	  rm -rf build/__editable__* && \
-	  $(BIN)/pip install --quiet --no-build-isolation --no-deps --config-settings editable_mode=strict -e . && \
+	  $(BIN)/pip install -qq --no-build-isolation --no-deps --config-settings editable_mode=strict -e . && \
 	  echo "$(FILES)" > $(VENV)/files.stamp; }
 
 $(VENV)/tools.stamp: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade 'pip>=25.1' 'setuptools>=77'
 	rm -rf build/__editable__*
-	$(BIN)/pip install --quiet --no-build-isolation --config-settings editable_mode=strict -e . --group dev
+	$(BIN)/pip install -qq --no-build-isolation --config-settings editable_mode=strict -e . --group dev
 	@rm -f $(VENV)/files.stamp
 	touch $@
 

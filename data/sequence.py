@@ -24,7 +24,7 @@ class Truth:
     @property
     def known(self) -> BoolArray:
         """(T,) which frames have a true pose."""
-        return np.isfinite(self.world_T_imu[:, :3, :]).reshape(len(self.world_T_imu), 12).all(axis=1)
+        return np.asarray(np.isfinite(self.world_T_imu).all(axis=(1, 2)), dtype=np.bool_)
 
     @staticmethod
     def from_any_world(
