@@ -1,5 +1,7 @@
 """Recordings, the problem they pose, the answers to it, and the estimators that give them."""
 
+from .calibrated import Calibration, NoiseSettings, calibrated
+from .documented import documented
 from .estimate import Estimate, Event, Landmarks, Progress, Status
 from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
@@ -7,12 +9,14 @@ from .registry import estimator_names, find_estimator
 from .sequence import Sequence, Truth
 
 __all__ = [
+    "Calibration",
     "Estimate",
     "Event",
     "Excluded",
     "HuberKernel",
     "LandmarkPrior",
     "Landmarks",
+    "NoiseSettings",
     "Observations",
     "Problem",
     "Progress",
@@ -20,6 +24,8 @@ __all__ = [
     "Sequence",
     "Status",
     "Truth",
+    "calibrated",
+    "documented",
     "estimator_names",
     "find_estimator",
 ]

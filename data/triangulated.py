@@ -1,0 +1,34 @@
+"""The landmarks that a problem's observations give along any path."""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.triangulation import triangulate_tracks
+
+from .estimate import Landmarks
+from .problem import Problem
+
+SINGULAR_CONDITION = 1e14
+"""of a landmark's 3x3 information: beyond it its position is not determined"""
+
+
+def landmarks_along(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
+    """The problem's landmarks triangulated from its observations with the poses (T, 4, 4) held.
+
+    Their covariances hold for exact poses. Landmarks that no observation determines are left out.
+    """
+    o = problem.observations()
+    world_T_cam = (world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
+    points = triangulate_tracks(
+        problem.sequence.camera,
+        world_T_cam,
+        problem.feature_row(o.landmark),
+        o.pixel,
+        len(problem.features),
+        problem.pixel_variance,
+        None if problem.kernel is None else problem.kernel.threshold,
+    )
+    determined = np.flatnonzero(np.isfinite(points.position).all(axis=1))
+    determined = determined[np.linalg.cond(points.information[determined]) < SINGULAR_CONDITION]
+    covariance = np.asarray(np.linalg.inv(points.information[determined]), dtype=np.float64)
+    return Landmarks(problem.features[determined], points.position[determined], covariance)

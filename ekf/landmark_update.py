@@ -1,0 +1,63 @@
+"""The landmark half of the filter (equations 11 and 12), on independent 3x3 blocks.
+
+With the poses given, landmarks are conditionally independent: the report's 3M x 3M covariance is exactly block
+diagonal, and its update equals, block by block,
+
+    Lambda <- Lambda + H^T V^-1 H    and    mu <- mu + Lambda^-1 H^T V^-1 (z - z~).
+"""
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, StereoCamera, se3
+
+
+class LandmarkBlocks:
+    """The means (m, 3) and 3x3 information matrices (m, 3, 3) of m independent landmarks, in the world frame."""
+
+    def __init__(self, problem: Problem) -> None:
+        m = len(problem.features)
+        prior = problem.landmark_prior
+        self.camera: StereoCamera = problem.sequence.camera
+        self.cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
+        self.imu_T_cam = problem.sequence.imu_T_cam
+        self.known: BoolArray = np.full(m, prior is not None)
+        if prior is None:
+            self.mean = np.full((m, 3), np.nan)
+            self.information = np.zeros((m, 3, 3))
+        else:
+            self.mean = prior.mean.copy()
+            self.information = np.broadcast_to(np.linalg.inv(prior.covariance), (m, 3, 3)).copy()
+
+    def update(self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray) -> None:
+        """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
+
+        `weight` (n,) is 1 / V of each observation, in 1/px^2. Landmarks that are not yet known start at their
+        back-projection, with the information that this one observation gives.
+        """
+        cam_T_world = self.cam_T_imu @ se3.inverse(world_T_imu)
+        fresh = ~self.known[row]
+        if fresh.any():
+            world_T_cam = world_T_imu @ self.imu_T_cam
+            self.mean[row[fresh]] = se3.transform(world_T_cam, self.camera.triangulate(pixel[fresh]))
+            self.known[row[fresh]] = True
+        p_cam = se3.transform(cam_T_world, self.mean[row])
+        H = self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
+        weighted_Ht = np.swapaxes(H, 1, 2) * weight[:, None, None]
+        information = self.information[row] + weighted_Ht @ H
+        innovation = pixel - self.camera.project(p_cam)
+        gradient = (weighted_Ht @ innovation[:, :, None])[:, :, 0]
+        self.mean[row] += solve_3x3(information, gradient)
+        self.information[row] = information
+
+    def covariance(self) -> FloatArray:
+        """(m, 3, 3) m^2; NaN for landmarks that were never seen."""
+        covariance = np.full_like(self.information, np.nan)
+        covariance[self.known] = np.linalg.inv(self.information[self.known])
+        return 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
+
+
+def solve_3x3(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+    """x (n, 3) with matrix @ x = vector, for symmetric positive definite matrices (n, 3, 3)."""
+    return np.asarray(np.linalg.solve(matrix, vector[:, :, None])[:, :, 0], dtype=np.float64)

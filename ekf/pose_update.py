@@ -1,0 +1,88 @@
+"""The pose half of the filter: prediction (equation 9) and update (equation 13)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fgbaseline.data.problem import HuberKernel
+from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
+
+
+class PoseInnovation(NamedTuple):
+    """What n observations of known landmarks say of a pose."""
+
+    residual: FloatArray
+    """(n, 4) z - z~, px"""
+    jacobian: FloatArray
+    """(n, 4, 6) of the predicted pixels by the right perturbation [v, w] of the pose: H of equation 13"""
+
+
+def pose_innovation(
+    camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray, pixel: FloatArray
+) -> PoseInnovation:
+    """Residuals and Jacobians of world points (n, 3) seen at pixels (n, 4) from a pose (4, 4) (equation 13).
+
+    H = -K_s dpi/dq cam_T_imu (s)^odot with s the point in the IMU's frame and s^odot = [I, -hat(s)].
+    """
+    s = se3.transform(se3.inverse(world_T_imu), points)
+    p_cam = se3.transform(cam_T_imu, s)
+    J = camera.jacobian(p_cam) @ cam_T_imu[:3, :3]
+    H = np.concatenate([-J, J @ so3.hat3(s)], axis=2)
+    return PoseInnovation(pixel - camera.project(p_cam), H)
+
+
+class PosePosterior(NamedTuple):
+    """The result of equation 13."""
+
+    correction: FloatArray
+    """(6,) K (z - z~), the right perturbation to apply to the predicted pose"""
+    covariance: FloatArray
+    """(6, 6) (I - K H) Sigma"""
+    innovation_condition: float
+    """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
+
+
+def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
+    """Equation 13 in a form whose cost is linear in the observations, and that keeps the covariance symmetric.
+
+    With Sigma = L L^T and A = H^T V^-1 H: (I - K H) Sigma = L (I + L^T A L)^-1 L^T =: Sigma+, and
+    K (z - z~) = Sigma+ H^T V^-1 (z - z~). The eigenvalues of I + L^T A L, none below 1, are those of
+    (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance.
+    `weight` (n,) is 1 / V of each observation. Raises numpy's LinAlgError where `covariance` is not positive definite.
+    """
+    H = innovation.jacobian.reshape(-1, 6)
+    row_weight = np.repeat(weight, 4)
+    weighted_H = H * row_weight[:, None]
+    A = weighted_H.T @ H
+    L = np.linalg.cholesky(covariance)
+    eigenvalues, Q = np.linalg.eigh(np.eye(6) + L.T @ A @ L)
+    half = (L @ Q) / np.sqrt(eigenvalues)
+    posterior = half @ half.T
+    gradient = weighted_H.T @ innovation.residual.reshape(-1)
+    return PosePosterior(posterior @ gradient, posterior, float(eigenvalues[-1]))
+
+
+def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatArray) -> FloatArray:
+    """Sigma (6, 6) after a motion `step` (4, 4) with noise W (6, 6): F Sigma F^T + W, F = exp(-tau u^curly) (eq. 9)."""
+    F = se3.adjoint(se3.inverse(step))
+    predicted: FloatArray = F @ covariance @ F.T + noise
+    return 0.5 * (predicted + predicted.T)
+
+
+def robust_weight(
+    innovation: PoseInnovation, covariance: FloatArray, pixel_variance: float, kernel: HuberKernel | None
+) -> FloatArray:
+    """(n,) 1 / V of each observation, reduced by the kernel where the whitened innovation is beyond its threshold.
+
+    Whitened by the innovation's own covariance H Sigma H^T + V, so that an uncertain prediction is not taken for a
+    bad match.
+    """
+    n = len(innovation.residual)
+    if kernel is None:
+        return np.full(n, 1.0 / pixel_variance)
+    H = innovation.jacobian
+    S = H @ covariance @ np.swapaxes(H, 1, 2) + pixel_variance * np.eye(4)
+    whitened = np.linalg.solve(S, innovation.residual[:, :, None])[:, :, 0]
+    norm = np.sqrt(np.einsum("ni,ni->n", innovation.residual, whitened))
+    weight: FloatArray = kernel.threshold / np.maximum(norm, kernel.threshold) / pixel_variance
+    return weight
