@@ -1,0 +1,167 @@
+"""The course files (UCSD ECE276A) and our own npz, which is the later course form with truth added.
+
+| key | shape | form |
+|---|---|---|
+| `time_stamps` | (1, T) or (T,) s | all |
+| `linear_velocity` | (3, T) m/s | all |
+| `angular_velocity` | (3, T) rad/s | later, own |
+| `rotational_velocity` | (3, T) rad/s | 2020 |
+| `features` | (4, N, T) px, -1 unobserved; may be absent | all |
+| `K`, `b` | (3, 3) px, scalar m | all |
+| `imu_T_cam` | (4, 4) | later, own |
+| `cam_T_imu` | (4, 4): rotation IMU to camera, translation the camera's position in the IMU frame | 2020 |
+| `ground_truth` | (T, 4, 4) world_T_imu, a frame all NaN where unknown; may be absent | own |
+| `landmarks` | (3, N) m in the world, NaN where unknown; may be absent | own |
+| `up_imu` | (3,) unit vector, up in the IMU's frame at frame 0; may be absent | own |
+"""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, StereoCamera
+
+from ..observations import BoolArray, Observations
+from ..sequence import Sequence, Truth
+from .feature_block import read_features
+from .npz_archive import NpzArchive
+
+OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu"})
+EXACT = 1e-9
+"""how far from 0 or 1 the entries may be that have to be 0 or 1"""
+
+_ODD_EXTRINSIC = (
+    "cam_T_imu is read as the 2020 course wrote it: its rotation takes IMU to camera, its translation is the "
+    "camera's position in the IMU frame"
+)
+_NO_FEATURES = "The recording has no features: nothing but dead reckoning can be run on it"
+
+
+def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
+    """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
+    form = course_form(archive.keys)
+    t = _time_stamps(archive)
+    T = len(t)
+    observations, n_landmarks = Observations.none(), 0
+    remarks = []
+    if "features" in archive.keys:
+        with archive.stream("features") as stream:
+            observations, n_landmarks = read_features(stream, T)
+    else:
+        remarks.append(_NO_FEATURES)
+    if form == "course-2020":
+        remarks.append(_ODD_EXTRINSIC)
+    truth, moved = _truth(archive, T, n_landmarks)
+    if moved:
+        remarks.append(moved)
+    return Sequence(
+        name=name,
+        t=t,
+        linear_velocity=_columns(archive, "linear_velocity", T),
+        angular_velocity=_columns(archive, "rotational_velocity" if form == "course-2020" else "angular_velocity", T),
+        camera=_camera(archive),
+        imu_T_cam=_extrinsic(archive, form),
+        observations=observations,
+        n_landmarks=n_landmarks,
+        truth=truth,
+        up_imu=_up(archive),
+        form=form,
+        source=source,
+        remarks=tuple(remarks),
+    )
+
+
+def course_form(keys: frozenset[str]) -> str:
+    """`course-2020`, `course` or `fgbaseline`, by the keys. Raises InputError where they belong to none or to two."""
+    older = keys & {"rotational_velocity", "cam_T_imu"}
+    later = keys & {"angular_velocity", "imu_T_cam"}
+    if older and later:
+        raise InputError(
+            f"{', '.join(sorted(older))} (2020 form) and {', '.join(sorted(later))} (later form) are both in the file; "
+            "keep angular_velocity with imu_T_cam, or rotational_velocity with cam_T_imu"
+        )
+    if older:
+        return "course-2020"
+    if later or "time_stamps" in keys:
+        return "fgbaseline" if keys & OWN_KEYS else "course"
+    found = ", ".join(repr(k) for k in sorted(keys)[:12]) or "nothing"
+    raise InputError(
+        f"this archive is no recording; expected time_stamps, linear_velocity, angular_velocity, K, b and imu_T_cam, "
+        f"but found {found}"
+    )
+
+
+def _time_stamps(archive: NpzArchive) -> FloatArray:
+    t = archive.array("time_stamps")
+    if not (t.ndim == 1 or (t.ndim == 2 and t.shape[0] == 1)):
+        raise InputError(f"time_stamps: expected shape (1, T), got {t.shape}; write one row of seconds")
+    return t.reshape(-1)
+
+
+def _columns(archive: NpzArchive, key: str, T: int) -> FloatArray:
+    array = _shaped(archive, key, (3, T))
+    return np.ascontiguousarray(array.T)
+
+
+def _shaped(archive: NpzArchive, key: str, shape: tuple[int, ...]) -> FloatArray:
+    array = archive.array(key)
+    if array.shape != shape:
+        raise InputError(f"{key}: expected shape {shape}, got {array.shape}; check how the file was written")
+    return array
+
+
+def _camera(archive: NpzArchive) -> StereoCamera:
+    K = _shaped(archive, "K", (3, 3))
+    if not np.isfinite(K).all():
+        raise InputError(f"K: it has entries that are not finite: {K.tolist()}; write the calibration in pixels")
+    if abs(K[0, 1]) > EXACT or abs(K[1, 0]) > EXACT:
+        raise InputError(f"K: skew is not supported, but K[0, 1] is {K[0, 1]} and K[1, 0] is {K[1, 0]}; rectify first")
+    if np.abs(K[2] - [0.0, 0.0, 1.0]).max() > EXACT:
+        raise InputError(f"K: its last row is {K[2].tolist()}, expected [0, 0, 1]; write the calibration in pixels")
+    b = archive.array("b")
+    if b.size != 1:
+        raise InputError(f"b: expected one number, the baseline in metres, got shape {b.shape}")
+    return StereoCamera(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]), float(b.reshape(-1)[0]))
+
+
+def _extrinsic(archive: NpzArchive, form: str) -> FloatArray:
+    if form != "course-2020":
+        return _shaped(archive, "imu_T_cam", (4, 4))
+    imu_T_cam = _shaped(archive, "cam_T_imu", (4, 4))
+    imu_T_cam[:3, :3] = imu_T_cam[:3, :3].T.copy()
+    return imu_T_cam
+
+
+def _up(archive: NpzArchive) -> FloatArray | None:
+    if "up_imu" not in archive.keys:
+        return None
+    up = _shaped(archive, "up_imu", (3,))
+    if not abs(float(np.linalg.norm(up)) - 1.0) <= 1e-6:
+        raise InputError(f"up_imu: expected a unit vector, got {up.tolist()}; divide it by its length")
+    return up
+
+
+def _truth(archive: NpzArchive, T: int, n_landmarks: int) -> tuple[Truth | None, str]:
+    """The truth in the file, if any, and a remark where it had to be moved to the world of frame 0's IMU."""
+    if "ground_truth" not in archive.keys:
+        if "landmarks" in archive.keys:
+            raise InputError(
+                "landmarks: they need ground_truth beside them, which says in which world they are; add it"
+            )
+        return None, ""
+    poses = _shaped(archive, "ground_truth", (T, 4, 4))
+    entries = poses.reshape(T, 16)
+    known: BoolArray = np.isfinite(entries).all(axis=1)
+    rigid = known & (entries[:, 12:] == [0.0, 0.0, 0.0, 1.0]).all(axis=1)
+    broken = ~rigid & ~np.isnan(entries).all(axis=1)
+    if broken.any():
+        k = int(np.argmax(broken))
+        raise InputError(
+            f"ground_truth: the pose of frame {k} is no rigid motion: {poses[k].tolist()}; "
+            "write a pose, or NaN in all of its entries where it is not known"
+        )
+    landmarks = None
+    if "landmarks" in archive.keys:
+        landmarks = np.ascontiguousarray(_shaped(archive, "landmarks", (3, n_landmarks)).T)
+    if not known[0] or np.abs(poses[0] - np.eye(4)).max() <= EXACT:
+        return Truth(poses, landmarks), ""
+    moved = "ground_truth does not begin at the identity: it is re-expressed from the IMU at frame 0"
+    return Truth.from_any_world(poses, landmarks), moved

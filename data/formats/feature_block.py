@@ -1,0 +1,127 @@
+"""The recorded block of features (4, N, T), -1 where unobserved, turned into flat observations piece by piece.
+
+The dense block is never held: of 4 x 13289 x 3026 doubles (1.29 GB) some ten thousandths are observations.
+
+An entry is unobserved when all four of its rows are exactly -1. Anything else must be four finite pixel
+coordinates none of which is exactly -1: where some rows are -1 and others are not, a tracker has lost one camera,
+and a coordinate that truly is -1.0 (which lies outside every image, and which a sub-pixel tracker hits with
+probability zero) could not be told from that. So both are refused, by the reader and by the writer.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..observations import IntArray, Observations
+from .npz_archive import ArrayStream
+
+UNOBSERVED = -1.0
+CHUNK = 2**19
+"""values read at a time: 4 MB of doubles"""
+ROWS = ("uL", "vL", "uR", "vR")
+
+Locate = Callable[[IntArray], tuple[IntArray, IntArray]]
+"""frames and landmarks of flat indices into the block"""
+
+
+def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int]:
+    """The observations in a streamed block (4, N, T), and N. Raises InputError naming frame and landmark."""
+    shape = stream.shape
+    if len(shape) != 3 or shape[0] != 4 or shape[2] != n_frames:
+        raise InputError(
+            f"features: expected shape (4, N, {n_frames}) for the {n_frames} time stamps, got {shape}; "
+            "write uL, vL, uR, vR along the first axis and the frames along the last"
+        )
+    n_landmarks = shape[1]
+
+    def locate(index: IntArray) -> tuple[IntArray, IntArray]:
+        if stream.fortran_order:
+            return index // max(n_landmarks, 1), index % max(n_landmarks, 1)
+        return index % n_frames, index // n_frames
+
+    entries = _entries_together if stream.fortran_order else _entries_by_row
+    index, pixel = entries(stream, n_landmarks * n_frames, locate)
+    return _observations(index, pixel, locate), n_landmarks
+
+
+def dense_features(block: FloatArray) -> Observations:
+    """The observations in a block (4, T, N) that is in memory, as `.mat` files have it. Raises as `read_features`."""
+    n_landmarks = block.shape[2]
+
+    def locate(index: IntArray) -> tuple[IntArray, IntArray]:
+        return index // n_landmarks, index % n_landmarks
+
+    flat = block.reshape(4, -1)
+    index = np.flatnonzero((flat != UNOBSERVED).any(axis=0))
+    pixel = np.ascontiguousarray(flat[:, index].T)
+    _require_finite(index, pixel, locate)
+    return _observations(index, pixel, locate)
+
+
+def _entries_together(stream: ArrayStream, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+    """Fortran order: the four rows of an entry lie side by side."""
+    indices, pixels = [np.empty(0, np.int64)], [np.empty((0, 4))]
+    for start, n in _pieces(n_entries, CHUNK // 4):
+        values = stream.take(4 * n).reshape(n, 4)
+        index = np.flatnonzero((values != UNOBSERVED).any(axis=1))
+        _require_finite(start + index, values[index], locate)
+        indices.append(start + index)
+        pixels.append(values[index])
+    return np.concatenate(indices), np.concatenate(pixels)
+
+
+def _entries_by_row(stream: ArrayStream, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+    """C order: all entries of uL, then all of vL, and so on; the rows are brought together in the end."""
+    rows = [_row(stream, row, n_entries, locate) for row in range(4)]
+    first = rows[0][0]
+    if all(np.array_equal(first, index) for index, _ in rows[1:]):
+        return first, np.stack([values for _, values in rows], axis=1)
+    union = np.unique(np.concatenate([index for index, _ in rows]))
+    pixel = np.full((len(union), 4), UNOBSERVED)
+    for row, (index, values) in enumerate(rows):
+        pixel[np.searchsorted(union, index), row] = values
+    return union, pixel
+
+
+def _row(stream: ArrayStream, row: int, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+    indices, kept = [np.empty(0, np.int64)], [np.empty(0)]
+    for start, n in _pieces(n_entries, CHUNK):
+        values = stream.take(n)
+        index = np.flatnonzero(values != UNOBSERVED)
+        _require_finite(start + index, values[index, None], locate, row)
+        indices.append(start + index)
+        kept.append(values[index])
+    return np.concatenate(indices), np.concatenate(kept)
+
+
+def _pieces(total: int, size: int) -> Iterator[tuple[int, int]]:
+    for start in range(0, total, size):
+        yield start, min(size, total - start)
+
+
+def _require_finite(index: IntArray, values: FloatArray, locate: Locate, first_row: int = 0) -> None:
+    """Refuses NaN and infinity among `values` (n, rows) of the entries `index` (n,)."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return
+    entry, row = (int(i[0]) for i in np.nonzero(~finite))
+    frame, landmark = locate(index[entry : entry + 1])
+    raise InputError(
+        f"features: {ROWS[first_row + row]} of landmark {landmark[0]} in frame {frame[0]} is {values[entry, row]}; "
+        "write -1 in all four rows where a landmark was not observed"
+    )
+
+
+def _observations(index: IntArray, pixel: FloatArray, locate: Locate) -> Observations:
+    frame, landmark = locate(index)
+    half_seen = np.flatnonzero((pixel == UNOBSERVED).any(axis=1))
+    if len(half_seen):
+        i = half_seen[0]
+        raise InputError(
+            f"features: landmark {landmark[i]} in frame {frame[i]} is {pixel[i].tolist()}, -1 in some rows only "
+            f"({len(half_seen)} such entries); write -1 in all four rows where it was not observed, or four pixel "
+            "coordinates of which none is exactly -1"
+        )
+    return Observations.sort(frame, landmark, pixel)

@@ -1,0 +1,56 @@
+"""Errors that name the file: readers say what is wrong in a field, the name of the file is put before it here."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fgbaseline.geometry import InputError
+
+FilePath = str | os.PathLike[str]
+
+
+def shown(path: FilePath) -> str:
+    """The path as text that can be printed anywhere, on one line."""
+    text = os.fspath(path).encode("utf-8", "backslashreplace").decode()
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+@contextmanager
+def reading(path: FilePath) -> Iterator[None]:
+    """Within it, an InputError or OSError comes out as one InputError that begins with the file's name."""
+    with _naming(path, "it cannot be read", "check the path and its permissions"):
+        yield
+
+
+@contextmanager
+def writing(path: FilePath) -> Iterator[None]:
+    """As `reading`, for a file that is being written."""
+    with _naming(path, "it cannot be written", "check the folder, its permissions and the space left"):
+        yield
+
+
+@contextmanager
+def _naming(path: FilePath, failure: str, advice: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{shown(path)}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{shown(path)}: {failure} ({error.strerror or error}); {advice}") from error
+
+
+def regular_file(path: FilePath) -> Path:
+    """The path, if there is an ordinary file. Raises InputError (without the name: see `reading`) or OSError."""
+    file = Path(path)
+    try:
+        found = file.exists()
+    except ValueError as error:  # a null byte within the name
+        raise InputError(f"there can be no file of this name ({error}); check the path") from error
+    if not found:
+        raise InputError("there is no such file; check the path")
+    if file.is_dir():
+        raise InputError("this is a folder; give the recording's file")
+    if not file.is_file():
+        raise InputError("this is no ordinary file; give the recording's file")
+    return file
