@@ -27,12 +27,14 @@ from .npz_archive import NpzArchive
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu"})
 EXACT = 1e-9
 """how far from 0 or 1 the entries may be that have to be 0 or 1"""
+WORLD_TOLERANCE = 1e-6
+"""how far from the identity the true pose of frame 0 may be and still count as the world's origin"""
 
 _ODD_EXTRINSIC = (
     "cam_T_imu is read as the 2020 course wrote it: its rotation takes IMU to camera, its translation is the "
-    "camera's position in the IMU frame"
+    "camera's position in the IMU frame."
 )
-_NO_FEATURES = "The recording has no features: nothing but dead reckoning can be run on it"
+_NO_FEATURES = "The recording has no features, so nothing but dead reckoning can be run on it."
 
 
 def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
@@ -93,6 +95,8 @@ def _time_stamps(archive: NpzArchive) -> FloatArray:
     t = archive.array("time_stamps")
     if not (t.ndim == 1 or (t.ndim == 2 and t.shape[0] == 1)):
         raise InputError(f"time_stamps: expected shape (1, T), got {t.shape}; write one row of seconds")
+    if t.size < 2:
+        raise InputError(f"time_stamps: a recording needs at least 2 frames, this one has {t.size}")
     return t.reshape(-1)
 
 
@@ -149,7 +153,7 @@ def _truth(archive: NpzArchive, T: int, n_landmarks: int) -> tuple[Truth | None,
         return None, ""
     poses = _shaped(archive, "ground_truth", (T, 4, 4))
     entries = poses.reshape(T, 16)
-    known: BoolArray = np.isfinite(entries).all(axis=1)
+    known: BoolArray = np.asarray(np.isfinite(entries).all(axis=1))
     rigid = known & (entries[:, 12:] == [0.0, 0.0, 0.0, 1.0]).all(axis=1)
     broken = ~rigid & ~np.isnan(entries).all(axis=1)
     if broken.any():
@@ -161,7 +165,7 @@ def _truth(archive: NpzArchive, T: int, n_landmarks: int) -> tuple[Truth | None,
     landmarks = None
     if "landmarks" in archive.keys:
         landmarks = np.ascontiguousarray(_shaped(archive, "landmarks", (3, n_landmarks)).T)
-    if not known[0] or np.abs(poses[0] - np.eye(4)).max() <= EXACT:
+    if not known[0] or np.abs(poses[0] - np.eye(4)).max() <= WORLD_TOLERANCE:
         return Truth(poses, landmarks), ""
-    moved = "ground_truth does not begin at the identity: it is re-expressed from the IMU at frame 0"
+    moved = "ground_truth does not begin at the identity: it is re-expressed from the IMU at frame 0."
     return Truth.from_any_world(poses, landmarks), moved

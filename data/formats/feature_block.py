@@ -8,7 +8,8 @@ and a coordinate that truly is -1.0 (which lies outside every image, and which a
 probability zero) could not be told from that. So both are refused, by the reader and by the writer.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,8 +23,21 @@ CHUNK = 2**19
 """values read at a time: 4 MB of doubles"""
 ROWS = ("uL", "vL", "uR", "vR")
 
-Locate = Callable[[IntArray], tuple[IntArray, IntArray]]
-"""frames and landmarks of flat indices into the block"""
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """How the flat entries of a block lie: `frames_first` when neighbours are the same landmark in the next frame."""
+
+    key: str
+    n_frames: int
+    n_landmarks: int
+    frames_first: bool
+
+    def place(self, index: IntArray) -> tuple[IntArray, IntArray]:
+        """Frames and landmarks of flat entries (n,)."""
+        if self.frames_first:
+            return index % self.n_frames, index // self.n_frames
+        return index // self.n_landmarks, index % self.n_landmarks
 
 
 def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int]:
@@ -31,50 +45,42 @@ def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int
     shape = stream.shape
     if len(shape) != 3 or shape[0] != 4 or shape[2] != n_frames:
         raise InputError(
-            f"features: expected shape (4, N, {n_frames}) for the {n_frames} time stamps, got {shape}; "
+            f"{stream.key}: expected shape (4, N, {n_frames}) for the {n_frames} time stamps, got {shape}; "
             "write uL, vL, uR, vR along the first axis and the frames along the last"
         )
-    n_landmarks = shape[1]
-
-    def locate(index: IntArray) -> tuple[IntArray, IntArray]:
-        if stream.fortran_order:
-            return index // max(n_landmarks, 1), index % max(n_landmarks, 1)
-        return index % n_frames, index // n_frames
-
-    entries = _entries_together if stream.fortran_order else _entries_by_row
-    index, pixel = entries(stream, n_landmarks * n_frames, locate)
-    return _observations(index, pixel, locate), n_landmarks
+    layout = _Layout(stream.key, n_frames, shape[1], frames_first=not stream.fortran_order)
+    if shape[1] == 0:
+        return Observations.none(), 0
+    index, pixel = (_entries_by_row if layout.frames_first else _entries_together)(stream, layout)
+    return _observations(index, pixel, layout), shape[1]
 
 
-def dense_features(block: FloatArray) -> Observations:
+def dense_features(block: FloatArray, key: str) -> Observations:
     """The observations in a block (4, T, N) that is in memory, as `.mat` files have it. Raises as `read_features`."""
-    n_landmarks = block.shape[2]
-
-    def locate(index: IntArray) -> tuple[IntArray, IntArray]:
-        return index // n_landmarks, index % n_landmarks
-
-    flat = block.reshape(4, -1)
+    _, n_frames, n_landmarks = block.shape
+    layout = _Layout(key, n_frames, n_landmarks, frames_first=True)
+    flat = block.reshape(4, -1, order="F")
     index = np.flatnonzero((flat != UNOBSERVED).any(axis=0))
     pixel = np.ascontiguousarray(flat[:, index].T)
-    _require_finite(index, pixel, locate)
-    return _observations(index, pixel, locate)
+    _require_finite(index, pixel, layout)
+    return _observations(index, pixel, layout)
 
 
-def _entries_together(stream: ArrayStream, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+def _entries_together(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray]:
     """Fortran order: the four rows of an entry lie side by side."""
     indices, pixels = [np.empty(0, np.int64)], [np.empty((0, 4))]
-    for start, n in _pieces(n_entries, CHUNK // 4):
+    for start, n in _pieces(layout.n_frames * layout.n_landmarks, CHUNK // 4):
         values = stream.take(4 * n).reshape(n, 4)
         index = np.flatnonzero((values != UNOBSERVED).any(axis=1))
-        _require_finite(start + index, values[index], locate)
+        _require_finite(start + index, values[index], layout)
         indices.append(start + index)
         pixels.append(values[index])
     return np.concatenate(indices), np.concatenate(pixels)
 
 
-def _entries_by_row(stream: ArrayStream, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+def _entries_by_row(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray]:
     """C order: all entries of uL, then all of vL, and so on; the rows are brought together in the end."""
-    rows = [_row(stream, row, n_entries, locate) for row in range(4)]
+    rows = [_row(stream, row, layout) for row in range(4)]
     first = rows[0][0]
     if all(np.array_equal(first, index) for index, _ in rows[1:]):
         return first, np.stack([values for _, values in rows], axis=1)
@@ -85,12 +91,12 @@ def _entries_by_row(stream: ArrayStream, n_entries: int, locate: Locate) -> tupl
     return union, pixel
 
 
-def _row(stream: ArrayStream, row: int, n_entries: int, locate: Locate) -> tuple[IntArray, FloatArray]:
+def _row(stream: ArrayStream, row: int, layout: _Layout) -> tuple[IntArray, FloatArray]:
     indices, kept = [np.empty(0, np.int64)], [np.empty(0)]
-    for start, n in _pieces(n_entries, CHUNK):
+    for start, n in _pieces(layout.n_frames * layout.n_landmarks, CHUNK):
         values = stream.take(n)
         index = np.flatnonzero(values != UNOBSERVED)
-        _require_finite(start + index, values[index, None], locate, row)
+        _require_finite(start + index, values[index, None], layout, row)
         indices.append(start + index)
         kept.append(values[index])
     return np.concatenate(indices), np.concatenate(kept)
@@ -101,26 +107,26 @@ def _pieces(total: int, size: int) -> Iterator[tuple[int, int]]:
         yield start, min(size, total - start)
 
 
-def _require_finite(index: IntArray, values: FloatArray, locate: Locate, first_row: int = 0) -> None:
+def _require_finite(index: IntArray, values: FloatArray, layout: _Layout, first_row: int = 0) -> None:
     """Refuses NaN and infinity among `values` (n, rows) of the entries `index` (n,)."""
     finite = np.isfinite(values)
     if finite.all():
         return
     entry, row = (int(i[0]) for i in np.nonzero(~finite))
-    frame, landmark = locate(index[entry : entry + 1])
+    frame, landmark = layout.place(index[entry : entry + 1])
     raise InputError(
-        f"features: {ROWS[first_row + row]} of landmark {landmark[0]} in frame {frame[0]} is {values[entry, row]}; "
+        f"{layout.key}: {ROWS[first_row + row]} of landmark {landmark[0]} in frame {frame[0]} is {values[entry, row]}; "
         "write -1 in all four rows where a landmark was not observed"
     )
 
 
-def _observations(index: IntArray, pixel: FloatArray, locate: Locate) -> Observations:
-    frame, landmark = locate(index)
+def _observations(index: IntArray, pixel: FloatArray, layout: _Layout) -> Observations:
+    frame, landmark = layout.place(index)
     half_seen = np.flatnonzero((pixel == UNOBSERVED).any(axis=1))
     if len(half_seen):
         i = half_seen[0]
         raise InputError(
-            f"features: landmark {landmark[i]} in frame {frame[i]} is {pixel[i].tolist()}, -1 in some rows only "
+            f"{layout.key}: landmark {landmark[i]} in frame {frame[i]} is {pixel[i].tolist()}, -1 in some rows only "
             f"({len(half_seen)} such entries); write -1 in all four rows where it was not observed, or four pixel "
             "coordinates of which none is exactly -1"
         )

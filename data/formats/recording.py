@@ -3,28 +3,55 @@
 import os
 from pathlib import Path
 
+import numpy as np
+
 from fgbaseline.geometry import InputError
 
 from ..sequence import Sequence
 from .course import read_course
+from .ground_truth import BodyFrame, attach_truth
+from .mat_file import MatFile
 from .named_file import FilePath, reading, regular_file
 from .npz_archive import NpzArchive
+from .utias import read_utias
 
-_KNOWN = "an .npz of the course or of fgbaseline, or a UTIAS .mat"
+ZIP = (b"PK\x03\x04", b"PK\x05\x06")
+HDF5 = b"\x89HDF\r\n\x1a\n"
+MATLAB_HEADER = 128
+"""bytes: the text of a MATLAB 5 file, its version and the two letters that tell its byte order"""
 
 
-def read(path: FilePath) -> Sequence:
-    """The recording in the file `path`. Raises InputError, naming file, field and value, for anything else."""
-    with reading(path):
-        return _read(regular_file(path), os.fspath(path))
+def read(path: FilePath, truth: FilePath | None = None, truth_frame: BodyFrame | None = None) -> Sequence:
+    """The recording in the file `path`: a course file, one of our own, or a UTIAS `.mat`.
+
+    `truth` is a KITTI or TUM file with the poses of `truth_frame`, "camera" or "imu" (see `attach_truth`); without it
+    the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
+    """
+    with reading(path), np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are judged, not computed with
+        sequence = _read(regular_file(path), os.fspath(path))
+    return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
 
 
 def _read(file: Path, source: str) -> Sequence:
     with file.open("rb") as opened:
         head = opened.read(1024)
-    if not head:
-        raise InputError(f"the file is empty; expected {_KNOWN}")
-    if head[:4] in (b"PK\x03\x04", b"PK\x05\x06"):
+    if head.startswith(ZIP):
         with NpzArchive(file) as archive:
             return read_course(archive, file.stem, source)
-    raise InputError(f"this is no recording; expected {_KNOWN}")
+    if head.startswith(b"MATLAB") and head[MATLAB_HEADER - 2 : MATLAB_HEADER] in (b"IM", b"MI"):
+        if HDF5 in head:
+            raise InputError("this is a MATLAB 7.3 file (HDF5), which is not supported; save it with save(..., '-v7')")
+        return read_utias(MatFile(file), file.stem, source)
+    raise InputError(f"{_what(head)}; expected an .npz of the course or of fgbaseline, or a UTIAS .mat")
+
+
+def _what(head: bytes) -> str:
+    if not head:
+        return "the file is empty"
+    if head.startswith(HDF5):
+        return "this is an HDF5 file"
+    if head.startswith(b"\x93NUMPY"):
+        return "this is a single array (.npy)"
+    if head.isascii() and b"\0" not in head:
+        return "this is a text file and no recording"
+    return f"this is no recording (it begins with the bytes {head[:8].hex(' ')})"

@@ -1,0 +1,45 @@
+"""KITTI trajectories: the upper three rows of a pose in 12 numbers a line; line k is frame k."""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, so3
+
+from .named_file import FilePath, reading, regular_file
+from .number_table import NumberTable, read_numbers
+
+NUMBERS = 12
+ROTATION_TOLERANCE = 1e-3
+"""how far from a rotation the nine numbers may be: files with four digits are within it"""
+
+
+def read_kitti(path: FilePath) -> FloatArray:
+    """Poses (n, 4, 4) `world_T_body` of a KITTI file, their rotations made exact (the nearest one).
+
+    Raises InputError naming file and line for what is no number, and for a rotation that is off by more than
+    ROTATION_TOLERANCE.
+    """
+    with reading(path), np.errstate(over="ignore", invalid="ignore"):
+        return kitti_poses(read_numbers(regular_file(path), {NUMBERS: "KITTI"}))
+
+
+def kitti_poses(table: NumberTable) -> FloatArray:
+    """Poses (n, 4, 4) of the lines of a KITTI file. Raises InputError naming the line."""
+    poses = np.tile(np.eye(4), (len(table.values), 1, 1))
+    poses[:, :3, :] = table.values.reshape(-1, 3, 4)
+    defect = so3.rotation_defect(poses[:, :3, :3])
+    wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
+    if len(wrong):
+        i = wrong[0]
+        raise InputError(
+            f"line {table.line[i]}: the first three columns are no rotation (off by {defect[i]:.3g}, allowed "
+            f"{ROTATION_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
+        )
+    poses[:, :3, :3] = nearest_rotations(poses[:, :3, :3])
+    return poses
+
+
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
+    U, _, Vt = np.linalg.svd(matrices)
+    result: FloatArray = U @ Vt
+    return result

@@ -1,0 +1,79 @@
+"""`write_npz`: a recording in our own npz (the keys are listed in `course`), the same bytes for the same recording."""
+
+import zipfile
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.lib import format as npy
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..observations import IntArray
+from ..sequence import Sequence
+from .beside import written_beside
+from .feature_block import CHUNK, UNOBSERVED
+from .named_file import FilePath
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""the earliest stamp a zip can carry: the time of writing is none of the recording's business"""
+_UNIX = 3
+_MODE = 0o600 << 16
+
+
+def write_npz(sequence: Sequence, path: FilePath) -> None:
+    """Writes a recording with its truth, all or nothing; `read` gives every array back bit by bit.
+
+    The dense feature block is made and compressed a few landmarks at a time. Raises InputError when the file cannot be
+    written, or a pixel coordinate is exactly -1, which in the file means 'not observed'.
+    """
+    if (sequence.observations.pixel == UNOBSERVED).any():
+        raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
+    with written_beside(path) as file, zipfile.ZipFile(file, "w") as archive:
+        for key, array in _arrays(sequence).items():
+            _write_member(archive, key, array.shape, iter([array]))
+        if sequence.n_landmarks:
+            shape = (4, sequence.n_landmarks, sequence.n_frames)
+            _write_member(archive, "features", shape, _feature_chunks(sequence))
+
+
+def _arrays(s: Sequence) -> dict[str, FloatArray]:
+    camera = s.camera
+    arrays = {
+        "time_stamps": s.t[None, :],
+        "linear_velocity": s.linear_velocity.T,
+        "angular_velocity": s.angular_velocity.T,
+        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
+        "b": np.array(camera.baseline),
+        "imu_T_cam": s.imu_T_cam,
+        "up_imu": s.up,
+    }
+    if s.truth is not None:
+        arrays["ground_truth"] = s.truth.world_T_imu
+        if s.truth.landmarks is not None:
+            arrays["landmarks"] = s.truth.landmarks.T
+    return arrays
+
+
+def _write_member(archive: zipfile.ZipFile, key: str, shape: tuple[int, ...], chunks: Iterator[FloatArray]) -> None:
+    """One array of little-endian doubles in C order, given as consecutive pieces."""
+    info = zipfile.ZipInfo(f"{key}.npy", _EPOCH)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system, info.external_attr = _UNIX, _MODE
+    with archive.open(info, "w", force_zip64=True) as member:
+        npy.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        for chunk in chunks:
+            member.write(np.ascontiguousarray(chunk, dtype="<f8").tobytes())
+
+
+def _feature_chunks(s: Sequence) -> Iterator[FloatArray]:
+    """The block (4, N, T) row by row and, within a row, a few landmarks at a time: pieces (n, T)."""
+    order = s.observations.by_track()
+    frame, landmark, pixel = (a[order] for a in (s.observations.frame, s.observations.landmark, s.observations.pixel))
+    n = max(1, CHUNK // s.n_frames)
+    starts = np.arange(0, s.n_landmarks, n)
+    bounds: IntArray = np.searchsorted(landmark, [*starts, s.n_landmarks]).astype(np.int64)
+    for row in range(4):
+        for start, begin, end in zip(starts.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+            chunk = np.full((min(n, s.n_landmarks - start), s.n_frames), UNOBSERVED)
+            chunk[landmark[begin:end] - start, frame[begin:end]] = pixel[begin:end, row]
+            yield chunk
