@@ -1,0 +1,69 @@
+"""What is wrong with the matches: pixel noise on all of them, and a share that belongs to other points altogether."""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+
+from ..observations import BoolArray, IntArray
+from .chance import Concern, generator
+from .rig import Rig
+from .settings import Simulation
+
+
+def noisy_pixels(pixel: FloatArray, settings: Simulation) -> FloatArray:
+    """Pixels (n, 4) with independent noise of `sigma_pixel` on every row."""
+    noise: FloatArray = generator(settings.seed, Concern.PIXELS).standard_normal(pixel.shape)
+    return pixel + settings.sigma_pixel * noise
+
+
+def wrong_matches(
+    frame: IntArray, track: IntArray, t: FloatArray, settings: Simulation
+) -> tuple[BoolArray, FloatArray]:
+    """Which observations (n,) are wrong, and by how many pixels (n, 4).
+
+    Half of `wrong_share` are single observations. The other half belongs to tracks that slip onto another point at
+    some frame and stay there, displaced by one constant amount. In a burst every observation is wrong by chance.
+    """
+    rng = generator(settings.seed, Concern.WRONG_MATCHES)
+    n, m = len(frame), int(track.max(initial=-1)) + 1
+    single = rng.random(n) < 0.5 * settings.wrong_share
+    offset = displacements(n, rng)
+    length = np.bincount(track, minlength=m)
+    # A track of n observations that slips has (n - 1) / 2 wrong ones on average: its first is where it was found.
+    slips, when = rng.random(m) < settings.wrong_share * n / max(n - m, 1), rng.random(m)
+    slip_offset = displacements(m, rng)
+    age = np.arange(n) - (np.cumsum(length) - length)[track]
+    slipped = slips[track] & (age >= np.maximum(when * length, 1e-9)[track])
+    wrong = single | slipped
+    offset[slipped] = slip_offset[track[slipped]]
+
+    rng = generator(settings.seed, Concern.BURSTS)
+    chance, burst_offset = rng.random(n), displacements(n, rng)
+    for start, end, share in settings.bursts:
+        hit = (t[frame] >= start) & (t[frame] <= end) & (chance < share) & ~wrong
+        offset[hit] = burst_offset[hit]
+        wrong |= hit
+    offset[~wrong] = 0.0
+    return wrong, offset
+
+
+def displacements(n: int, rng: np.random.Generator) -> FloatArray:
+    """How wrong matches are off (n, 4), px: seven in ten in both images alike, by 8 to 100 px; the rest along the right
+    image's row only, by 5 to 60 px, which spoils the depth."""
+    size = rng.lognormal(np.log(28.0), 0.6, n).clip(8.0, 100.0)
+    angle = rng.uniform(0.0, 2.0 * np.pi, n)
+    du, dv = size * np.cos(angle), 0.6 * size * np.sin(angle)
+    both = np.stack([du, dv, du, dv], axis=1)
+    right = np.zeros((n, 4))
+    right[:, 2] = np.where(rng.random(n) < 0.5, 1.0, -1.0) * rng.lognormal(np.log(18.0), 0.5, n).clip(5.0, 60.0)
+    return np.where((rng.random(n) < 0.7)[:, None], both, right)
+
+
+def displaced(pixel: FloatArray, offset: FloatArray, rig: Rig) -> FloatArray:
+    """Pixels (n, 4) moved by offsets (n, 4) and kept inside the images: where they would leave, the other way."""
+    bound = np.array([rig.width, rig.height, rig.width, rig.height]) - 2.0
+    out = (pixel + offset < 1.0) | (pixel + offset > bound)
+    # Both rows of a pair turn together, so that left and right stay as they were to each other.
+    u_out, v_out = out[:, 0] | out[:, 2], out[:, 1] | out[:, 3]
+    turned = np.where(np.stack([u_out, v_out, u_out, v_out], axis=1), -offset, offset)
+    return np.where(offset != 0.0, np.clip(pixel + turned, 1.0, bound), pixel)

@@ -1,0 +1,160 @@
+"""A simulated recording: a path, what it sees, what its sensors make of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, se3
+
+from ..observations import BoolArray, IntArray, Observations
+from ..sequence import Sequence, Truth
+from .chance import Concern, generator
+from .matches import displaced, noisy_pixels, wrong_matches
+from .path import Path, followed, handheld_path, path_along, time_grid
+from .roads import drive, highway_road, loop_road, town_road
+from .room import Room
+from .settings import Simulation
+from .sight import Sight
+from .street import Street
+from .tracks import Tracking, Tracks, follow
+from .traffic import Traffic
+from .velocities import recorded_velocities
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Labels:
+    """What is wrong with each of the n observations of a simulated sequence."""
+
+    wrong: BoolArray
+    """(n,) wrong matches"""
+    moving: BoolArray
+    """(n,) points on things that move"""
+
+
+def simulate(settings: Simulation) -> Sequence:
+    """A recording with its truth: poses and landmarks in the IMU's frame at frame 0. Same settings, same bytes.
+
+    Landmarks on things that move have no true position: their rows are NaN. Raises InputError where `along` cannot be
+    followed.
+    """
+    return simulate_with_labels(settings)[0]
+
+
+def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
+    """The same, and which observations are wrong or moving."""
+    t, path = _path(settings)
+    origin = se3.inverse(path.at(t[:1])[0])
+    poses = origin @ path.at(t)
+    poses[0] = np.eye(4)
+    up = origin[:3, 2] if settings.path != "along" else np.array([0.0, 0.0, 1.0])
+    path = path.moved(origin)
+
+    static, moving = _tracks(path, poses, t, settings)
+    m = len(static.first)
+    tracks = Tracks(
+        np.concatenate([static.frame, moving.frame]),
+        np.concatenate([static.track, moving.track + m]),
+        np.concatenate([static.point, moving.point]),
+        np.concatenate([static.first, np.full_like(moving.first, np.nan)]),
+    )
+    rig = settings.mount
+    cameras = poses @ rig.imu_T_cam
+    pixel = rig.camera.project(se3.transform(se3.inverse(cameras)[tracks.frame], tracks.point))
+    wrong, offset = wrong_matches(tracks.frame, tracks.track, t, settings)
+    pixel = displaced(noisy_pixels(pixel, settings), offset, rig)
+
+    order = np.lexsort((tracks.track, tracks.frame))
+    linear, angular = recorded_velocities(path, t, settings)
+    sequence = Sequence(
+        name=f"simulated-{settings.path}",
+        t=t,
+        linear_velocity=linear,
+        angular_velocity=angular,
+        camera=rig.camera,
+        imu_T_cam=rig.imu_T_cam.copy(),
+        observations=Observations(tracks.frame[order], tracks.track[order], pixel[order]),
+        n_landmarks=len(tracks.first),
+        truth=Truth(poses, tracks.first, "simulated"),
+        up_imu=up,
+        form="simulated",
+        source=f"simulated: {_described(settings)}",
+        remarks=_remarks(settings, wrong),
+    )
+    return sequence, Labels(wrong[order], tracks.track[order] >= m)
+
+
+def _path(settings: Simulation) -> tuple[FloatArray, Path]:
+    """The frames' times (T,) s, and the path in a level world."""
+    if settings.path == "along":
+        velocities = followed(settings)
+        path = path_along(velocities)
+        if settings.frame_rate is None:
+            return velocities.t, path
+        return np.arange(0.0, velocities.t[-1] + 1e-9, 1.0 / settings.frame_rate), path
+    t = np.arange(round(settings.seconds * settings.rate)) / settings.rate
+    grid = time_grid(float(t[-1]), settings.rate)
+    rng = generator(settings.seed, Concern.PATH)
+    if settings.path == "handheld":
+        return t, handheld_path(grid, rng)
+    seconds = float(grid[-1] - grid[0])
+    if settings.path == "town":
+        road = town_road(13.0 * seconds + 100.0, rng)
+    elif settings.path == "highway":
+        road = highway_road(34.0 * seconds + 100.0, rng)
+    else:
+        lap = float(t[-1]) / max(1, round(float(t[-1]) / 60.0))
+        road = loop_road(max(8.0, 200.0 / lap) * seconds + 100.0, lap)
+    return t, drive(road, grid, rng)
+
+
+def _tracks(path: Path, poses: FloatArray, t: FloatArray, settings: Simulation) -> tuple[Tracks, Tracks]:
+    """Tracks of what stands still, and of what moves."""
+    rig = settings.mount
+    nearest, farthest = settings.depths
+    seeing = np.ones(len(t), dtype=np.bool_)
+    for start, end in settings.blackouts:
+        seeing &= (t < start) | (t > end)
+    sight = Sight(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, 2.0 + 5.0 * settings.sigma_pixel, seeing)
+    scenery = generator(settings.seed, Concern.SCENERY)
+    if settings.scene == "room":
+        points: Callable[[FloatArray, np.random.Generator], FloatArray] = Room(path, rig).points
+    else:
+        points = Street(path, rig.imu_above_ground, settings.path == "highway", scenery).points
+
+    def standing(birth: IntArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        return points(t[birth], rng), np.zeros((len(birth), 3))
+
+    how = Tracking(
+        settings.features_per_frame,
+        settings.track_length,
+        farthest,
+        settings.returning_share,
+        max(1, round(settings.return_after / float(np.median(np.diff(t))))),
+    )
+    static = follow(
+        standing, sight, t, how, generator(settings.seed, Concern.TRACKS), generator(settings.seed, Concern.RETURNS)
+    )
+    traffic = generator(settings.seed, Concern.TRAFFIC)
+    share = settings.moving_share
+    how = Tracking(settings.features_per_frame * share / (1.0 - share), settings.track_length, farthest)
+    moving = follow(Traffic(path, t, settings.scene, traffic).points, sight, t, how, traffic, traffic)
+    return static, moving
+
+
+def _described(settings: Simulation) -> str:
+    """The settings that are not at their defaults, and the seed."""
+    said: list[str] = [settings.path]
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        if field.name not in ("path", "along", "rig") and (value != field.default or field.name == "seed"):
+            said.append(f"{field.name} {value}")
+    return ", ".join(said)
+
+
+def _remarks(settings: Simulation, wrong: BoolArray) -> tuple[str, ...]:
+    share = float(wrong.mean()) if len(wrong) else 0.0
+    return (
+        f"simulated: velocities with noise of {settings.sigma_linear:g} m/s and {settings.sigma_angular:g} rad/s a "
+        f"sample, pixels with {settings.sigma_pixel:g} px a row, {100.0 * share:.1f} % wrong matches",
+    )
