@@ -22,6 +22,7 @@ from fgbaseline.geometry import FloatArray, InputError, StereoCamera
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from .feature_block import read_features
+from .fields import extrinsic, positive, time_stamps, vectors
 from .npz_archive import NpzArchive
 
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu"})
@@ -40,8 +41,9 @@ _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can
 def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
     form = course_form(archive.keys)
-    t = _time_stamps(archive)
+    t = time_stamps("time_stamps", archive.array("time_stamps"))
     T = len(t)
+    rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
     observations, n_landmarks = Observations.none(), 0
     remarks = []
     if "features" in archive.keys:
@@ -57,8 +59,8 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     return Sequence(
         name=name,
         t=t,
-        linear_velocity=_columns(archive, "linear_velocity", T),
-        angular_velocity=_columns(archive, "rotational_velocity" if form == "course-2020" else "angular_velocity", T),
+        linear_velocity=vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T))),
+        angular_velocity=vectors(rate, _shaped(archive, rate, (3, T))),
         camera=_camera(archive),
         imu_T_cam=_extrinsic(archive, form),
         observations=observations,
@@ -91,20 +93,6 @@ def course_form(keys: frozenset[str]) -> str:
     )
 
 
-def _time_stamps(archive: NpzArchive) -> FloatArray:
-    t = archive.array("time_stamps")
-    if not (t.ndim == 1 or (t.ndim == 2 and t.shape[0] == 1)):
-        raise InputError(f"time_stamps: expected shape (1, T), got {t.shape}; write one row of seconds")
-    if t.size < 2:
-        raise InputError(f"time_stamps: a recording needs at least 2 frames, this one has {t.size}")
-    return t.reshape(-1)
-
-
-def _columns(archive: NpzArchive, key: str, T: int) -> FloatArray:
-    array = _shaped(archive, key, (3, T))
-    return np.ascontiguousarray(array.T)
-
-
 def _shaped(archive: NpzArchive, key: str, shape: tuple[int, ...]) -> FloatArray:
     array = archive.array(key)
     if array.shape != shape:
@@ -120,18 +108,18 @@ def _camera(archive: NpzArchive) -> StereoCamera:
         raise InputError(f"K: skew is not supported, but K[0, 1] is {K[0, 1]} and K[1, 0] is {K[1, 0]}; rectify first")
     if np.abs(K[2] - [0.0, 0.0, 1.0]).max() > EXACT:
         raise InputError(f"K: its last row is {K[2].tolist()}, expected [0, 0, 1]; write the calibration in pixels")
-    b = archive.array("b")
-    if b.size != 1:
-        raise InputError(f"b: expected one number, the baseline in metres, got shape {b.shape}")
-    return StereoCamera(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]), float(b.reshape(-1)[0]))
+    fu, fv = (positive(f"K[{i}, {i}]", K[i, i], "a focal length in pixels") for i in (0, 1))
+    b = positive("b", archive.array("b"), "the baseline in metres")
+    return StereoCamera(fu, fv, float(K[0, 2]), float(K[1, 2]), b)
 
 
 def _extrinsic(archive: NpzArchive, form: str) -> FloatArray:
-    if form != "course-2020":
-        return _shaped(archive, "imu_T_cam", (4, 4))
-    imu_T_cam = _shaped(archive, "cam_T_imu", (4, 4))
-    imu_T_cam[:3, :3] = imu_T_cam[:3, :3].T.copy()
-    return imu_T_cam
+    key = "cam_T_imu" if form == "course-2020" else "imu_T_cam"
+    matrix = _shaped(archive, key, (4, 4))
+    if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise InputError(f"{key}: its last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]")
+    rotation = matrix[:3, :3].T if form == "course-2020" else matrix[:3, :3]
+    return extrinsic(key, rotation, matrix[:3, 3])
 
 
 def _up(archive: NpzArchive) -> FloatArray | None:

@@ -16,7 +16,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import IntArray, Observations
-from .npz_archive import ArrayStream
+from .array_stream import ArrayStream
 
 UNOBSERVED = -1.0
 CHUNK = 2**19
@@ -48,21 +48,24 @@ def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int
             f"{stream.key}: expected shape (4, N, {n_frames}) for the {n_frames} time stamps, got {shape}; "
             "write uL, vL, uR, vR along the first axis and the frames along the last"
         )
-    layout = _Layout(stream.key, n_frames, shape[1], frames_first=not stream.fortran_order)
-    if shape[1] == 0:
-        return Observations.none(), 0
-    index, pixel = (_entries_by_row if layout.frames_first else _entries_together)(stream, layout)
-    return _observations(index, pixel, layout), shape[1]
+    return _read(stream, _Layout(stream.key, n_frames, shape[1], frames_first=not stream.fortran_order)), shape[1]
 
 
-def dense_features(block: FloatArray, key: str) -> Observations:
-    """The observations in a block (4, T, N) that is in memory, as `.mat` files have it. Raises as `read_features`."""
-    _, n_frames, n_landmarks = block.shape
-    layout = _Layout(key, n_frames, n_landmarks, frames_first=True)
-    flat = block.reshape(4, -1, order="F")
-    index = np.flatnonzero((flat != UNOBSERVED).any(axis=0))
-    pixel = np.ascontiguousarray(flat[:, index].T)
-    _require_finite(index, pixel, layout)
+def read_features_by_frame(stream: ArrayStream, n_frames: int) -> tuple[Observations, int]:
+    """The same of a block (4, T, N), as `.mat` files have it."""
+    shape = stream.shape if len(stream.shape) != 2 else (*stream.shape, 1)  # MATLAB drops a last axis of length 1
+    if len(shape) != 3 or shape[:2] != (4, n_frames):
+        raise InputError(
+            f"{stream.key}: expected shape (4, {n_frames}, N) for the {n_frames} time stamps, got {stream.shape}; "
+            "save uL, vL, uR, vR along the first axis and the frames along the second"
+        )
+    return _read(stream, _Layout(stream.key, n_frames, shape[2], frames_first=stream.fortran_order)), shape[2]
+
+
+def _read(stream: ArrayStream, layout: _Layout) -> Observations:
+    if layout.n_landmarks == 0:
+        return Observations.none()
+    index, pixel = (_entries_together if stream.fortran_order else _entries_by_row)(stream, layout)
     return _observations(index, pixel, layout)
 
 

@@ -31,7 +31,7 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
         raise InputError(
             f"{shown(path)}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
-    with reading(path), np.errstate(over="ignore", invalid="ignore"):
+    with reading(path), np.errstate(all="ignore"):
         poses, remarks = _poses_of_frames(sequence, path)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)

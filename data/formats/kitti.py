@@ -18,7 +18,7 @@ def read_kitti(path: FilePath) -> FloatArray:
     Raises InputError naming file and line for what is no number, and for a rotation that is off by more than
     ROTATION_TOLERANCE.
     """
-    with reading(path), np.errstate(over="ignore", invalid="ignore"):
+    with reading(path), np.errstate(all="ignore"):
         return kitti_poses(read_numbers(regular_file(path), {NUMBERS: "KITTI"}))
 
 

@@ -1,73 +1,191 @@
-"""Real arrays out of a MATLAB 5 file, by name; the variables that were not asked for are never opened."""
+"""Real arrays out of a MATLAB 5 file, whole or piece by piece.
 
+Layout: "MAT-File Format", The MathWorks, chapter 1. After 128 bytes of header come elements of a tag (type, number
+of bytes) and data padded to 8 bytes. A variable is an element of type 14, or one of type 15 that holds it compressed;
+its sub-elements are flags, dimensions, name and numbers. Only dense real arrays are opened. (`scipy.io.loadmat` reads
+these files too, but one wrong byte in them makes it take the interpreter down.)
+"""
+
+import io
 import math
-import warnings
-from collections.abc import Callable
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from types import TracebackType
+from typing import IO, Self
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-NUMERIC = frozenset(
-    {"double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"}
-)  # fmt: skip
-VARIABLE_LIMIT = 4 * 2**30
-"""bytes: scipy reads a variable whole, so one that claims more than this is refused before"""
+from .array_stream import ArrayStream, Readable, Shape, damage_told, missing
 
-_Result = TypeVar("_Result")
+HEADER = 128
+STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""how numbers lie in the file, whatever the class of the variable"""
+INT8, INT32, UINT32, MATRIX, COMPRESSED = 1, 5, 6, 14, 15
+DENSE_CLASSES = range(6, 16)
+"""double, single and the integers; what is below are cells, structures, objects, texts and sparse matrices"""
+COMPLEX = 0x0800
+SMALL_PART = 1024
+"""bytes: flags, dimensions and names are shorter than this"""
+
+
+class _Slice:
+    """The next n bytes of a file."""
+
+    def __init__(self, file: Readable, n: int) -> None:
+        self._file, self._left = file, n
+
+    def read(self, n: int, /) -> bytes:
+        raw = self._file.read(min(n, self._left))
+        self._left -= len(raw)
+        return raw
+
+
+class _Inflated:
+    """What compressed bytes unpack to; its end is reached only if the checksum holds."""
+
+    def __init__(self, packed: Readable) -> None:
+        self._packed, self._zlib = packed, zlib.decompressobj()
+
+    def read(self, n: int, /) -> bytes:
+        pieces = []
+        while n > 0 and not self._zlib.eof:
+            packed = self._zlib.unconsumed_tail or self._packed.read(2**16)
+            piece = self._zlib.decompress(packed, n)
+            if not packed and not piece:
+                raise EOFError("the compressed data end early")
+            pieces.append(piece)
+            n -= len(piece)
+        return b"".join(pieces)
+
+
+@dataclass(frozen=True, slots=True)
+class _Variable:
+    offset: int
+    n_bytes: int
+    compressed: bool
+    shape: Shape
+    flags: int
 
 
 class MatFile:
-    """The numeric variables of a MATLAB 5 file. Raises InputError; the caller puts the file's name before it."""
+    """An open MATLAB 5 file. Its methods raise InputError naming the variable; the caller adds the file's name."""
 
     def __init__(self, path: Path) -> None:
-        from scipy.io import whosmat
+        self._file: IO[bytes] = path.open("rb")
+        try:
+            with damage_told("MATLAB header"):
+                self._order = "<" if self._file.read(HEADER)[-2:] == b"IM" else ">"
+                self._variables = dict(self._scan(path.stat().st_size))
+        except InputError:
+            self._file.close()
+            raise
 
-        self._path = path
-        self._kinds = {
-            str(name): (tuple(int(n) for n in shape), str(kind))
-            for name, shape, kind in _parsed(lambda: whosmat(path, appendmat=False))
-        }
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
 
     @property
     def keys(self) -> frozenset[str]:
         """The names of the variables."""
-        return frozenset(self._kinds)
+        return frozenset(self._variables)
 
-    def shape(self, key: str) -> tuple[int, ...]:
-        """What the file says the shape of a variable is. Raises InputError when it is missing."""
-        if key not in self._kinds:
-            found = ", ".join(repr(k) for k in sorted(self.keys)[:16]) or "nothing"
-            raise InputError(f"{key} is missing; the file has {found}")
-        return self._kinds[key][0]
+    def shape(self, key: str) -> Shape:
+        """The shape of a variable; it has at least two axes. Raises InputError when it is missing."""
+        if key not in self._variables:
+            raise missing(key, self.keys)
+        return self._variables[key].shape
+
+    @contextmanager
+    def stream(self, key: str) -> Iterator[ArrayStream]:
+        """The variable `key`, to be read piece by piece, from the first value to the last.
+
+        Raises InputError when it is missing, no dense array of real numbers, or its data do not fit its shape.
+        """
+        shape, variable = self.shape(key), self._variables[key]
+        if variable.flags & 0xFF not in DENSE_CLASSES or variable.flags & COMPLEX:
+            raise InputError(f"{key}: it is no dense array of real numbers; save it as double")
+        with damage_told(key):
+            source = self._open(variable)
+            self._head(source)
+            stored, n_bytes, inline = self._tag(source)
+            dtype = np.dtype(self._order + STORED[stored])
+        if math.prod(shape) * dtype.itemsize != n_bytes:
+            raise InputError(f"{key}: {n_bytes} bytes of {dtype} do not fill the shape {shape}; save the file again")
+        yield ArrayStream(key, shape, True, dtype, source if inline is None else io.BytesIO(inline))
+        with damage_told(key):
+            source.read(8)  # the padding, and with it the end and its checksum
 
     def array(self, key: str) -> FloatArray:
-        """One variable as float64, with at least two axes, as MATLAB keeps it."""
-        from scipy.io import loadmat
+        """The whole variable as native float64. Raises as `stream`, and when it is implausibly large."""
+        with self.stream(key) as stream:
+            return stream.whole()
 
-        shape = self.shape(key)
-        kind = self._kinds[key][1]
-        if kind not in NUMERIC:
-            raise InputError(f"{key}: it is a MATLAB {kind} where real numbers are expected; save it as double")
-        if any(n < 0 for n in shape) or math.prod(shape) * 8 > VARIABLE_LIMIT:
-            raise InputError(f"{key}: it claims the shape {shape}, more than any recording needs; save the file again")
-        value = _parsed(lambda: loadmat(self._path, appendmat=False, variable_names=[key])[key])
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu":
-            raise InputError(f"{key}: it holds {array.dtype} where real numbers are expected; save it as double")
-        if array.shape != shape:
-            raise InputError(f"{key}: its header claims shape {shape} but {array.shape} was found; save the file again")
-        return array.astype(np.float64, copy=False)
+    def _scan(self, size: int) -> Iterator[tuple[str, _Variable]]:
+        """Every named variable of the file, by its head."""
+        offset = HEADER
+        while offset < size:
+            self._file.seek(offset)
+            kind, n_bytes, inline = self._tag(self._file)
+            offset += 8
+            if kind not in (MATRIX, COMPRESSED) or inline is not None or offset + n_bytes > size:
+                raise ValueError(f"no whole variable at byte {offset - 8}")
+            variable = _Variable(offset, n_bytes, kind == COMPRESSED, (), 0)
+            flags, shape, name = self._head(self._open(variable))
+            yield name, _Variable(offset, n_bytes, kind == COMPRESSED, shape, flags)
+            offset += n_bytes
+
+    def _open(self, variable: _Variable) -> Readable:
+        """The sub-elements of a variable."""
+        self._file.seek(variable.offset)
+        packed = _Slice(self._file, variable.n_bytes)
+        if not variable.compressed:
+            return packed
+        source = _Inflated(packed)
+        kind, _, _ = self._tag(source)
+        if kind != MATRIX:
+            raise ValueError(f"element type {kind} in place of a variable")
+        return source
+
+    def _head(self, source: Readable) -> tuple[int, Shape, str]:
+        """Flags, dimensions and name of a variable; `source` then stands before its numbers."""
+        flags = np.frombuffer(self._part(source, UINT32), self._order + "u4")
+        dimensions = np.frombuffer(self._part(source, INT32), self._order + "i4").tolist()
+        name = self._part(source, INT8).decode("ascii")
+        if len(flags) != 2 or len(dimensions) < 2 or min(dimensions) < 0:
+            raise ValueError(f"flags {flags.tolist()} and dimensions {dimensions} of {name!r}")
+        return int(flags[0]), tuple(dimensions), name
+
+    def _part(self, source: Readable, expected: int) -> bytes:
+        kind, n_bytes, inline = self._tag(source)
+        if kind != expected or n_bytes > SMALL_PART:
+            raise ValueError(f"element of type {kind} and {n_bytes} bytes in place of type {expected}")
+        if inline is not None:
+            return inline
+        return _exactly(source, n_bytes + -n_bytes % 8)[:n_bytes]
+
+    def _tag(self, source: Readable) -> tuple[int, int, bytes | None]:
+        """Type and size of the next element, and its data if it is of the small kind that has them in its tag."""
+        raw = _exactly(source, 8)
+        first, second = np.frombuffer(raw, self._order + "u4").tolist()
+        if first >> 16:
+            n_bytes = first >> 16
+            if n_bytes > 4:
+                raise ValueError(f"a small element of {n_bytes} bytes")
+            return first & 0xFFFF, n_bytes, raw[4 : 4 + n_bytes]
+        return first, second, None
 
 
-def _parsed(parse: Callable[[], _Result]) -> _Result:
-    """What scipy makes of the file; on damaged input it raises a dozen types, which become one here."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return parse()
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"the MATLAB file is damaged or truncated ({reason}); copy or save it again") from error
+def _exactly(source: Readable, n: int) -> bytes:
+    raw = source.read(n)
+    if len(raw) < n:
+        raise EOFError("the file ends early")
+    return raw

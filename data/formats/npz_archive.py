@@ -1,11 +1,10 @@
-"""Arrays out of a zip of .npy members (`np.savez`), whole or piece by piece, trusting nothing it says of itself."""
+"""Arrays out of a zip of .npy members (`np.savez`), whole or piece by piece."""
 
 import math
 import warnings
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
@@ -15,50 +14,14 @@ from numpy.lib import format as npy
 
 from fgbaseline.geometry import FloatArray, InputError
 
-Shape = tuple[int, ...]
-WHOLE_ARRAY_LIMIT = 256 * 2**20
-"""bytes: an array that is read whole and claims more than this is a mistake or an attack"""
-
-
-@contextmanager
-def _unzipping(key: str) -> Iterator[None]:
-    """zipfile, its decompressors and the header's parser raise a dozen types on damaged input: here they become one."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{key}: the archive is damaged or truncated ({reason}); copy or write it again") from error
-
-
-@dataclass(frozen=True, slots=True)
-class ArrayStream:
-    """One member, opened behind its header: `take` gives its values in the order they lie in."""
-
-    key: str
-    shape: Shape
-    fortran_order: bool
-    dtype: np.dtype[Any]
-    _member: IO[bytes]
-
-    def take(self, n: int) -> FloatArray:
-        """The next n values (n,) as native float64. Raises InputError where the member ends before them."""
-        wanted = n * self.dtype.itemsize
-        with _unzipping(self.key):
-            raw = self._member.read(wanted)
-        if len(raw) < wanted:
-            raise InputError(
-                f"{self.key}: the data end before the shape {self.shape} is filled; copy or write the file again"
-            )
-        return np.frombuffer(raw, self.dtype).astype(np.float64, copy=False)
+from .array_stream import ArrayStream, Shape, damage_told, missing
 
 
 class NpzArchive:
     """An open .npz file. Its methods raise InputError naming the key; the caller puts the file's name before it."""
 
     def __init__(self, path: Path) -> None:
-        with _unzipping("zip directory"):
+        with damage_told("zip directory"):
             self._zip = zipfile.ZipFile(path)
         self._members: dict[str, zipfile.ZipInfo] = {}
         try:
@@ -99,13 +62,12 @@ class NpzArchive:
         Raises InputError when the key is missing, the numbers are not real, or the header does not fit the data.
         """
         if key not in self._members:
-            found = ", ".join(repr(k) for k in sorted(self.keys)[:12]) or "nothing"
-            raise InputError(f"{key} is missing; the file has {found}")
+            raise missing(key, self.keys)
         info = self._members[key]
-        with _unzipping(key):
+        with damage_told(key):
             member = self._zip.open(info)
         with member:
-            with _unzipping(key):
+            with damage_told(key):
                 shape, fortran_order, dtype = _read_header(key, member)
                 promised = math.prod(shape) * dtype.itemsize
                 held = info.file_size - member.tell()
@@ -119,14 +81,7 @@ class NpzArchive:
     def array(self, key: str) -> FloatArray:
         """The whole array as native float64. Raises as `stream`, and when it is implausibly large."""
         with self.stream(key) as stream:
-            size = math.prod(stream.shape)
-            if size * 8 > WHOLE_ARRAY_LIMIT:
-                raise InputError(
-                    f"{key}: shape {stream.shape} is larger than any recording needs; check how the file was written"
-                )
-            values = stream.take(size)
-            array = values.reshape(stream.shape[::-1]).T if stream.fortran_order else values.reshape(stream.shape)
-            return array.copy(order="C")
+            return stream.whole()
 
 
 def _read_header(key: str, member: IO[bytes]) -> tuple[Shape, bool, np.dtype[Any]]:

@@ -27,7 +27,7 @@ def read(path: FilePath, truth: FilePath | None = None, truth_frame: BodyFrame |
     `truth` is a KITTI or TUM file with the poses of `truth_frame`, "camera" or "imu" (see `attach_truth`); without it
     the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
     """
-    with reading(path), np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are judged, not computed with
+    with reading(path), np.errstate(all="ignore"):  # absurd numbers are judged, not computed with
         sequence = _read(regular_file(path), os.fspath(path))
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
 
@@ -41,7 +41,8 @@ def _read(file: Path, source: str) -> Sequence:
     if head.startswith(b"MATLAB") and head[MATLAB_HEADER - 2 : MATLAB_HEADER] in (b"IM", b"MI"):
         if HDF5 in head:
             raise InputError("this is a MATLAB 7.3 file (HDF5), which is not supported; save it with save(..., '-v7')")
-        return read_utias(MatFile(file), file.stem, source)
+        with MatFile(file) as mat:
+            return read_utias(mat, file.stem, source)
     raise InputError(f"{_what(head)}; expected an .npz of the course or of fgbaseline, or a UTIAS .mat")
 
 

@@ -20,7 +20,7 @@ def read_tum(path: FilePath) -> tuple[FloatArray, FloatArray]:
     Raises InputError naming file and line for what is no number, for quaternions that are not of length 1 (within
     UNIT_TOLERANCE) and for stamps that do not rise.
     """
-    with reading(path), np.errstate(over="ignore", invalid="ignore"):
+    with reading(path), np.errstate(all="ignore"):
         return tum_poses(read_numbers(regular_file(path), {NUMBERS: "TUM"}))
 
 

@@ -19,11 +19,13 @@ from fgbaseline.geometry import FloatArray, InputError, StereoCamera, so3
 
 from ..observations import Observations
 from ..sequence import Sequence, Truth
-from .feature_block import dense_features
+from .feature_block import read_features_by_frame
+from .fields import extrinsic, positive, time_stamps, vectors
 from .mat_file import MatFile
 
 VELOCITIES = ("v_vk_vk_i", "w_vk_vk_i")
 TRUTH = ("r_i_vk_i", "theta_vk_i")
+POSITIVE = {"fu": "a focal length in pixels", "fv": "a focal length in pixels", "b": "the baseline in metres"}
 VARIANCES = ("v_var", "w_var", "y_var")
 
 
@@ -34,20 +36,18 @@ def read_utias(mat: MatFile, name: str, source: str) -> Sequence:
         raise InputError(
             f"this MATLAB file is no UTIAS recording; expected v_vk_vk_i, w_vk_vk_i and y_k_j, found {found}"
         )
-    t = mat.array("t")
-    if t.ndim != 2 or t.shape[0] != 1:
-        raise InputError(f"t: expected shape (1, T), got {t.shape}; save one row of seconds")
-    T = t.shape[1]
-    if T < 2:
-        raise InputError(f"t: a recording needs at least 2 frames, this one has {T}")
+    t = time_stamps("t", mat.array("t"))
+    T = len(t)
     observations, n_landmarks = _observations(mat, T)
-    v, w = (_first_columns(mat, key, T) for key in VELOCITIES)
+    v, w = (vectors(key, _first_columns(mat, key, T)) for key in VELOCITIES)
+    fu, fv, b = (positive(key, mat.array(key), what) for key, what in POSITIVE.items())
+    cu, cv = (_finite(mat, key) for key in ("cu", "cv"))
     return Sequence(
         name=name,
-        t=t[0].copy(),
+        t=t,
         linear_velocity=v,
         angular_velocity=w,
-        camera=StereoCamera(*(_scalar(mat, key) for key in ("fu", "fv", "cu", "cv", "b"))),
+        camera=StereoCamera(fu, fv, cu, cv, b),
         imu_T_cam=_extrinsic(mat),
         observations=observations,
         n_landmarks=n_landmarks,
@@ -61,36 +61,29 @@ def read_utias(mat: MatFile, name: str, source: str) -> Sequence:
 def _observations(mat: MatFile, T: int) -> tuple[Observations, int]:
     if "y_k_j" not in mat.keys:
         return Observations.none(), 0
-    block = mat.array("y_k_j")
-    if block.ndim == 2:  # MATLAB drops a last axis of length 1
-        block = block[:, :, None]
-    if block.ndim != 3 or block.shape[:2] != (4, T):
-        raise InputError(f"y_k_j: expected shape (4, {T}, N) for the {T} time stamps, got {block.shape}")
-    return dense_features(block, "y_k_j"), block.shape[2]
+    with mat.stream("y_k_j") as stream:
+        return read_features_by_frame(stream, T)
 
 
 def _first_columns(mat: MatFile, key: str, T: int) -> FloatArray:
-    """(T, 3) of a variable (3, >= T)."""
+    """(3, T) of a variable (3, >= T)."""
     array = mat.array(key)
     if array.ndim != 2 or array.shape[0] != 3 or array.shape[1] < T:
         raise InputError(f"{key}: expected 3 rows of at least {T} columns for the {T} time stamps, got {array.shape}")
-    return np.ascontiguousarray(array[:, :T].T)
+    return array[:, :T]
 
 
 def _extrinsic(mat: MatFile) -> FloatArray:
-    imu_T_cam = np.eye(4)
     for key, shape in (("C_c_v", (3, 3)), ("rho_v_c_v", (3, 1))):
         if mat.shape(key) != shape:
             raise InputError(f"{key}: expected shape {shape}, got {mat.shape(key)}")
-    imu_T_cam[:3, :3] = mat.array("C_c_v").T
-    imu_T_cam[:3, 3] = mat.array("rho_v_c_v")[:, 0]
-    return imu_T_cam
+    return extrinsic("C_c_v with rho_v_c_v", mat.array("C_c_v").T, mat.array("rho_v_c_v")[:, 0])
 
 
-def _scalar(mat: MatFile, key: str) -> float:
+def _finite(mat: MatFile, key: str) -> float:
     value = mat.array(key)
     if value.size != 1 or not np.isfinite(value).all():
-        raise InputError(f"{key}: expected one finite number, got {value.tolist() if value.size < 5 else value.shape}")
+        raise InputError(f"{key}: expected one finite number, the image centre in pixels, got {value.tolist()[:4]}")
     return float(value.reshape(-1)[0])
 
 
@@ -98,8 +91,8 @@ def _truth(mat: MatFile, T: int, n_landmarks: int) -> Truth | None:
     if not mat.keys.issuperset(TRUTH):
         return None
     poses = np.tile(np.eye(4), (T, 1, 1))
-    poses[:, :3, 3] = _first_columns(mat, "r_i_vk_i", T)
-    poses[:, :3, :3] = so3.exp_so3(_first_columns(mat, "theta_vk_i", T))
+    poses[:, :3, 3] = _first_columns(mat, "r_i_vk_i", T).T
+    poses[:, :3, :3] = so3.exp_so3(_first_columns(mat, "theta_vk_i", T).T)
     poses[~np.isfinite(poses).all(axis=(1, 2))] = np.nan
     landmarks = None
     if "rho_i_pj_i" in mat.keys:

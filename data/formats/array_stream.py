@@ -1,0 +1,74 @@
+"""An array in a file, opened behind its header and read piece by piece, trusting nothing the file says of itself."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+Shape = tuple[int, ...]
+WHOLE_ARRAY_LIMIT = 256 * 2**20
+"""bytes: an array that is read whole and claims more than this is a mistake or an attack"""
+
+
+class Readable(Protocol):
+    """Bytes in their order: a file, a member of an archive, a compressed element."""
+
+    def read(self, n: int, /) -> bytes:
+        """The next n bytes; fewer only at the end."""
+        ...
+
+
+@contextmanager
+def damage_told(key: str) -> Iterator[None]:
+    """Parsers and decompressors raise a dozen types on damaged input: here they become one InputError."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{key}: the file is damaged or truncated ({reason}); copy or write it again") from error
+
+
+def missing(key: str, keys: frozenset[str]) -> InputError:
+    """The error for an array that is not in the file, which has `keys`."""
+    found = ", ".join(repr(k) for k in sorted(keys)[:16]) or "nothing"
+    return InputError(f"{key} is missing; the file has {found}")
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayStream:
+    """One array, opened behind its header: `take` gives its values in the order they lie in."""
+
+    key: str
+    shape: Shape
+    fortran_order: bool
+    dtype: np.dtype[Any]
+    source: Readable
+
+    def take(self, n: int) -> FloatArray:
+        """The next n values (n,) as native float64. Raises InputError where the data end before them."""
+        wanted = n * self.dtype.itemsize
+        with damage_told(self.key):
+            raw = self.source.read(wanted)
+        if len(raw) < wanted:
+            raise InputError(
+                f"{self.key}: the data end before the shape {self.shape} is filled; copy or write the file again"
+            )
+        return np.frombuffer(raw, self.dtype).astype(np.float64, copy=False)
+
+    def whole(self) -> FloatArray:
+        """The whole array as native float64 in C order. Raises InputError when it is implausibly large."""
+        size = math.prod(self.shape)
+        if size * 8 > WHOLE_ARRAY_LIMIT:
+            raise InputError(
+                f"{self.key}: shape {self.shape} is larger than any recording needs; check how the file was written"
+            )
+        values = self.take(size)
+        array = values.reshape(self.shape[::-1]).T if self.fortran_order else values.reshape(self.shape)
+        return array.copy(order="C")
