@@ -11,8 +11,11 @@ from .settings import Simulation
 
 
 def noisy_pixels(pixel: FloatArray, settings: Simulation) -> FloatArray:
-    """Pixels (n, 4) with independent noise of `sigma_pixel` on every row."""
+    """Pixels (n, 4) with noise of `sigma_pixel` on every row, that of vL and vR with `row_correlation`."""
     noise: FloatArray = generator(settings.seed, Concern.PIXELS).standard_normal(pixel.shape)
+    shared = settings.row_correlation
+    if shared:
+        noise[:, 3] = shared * noise[:, 1] + np.sqrt(1.0 - shared**2) * noise[:, 3]
     return pixel + settings.sigma_pixel * noise
 
 

@@ -13,12 +13,12 @@ from .settings import MAX_TIME_OFFSET, Simulation, Velocities
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """A continuous motion. Its world is level (z up); its ends are extended with their own velocities."""
+    """A continuous motion; beyond its ends it goes on with the velocities it has there."""
 
     t: FloatArray
     """(g,) s, rising; reaches beyond the first and last frame"""
     poses: FloatArray
-    """(g, 4, 4) world_T_imu"""
+    """(g, 4, 4) of the body in some world"""
     velocity: FloatArray
     """(g - 1, 6) the body twist [v, w] held from one grid time to the next"""
 
@@ -28,7 +28,7 @@ class Path:
         return Path(t, poses, se3.log(se3.relative(poses)) / np.diff(t)[:, None])
 
     def at(self, t: ArrayLike) -> FloatArray:
-        """`world_T_imu` (n, 4, 4) at times (n,) in s."""
+        """Poses (n, 4, 4) at times (n,) in s."""
         times = np.asarray(t, dtype=np.float64)
         i = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.velocity) - 1)
         poses: FloatArray = self.poses[i] @ se3.exp((times - self.t[i])[:, None] * self.velocity[i])
@@ -43,6 +43,11 @@ class Path:
     def moved(self, pose: FloatArray) -> "Path":
         """The same path in another world: `pose` (4, 4) takes the present world to it."""
         return Path(self.t, pose @ self.poses, self.velocity)
+
+    def of(self, mounted: FloatArray) -> "Path":
+        """The path of something at the pose `mounted` (4, 4) on this body."""
+        back = se3.adjoint(se3.inverse(mounted))
+        return Path(self.t, self.poses @ mounted, self.velocity @ back.T)
 
 
 def time_grid(seconds: float, frame_rate: float) -> FloatArray:

@@ -43,14 +43,14 @@ def simulate(settings: Simulation) -> Sequence:
 
 def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     """The same, and which observations are wrong or moving."""
-    t, path = _path(settings)
-    origin = se3.inverse(path.at(t[:1])[0])
-    poses = origin @ path.at(t)
+    rig = settings.mount
+    t, level = _path(settings)
+    origin = se3.inverse(level.at(t[:1])[0])
+    path = level.moved(origin)
+    poses = path.at(t)
     poses[0] = np.eye(4)
-    up = origin[:3, 2] if settings.path != "along" else np.array([0.0, 0.0, 1.0])
-    path = path.moved(origin)
 
-    static, moving = _tracks(path, poses, t, settings)
+    static, moving = _tracks(path.of(rig.body_pose), poses, t, settings)
     m = len(static.first)
     tracks = Tracks(
         np.concatenate([static.frame, moving.frame]),
@@ -58,7 +58,6 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
         np.concatenate([static.point, moving.point]),
         np.concatenate([static.first, np.full_like(moving.first, np.nan)]),
     )
-    rig = settings.mount
     cameras = poses @ rig.imu_T_cam
     pixel = rig.camera.project(se3.transform(se3.inverse(cameras)[tracks.frame], tracks.point))
     wrong, offset = wrong_matches(tracks.frame, tracks.track, t, settings)
@@ -76,7 +75,7 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
         observations=Observations(tracks.frame[order], tracks.track[order], pixel[order]),
         n_landmarks=len(tracks.first),
         truth=Truth(poses, tracks.first, "simulated"),
-        up_imu=up,
+        up_imu=origin[:3, 2],
         form="simulated",
         source=f"simulated: {_described(settings)}",
         remarks=_remarks(settings, wrong),
@@ -85,10 +84,11 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
 
 
 def _path(settings: Simulation) -> tuple[FloatArray, Path]:
-    """The frames' times (T,) s, and the path in a level world."""
+    """The frames' times (T,) s, and the IMU's path in a level world: z up."""
+    imu_T_body = settings.mount.body_pose
     if settings.path == "along":
         velocities = followed(settings)
-        path = path_along(velocities)
+        path = path_along(velocities).moved(se3.inverse(imu_T_body))
         if settings.frame_rate is None:
             return velocities.t, path
         return np.arange(0.0, velocities.t[-1] + 1e-9, 1.0 / settings.frame_rate), path
@@ -96,7 +96,7 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
     grid = time_grid(float(t[-1]), settings.rate)
     rng = generator(settings.seed, Concern.PATH)
     if settings.path == "handheld":
-        return t, handheld_path(grid, rng)
+        return t, handheld_path(grid, rng).of(se3.inverse(imu_T_body))
     seconds = float(grid[-1] - grid[0])
     if settings.path == "town":
         road = town_road(13.0 * seconds + 100.0, rng)
@@ -105,22 +105,24 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
     else:
         lap = float(t[-1]) / max(1, round(float(t[-1]) / 60.0))
         road = loop_road(max(8.0, 200.0 / lap) * seconds + 100.0, lap)
-    return t, drive(road, grid, rng)
+    return t, drive(road, grid, rng).of(se3.inverse(imu_T_body))
 
 
-def _tracks(path: Path, poses: FloatArray, t: FloatArray, settings: Simulation) -> tuple[Tracks, Tracks]:
-    """Tracks of what stands still, and of what moves."""
+def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) -> tuple[Tracks, Tracks]:
+    """Tracks of what stands still, and of what moves, seen along the IMU's poses (T, 4, 4)."""
     rig = settings.mount
     nearest, farthest = settings.depths
     seeing = np.ones(len(t), dtype=np.bool_)
     for start, end in settings.blackouts:
         seeing &= (t < start) | (t > end)
-    sight = Sight(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, 2.0 + 5.0 * settings.sigma_pixel, seeing)
+    # so far inside that noise leaves no image; the same for every small noise, so that it does not change the tracks
+    border = max(5.0, 5.0 * settings.sigma_pixel)
+    sight = Sight(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, border, seeing)
     scenery = generator(settings.seed, Concern.SCENERY)
     if settings.scene == "room":
-        points: Callable[[FloatArray, np.random.Generator], FloatArray] = Room(path, rig).points
+        points: Callable[[FloatArray, np.random.Generator], FloatArray] = Room(body, rig).points
     else:
-        points = Street(path, rig.imu_above_ground, settings.path == "highway", scenery).points
+        points = Street(body, rig.imu_above_ground, settings.path == "highway", scenery).points
 
     def standing(birth: IntArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         return points(t[birth], rng), np.zeros((len(birth), 3))
@@ -138,7 +140,7 @@ def _tracks(path: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
     traffic = generator(settings.seed, Concern.TRAFFIC)
     share = settings.moving_share
     how = Tracking(settings.features_per_frame * share / (1.0 - share), settings.track_length, farthest)
-    moving = follow(Traffic(path, t, settings.scene, traffic).points, sight, t, how, traffic, traffic)
+    moving = follow(Traffic(body, t, settings.scene, traffic).points, sight, t, how, traffic, traffic)
     return static, moving
 
 

@@ -6,12 +6,15 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera, so3
 
+from ..sequence import Sequence
+from .axes import AXIS_CONVENTIONS, axes_matrix
+
 _IMU_R_CAM = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""camera z forward, x right, y down in an IMU with x forward, y left, z up"""
+"""camera z forward, x right, y down in a body with x forward, y left, z up"""
 
 
 def mounted(position: tuple[float, float, float], misalignment: tuple[float, float, float]) -> FloatArray:
-    """`imu_T_cam` (4, 4) of a camera that looks forward.
+    """`imu_T_cam` (4, 4) of a camera that looks forward, on an IMU with x forward, y left, z up.
 
     `position` in the IMU's frame (m), turned in its own axes by the small rotation vector `misalignment` (rad).
     """
@@ -23,7 +26,7 @@ def mounted(position: tuple[float, float, float], misalignment: tuple[float, flo
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rig:
-    """A stereo camera on an IMU whose x axis looks forward, y left and z up."""
+    """A stereo camera on an IMU, on a body with x forward, y left, z up; the IMU may be mounted in other axes."""
 
     camera: StereoCamera
     width: int
@@ -33,6 +36,27 @@ class Rig:
     """(4, 4) extrinsic of the left camera"""
     imu_above_ground: float
     """m, where the rig drives on a road"""
+
+    @property
+    def body_pose(self) -> FloatArray:
+        """`imu_T_body` (4, 4): of the 24 ways to mount an IMU the one by which the camera looks most nearly ahead."""
+        looks = self.imu_T_cam[:3, :3] @ _IMU_R_CAM.T
+        imu_T_body = np.eye(4)
+        imu_T_body[:3, :3] = max(map(axes_matrix, AXIS_CONVENTIONS), key=lambda axes: float(np.sum(axes * looks)))
+        return imu_T_body
+
+
+def rig_of(sequence: Sequence) -> Rig:
+    """The rig that recorded a sequence; images are taken to be as large as its observations or twice its centre say."""
+    camera, pixel = sequence.camera, sequence.observations.pixel
+    corner = pixel[:, :2].max(axis=0, initial=0.0)
+    return Rig(
+        camera=camera,
+        width=int(np.ceil(max(corner[0], 2.0 * camera.cu))),
+        height=int(np.ceil(max(corner[1], 2.0 * camera.cv))),
+        imu_T_cam=sequence.imu_T_cam,
+        imu_above_ground=KITTI.imu_above_ground,
+    )
 
 
 KITTI = Rig(

@@ -17,6 +17,7 @@ class Room:
     def __init__(self, path: Path, rig: Rig) -> None:
         self._path = path
         self._rig = rig
+        self._body_T_cam = se3.inverse(rig.body_pose) @ rig.imu_T_cam
         positions = path.poses[:, :3, 3]
         self._low = positions.min(axis=0) - _MARGIN
         self._high = positions.max(axis=0) + _MARGIN
@@ -27,7 +28,7 @@ class Room:
         u = rng.uniform(0.0, self._rig.width, len(t))
         v = rng.uniform(0.0, self._rig.height, len(t))
         ray = np.stack([(u - camera.cu) / camera.fu, (v - camera.cv) / camera.fv, np.ones(len(t))], axis=1)
-        world_T_cam = self._path.at(t) @ self._rig.imu_T_cam
+        world_T_cam = self._path.at(t) @ self._body_T_cam
         eye = world_T_cam[:, :3, 3]
         direction = se3.transform(world_T_cam, ray) - eye
         direction = np.where(np.abs(direction) < 1e-9, 1e-9, direction)

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..sequence import Sequence
 from .axes import IDENTITY, axes_matrix
-from .rig import HANDHELD, KITTI, Rig
+from .rig import HANDHELD, KITTI, Rig, rig_of
 
 PathName = Literal["town", "loop", "highway", "handheld", "along"]
 WorldName = Literal["street", "room"]
@@ -23,7 +23,7 @@ MAX_TIME_OFFSET = 1.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Velocities:
-    """A motion to follow: sample k moves frame k to k + 1, in a frame with x forward, y left, z up."""
+    """A motion to follow: sample k moves frame k to k + 1, in the IMU's frame."""
 
     t: FloatArray
     """(T,) s, strictly rising"""
@@ -57,9 +57,9 @@ class Simulation:
     """frames a second; 10, or the stamps of `along`"""
     seed: int = 0
     world: WorldName | None = None
-    """what there is to see; a room for `handheld`, otherwise a street"""
+    """what there is to see; a room for `handheld` and for what moves at less than 1.5 m/s, otherwise a street"""
     rig: Rig | None = None
-    """camera and extrinsic; by default KITTI's car, or a small rig for `handheld`"""
+    """camera and extrinsic; by default that of `along`, if it has one, a small rig for `handheld`, else KITTI's car"""
 
     sigma_linear: float = 0.1
     """m/s, noise of each component of a velocity sample, held over the interval"""
@@ -94,7 +94,9 @@ class Simulation:
     """(start, end) in s: frames without features"""
 
     sigma_pixel: float = 0.5
-    """px, noise of each of uL, vL, uR, vR, independent"""
+    """px, noise of each of uL, vL, uR, vR"""
+    row_correlation: float = 0.0
+    """between the noise of vL and vR; on the real recordings vL - vR has a deviation of only 0.35 to 0.43 px"""
     wrong_share: float = 0.03
     """share of the observations that are wrong matches; half of them single, half from one frame on to the track's
     end"""
@@ -118,7 +120,7 @@ class Simulation:
             raise InputError(f"seed: expected a whole number from 0 on, got {self.seed!r}")
         for name in ("sigma_linear", "sigma_angular", "sigma_pixel"):
             _require_range(name, getattr(self, name), low=0.0)
-        for name in ("wrong_share", "returning_share"):
+        for name in ("wrong_share", "returning_share", "row_correlation"):
             _require_range(name, getattr(self, name), low=0.0, high=1.0)
         _require_range("moving_share", self.moving_share, low=0.0, high=0.9)
         _require_vector("gyro_bias", self.gyro_bias)
@@ -155,12 +157,20 @@ class Simulation:
     @property
     def scene(self) -> WorldName:
         """`world`, or its default."""
-        return self.world or ("room" if self.path == "handheld" else "street")
+        if self.world is not None:
+            return self.world
+        linear = self.along.linear_velocity if isinstance(self.along, Sequence) else getattr(self.along, "linear", None)
+        slow = linear is not None and bool(np.mean(np.linalg.norm(linear, axis=-1)) < 1.5)
+        return "room" if slow or self.path == "handheld" else "street"
 
     @property
     def mount(self) -> Rig:
         """`rig`, or its default."""
-        return self.rig or (HANDHELD if self.path == "handheld" else KITTI)
+        if self.rig is not None:
+            return self.rig
+        if isinstance(self.along, Sequence):
+            return rig_of(self.along)
+        return HANDHELD if self.path == "handheld" else KITTI
 
     @property
     def depths(self) -> tuple[float, float]:

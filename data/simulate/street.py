@@ -111,7 +111,7 @@ class Street:
         m = int(i.sum())
         x[i] = rng.uniform(20.0, 90.0, m)
         y[i] = rng.uniform(12.0, 60.0, m)
-        z[i] = rng.uniform(2.0, 26.0, m)
+        z[i] = rng.uniform(4.0, 28.0, m)
 
         standing = names != "ground"
         y = side * (y + self._margin * standing) + _LANE

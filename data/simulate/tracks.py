@@ -90,7 +90,7 @@ def follow(
     wanted = _wanted(how.features, sight.seeing, t, rng)
     candidates = _born(source, sight, how, wanted, rng)
     length = _held(candidates, candidates.birth, _lifetimes(len(candidates), how, rng), sight, t)
-    kept = np.flatnonzero(length >= SHORTEST)
+    kept = np.flatnonzero(length >= min(SHORTEST, len(t)))
     chosen = kept[_top_up(candidates.birth[kept], length[kept], wanted)]
     tracked = candidates.select(chosen)
     track, frame = _expand(tracked.birth, length[chosen])
