@@ -1,0 +1,74 @@
+"""The terms of a problem as GTSAM factors, with the same likelihood as the filters have.
+
+The report's measurement has four rows of variance V; `StereoPoint2` has one v. Feeding v = (vL + vR) / 2 with
+standard deviations (s, s, s / sqrt(2)), s^2 = V, for (uL, uR, v) leaves out only the constant
+sum of (vL - vR)^2 / (4 s^2) of the half cost.
+"""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+
+from .convention import landmark_key, pose_key, reordered
+
+HELD_SIGMA = 1e-6
+"""m and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
+
+
+class Factors:
+    """Makes the factors of one problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        camera = problem.sequence.camera
+        self.problem = problem
+        self.calibration = gtsam.Cal3_S2Stereo(camera.fu, camera.fv, 0.0, camera.cu, camera.cv, camera.baseline)
+        self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
+        self.stereo_noise = stereo_noise(problem)
+        self.steps = se3.exp(problem.increment)
+        self.step_covariance = reordered(problem.increment_covariance)
+
+    def first_pose(self) -> gtsam.PriorFactorPose3:
+        """The prior on the pose of frame 0."""
+        covariance = reordered(self.problem.initial_covariance) + HELD_SIGMA**2 * np.eye(6)
+        noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
+        return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(self.problem.initial_pose), noise)
+
+    def motion(self, frame: int) -> gtsam.BetweenFactorPose3:
+        """The increment from `frame` to the next."""
+        noise = gtsam.noiseModel.Gaussian.Covariance(self.step_covariance[frame])
+        step = gtsam.Pose3(self.steps[frame])
+        return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
+
+    def stereo(self, frame: int, landmark: int, pixel: FloatArray) -> gtsam.GenericStereoFactor3D:
+        """One stereo observation (4,) of a landmark; no throw where the point is behind the camera."""
+        uL, vL, uR, vR = pixel.tolist()
+        return gtsam.GenericStereoFactor3D(
+            gtsam.StereoPoint2(uL, uR, 0.5 * (vL + vR)),
+            self.stereo_noise,
+            pose_key(frame),
+            landmark_key(landmark),
+            self.calibration,
+            False,
+            False,
+            self.imu_P_cam,
+        )
+
+    def landmark_prior(self, landmark: int) -> gtsam.PriorFactorPoint3:
+        """The problem's prior on one landmark."""
+        prior = self.problem.landmark_prior
+        assert prior is not None
+        row = int(np.searchsorted(self.problem.features, landmark))
+        noise = gtsam.noiseModel.Gaussian.Covariance(prior.covariance)
+        return gtsam.PriorFactorPoint3(landmark_key(landmark), prior.mean[row], noise)
+
+
+def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:
+    """The noise model of (uL, uR, v), under the problem's kernel."""
+    s = np.sqrt(problem.pixel_variance)
+    gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.array([s, s, s / np.sqrt(2.0)]))
+    if problem.kernel is None:
+        return gaussian
+    huber = gtsam.noiseModel.mEstimator.Huber.Create(problem.kernel.threshold)
+    return gtsam.noiseModel.Robust.Create(huber, gaussian)

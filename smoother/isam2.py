@@ -1,0 +1,134 @@
+"""The reference estimate, and what was known online, from one run of iSAM2."""
+
+import time
+from collections import Counter
+from dataclasses import replace
+
+import gtsam
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from .convention import landmark_key, pose_key, reordered
+from .incremental import PRIOR, GivenUpError, IncrementalSmoother, ISAM2Settings
+from .journal import IndeterminateSystemError
+from .values import points_of, poses_of
+
+FINAL_UPDATES = 10
+"""at most, after the last frame: each relinearises what has moved beyond the threshold"""
+
+
+def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
+    """Incremental smoothing over the whole graph: every pose as known from all of the data.
+
+    A landmark enters once its geometry is determined, with all its observations. Where the system is indeterminate
+    the landmark behind it is given up, or the frame's observations; each is an event and the status is then
+    `recovered`. `by_products["isam2-online"]` is pose k as known from data up to k.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _solve(problem, progress, settings or ISAM2Settings())
+
+
+def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Pose k as the same run knew it from data up to frame k: what a filter can fairly be compared with.
+
+    `by_products["isam2"]` is the run's final answer.
+    """
+    final = isam2(problem, progress)
+    if final.status is Status.FAILED:
+        return Estimate.failed("isam2-online", final.reason, problem.n_frames, len(problem.excluded))
+    return _with_by_product(final.by_products["isam2-online"], final)
+
+
+def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings) -> Estimate:
+    start = time.perf_counter()
+    T = problem.n_frames
+    if len(problem.observations()) == 0:
+        return Estimate.failed("isam2", "no observations", T, len(problem.excluded))
+    seconds = np.zeros(T)
+    smoother = IncrementalSmoother(problem, settings)
+    try:
+        smoother.run(seconds, progress)
+        _relinearise(smoother)
+    except (GivenUpError, IndeterminateSystemError) as error:
+        return Estimate.failed("isam2", str(error), T, len(problem.excluded))
+    values = smoother.isam.tree.calculateEstimate()
+    index = np.sort(np.fromiter(smoother.in_graph, dtype=np.int64))
+    pose_covariance, landmark_covariance = _marginals(smoother, values, index.tolist())
+    events = (*smoother.events, *_never_determined(smoother))
+    status, reason = _verdict(events)
+    used = problem.spread(_used(smoother))
+    online = Estimate(
+        name="isam2-online",
+        world_T_imu=smoother.online,
+        covariance=smoother.online_covariance,
+        landmarks=smoother.online_landmarks(),
+        used=used,
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=float(seconds.sum()),
+        events=events,
+    )
+    final = Estimate(
+        name="isam2",
+        world_T_imu=poses_of(values, T),
+        covariance=pose_covariance,
+        landmarks=Landmarks(index, points_of(values, index.tolist()), landmark_covariance),
+        used=used,
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=time.perf_counter() - start,
+        events=events,
+    )
+    return _with_by_product(final, online)
+
+
+def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
+    return replace(estimate, by_products={other.name: replace(other, by_products={})})
+
+
+def _relinearise(smoother: IncrementalSmoother) -> None:
+    """Updates without new factors until nothing has moved beyond the threshold; then gives up what lies behind."""
+    for _ in range(FINAL_UPDATES):
+        result = smoother.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values())
+        if result.getVariablesRelinearized() == 0:
+            break
+    smoother.drop_behind()
+
+
+def _marginals(
+    smoother: IncrementalSmoother, values: gtsam.Values, landmarks: list[int]
+) -> tuple[FloatArray, FloatArray]:
+    """(T, 6, 6) of the poses, order [v, w], and (m, 3, 3) of the landmarks, at the final linearisation."""
+    marginals = gtsam.Marginals(smoother.isam.tree.getFactorsUnsafe(), values)
+    T = smoother.problem.n_frames
+    poses = np.array([marginals.marginalCovariance(pose_key(k)) for k in range(T)])
+    points = np.array([marginals.marginalCovariance(landmark_key(j)) for j in landmarks]).reshape(-1, 3, 3)
+    return reordered(poses), points
+
+
+def _used(smoother: IncrementalSmoother) -> BoolArray:
+    used = np.zeros(len(smoother.observations), dtype=np.bool_)
+    used[[i for observed in smoother.in_graph.values() for i in observed if i != PRIOR]] = True
+    return used
+
+
+def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
+    return [
+        Event(frame, "landmark never determined", "its observations never fixed its position well enough", landmark)
+        for landmark, frame in smoother.waiting.last_seen()
+    ]
+
+
+def _verdict(events: tuple[Event, ...]) -> tuple[Status, str]:
+    trouble = Counter(event.kind for event in events if event.kind != "landmark never determined")
+    if not trouble:
+        return Status.OK, ""
+    told = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
+    return Status.RECOVERED, f"the system was indeterminate on the way: {told}"

@@ -1,0 +1,97 @@
+"""Landmarks that wait to enter the graph until their geometry is determined."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data.observations import IntArray, Observations
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.triangulation import triangulate_tracks
+
+
+@dataclass(frozen=True, slots=True)
+class EntryRule:
+    """When the geometry of a landmark counts as determined."""
+
+    min_observations: int = 3
+    max_relative_deviation: float = 0.25
+    """of the worst-known direction, as a share of the distance to the camera"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entry:
+    """A landmark that enters the graph: where it starts, and all its observations so far."""
+
+    landmark: int
+    start: FloatArray
+    """(3,) m, in the world frame"""
+    observation: list[int]
+    """indices into the problem's observations"""
+
+
+class WaitingLandmarks:
+    """Collects the observations of landmarks that are not in the graph, and tells which may enter."""
+
+    def __init__(self, problem: Problem, observations: Observations, rule: EntryRule) -> None:
+        self._problem = problem
+        self._observations = observations
+        self._rule = rule
+        self._observed: dict[int, list[int]] = {}
+
+    def __len__(self) -> int:
+        return len(self._observed)
+
+    def add(self, landmark: int, observation: int) -> None:
+        """One more observation of a landmark that waits."""
+        self._observed.setdefault(landmark, []).append(observation)
+
+    def last_seen(self) -> list[tuple[int, int]]:
+        """(landmark, frame it was seen last) of those that still wait."""
+        frame = self._observations.frame
+        return [(landmark, int(frame[observed[-1]])) for landmark, observed in sorted(self._observed.items())]
+
+    def enter(self, seen: list[int], world_T_imu: FloatArray) -> list[Entry]:
+        """Those of the landmarks `seen` in this frame that are determined along the poses (T, 4, 4); they wait no more.
+
+        The landmark must be in front of every camera that saw it, and its triangulation, with the poses held, must
+        leave no direction less certain than the rule allows.
+        """
+        if self._problem.landmark_prior is not None:
+            return [self._enter_at_prior(landmark) for landmark in seen]
+        candidates = [j for j in seen if len(self._observed[j]) >= self._rule.min_observations]
+        if not candidates:
+            return []
+        lengths = [len(self._observed[j]) for j in candidates]
+        index = np.concatenate([self._observed[j] for j in candidates])
+        row = np.repeat(np.arange(len(candidates)), lengths)
+        position, deviation = self._triangulate(index, row, len(candidates), world_T_imu)
+        camera = world_T_imu[self._observations.frame[index[np.cumsum(lengths) - 1]], :3, 3]
+        determined = deviation < self._rule.max_relative_deviation * np.linalg.norm(position - camera, axis=1)
+        return [Entry(j, position[i], self._observed.pop(j)) for i, j in enumerate(candidates) if bool(determined[i])]
+
+    def _enter_at_prior(self, landmark: int) -> Entry:
+        prior = self._problem.landmark_prior
+        assert prior is not None
+        row = int(np.searchsorted(self._problem.features, landmark))
+        return Entry(landmark, prior.mean[row], self._observed.pop(landmark))
+
+    def _triangulate(
+        self, index: IntArray, row: IntArray, n: int, world_T_imu: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Positions (n, 3) and the standard deviation (n,) of the worst-known direction, m; infinite where unknown."""
+        problem, o = self._problem, self._observations
+        points = triangulate_tracks(
+            problem.sequence.camera,
+            world_T_imu[o.frame[index]] @ problem.sequence.imu_T_cam,
+            row,
+            o.pixel[index],
+            n,
+            problem.pixel_variance,
+            None if problem.kernel is None else problem.kernel.threshold,
+        )
+        weakest = np.linalg.eigvalsh(points.information)[:, 0]
+        finite = np.isfinite(points.position).all(axis=1) & (weakest > 0)
+        deviation = np.full(n, np.inf)
+        deviation[finite] = 1.0 / np.sqrt(weakest[finite])
+        return points.position, deviation
