@@ -84,7 +84,7 @@ class IncrementalSmoother:
         """Frame k with its observations (indices into the problem's)."""
         guess = self.problem.initial_pose if k == 0 else self.online[k - 1] @ self.factors.steps[k - 1]
         self.online[k] = guess
-        motion = [self.factors.first_pose() if k == 0 else self.factors.motion(k - 1)]
+        motion: list[gtsam.NonlinearFactor] = [self.factors.first_pose() if k == 0 else self.factors.motion(k - 1)]
         seen: dict[int, int] = {}
         waiting: list[int] = []
         for i in observed:
