@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
@@ -91,7 +91,12 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
         path = path_along(velocities).moved(se3.inverse(imu_T_body))
         if settings.frame_rate is None:
             return velocities.t, path
-        return np.arange(0.0, velocities.t[-1] + 1e-9, 1.0 / settings.frame_rate), path
+        t = np.arange(0.0, velocities.t[-1] + 1e-9, 1.0 / settings.frame_rate)
+        if len(t) < 2:
+            raise InputError(
+                f"frame_rate: {settings.frame_rate:g} Hz leaves one frame of the {velocities.t[-1]:g} s of along"
+            )
+        return t, path
     t = np.arange(round(settings.seconds * settings.rate)) / settings.rate
     grid = time_grid(float(t[-1]), settings.rate)
     rng = generator(settings.seed, Concern.PATH)

@@ -17,6 +17,7 @@ WorldName = Literal["street", "room"]
 Interval = Literal["after", "before", "mean"]
 Vector = tuple[float, float, float]
 
+MAX_FRAMES = 1_000_000
 MAX_TIME_OFFSET = 1.0
 """s; the path is known this far beyond both ends"""
 
@@ -80,7 +81,7 @@ class Simulation:
 
     features_per_frame: float = 70.0
     """how many points are tracked at a time, on average"""
-    track_length: float = 11.0
+    track_length: float = 14.0
     """median number of frames after which the tracker loses a point that stays in view"""
     nearest: float | None = None
     """m, depth below which a point is not tracked; 5 in a street, 0.5 in a room"""
@@ -114,8 +115,11 @@ class Simulation:
             raise InputError(f"path and along: path 'along' needs velocities to follow, '{self.path}' takes none")
         _require_range("duration", self.duration, low=0.0, low_open=True, high=1e5)
         _require_range("frame_rate", self.frame_rate, low=0.1, high=1000.0)
-        if self.along is None and round(self.seconds * self.rate) < 2:
-            raise InputError(f"duration: {self.seconds:g} s at {self.rate:g} Hz is less than 2 frames")
+        frames = round(self.seconds * self.rate)
+        if self.along is None and not 2 <= frames <= MAX_FRAMES:
+            raise InputError(
+                f"duration: {self.seconds:g} s at {self.rate:g} Hz are {frames} frames, expected 2 to {MAX_FRAMES}"
+            )
         if not isinstance(self.seed, int | np.integer) or self.seed < 0:
             raise InputError(f"seed: expected a whole number from 0 on, got {self.seed!r}")
         for name in ("sigma_linear", "sigma_angular", "sigma_pixel"):
@@ -138,11 +142,11 @@ class Simulation:
                 axes_matrix(getattr(self, name))
             except InputError as error:
                 raise InputError(f"{name}: {error}") from None
-        for start, end in self.blackouts:
-            _require_order("blackouts", start, end)
-        for start, end, share in self.bursts:
-            _require_order("bursts", start, end)
-            _require_range("bursts", share, low=0.0, high=1.0)
+        for blackout in self.blackouts:
+            _require_interval("blackouts", blackout, size=2)
+        for burst in self.bursts:
+            _require_interval("bursts", burst, size=3)
+            _require_range("bursts", burst[2], low=0.0, high=1.0)
 
     @property
     def seconds(self) -> float:
@@ -199,10 +203,17 @@ def _require_range(name: str, value: float | None, low: float, high: float = mat
 
 
 def _require_vector(name: str, value: Vector) -> None:
-    if len(value) != 3 or not all(math.isfinite(component) for component in value):
+    if not _numbers(value, size=3):
         raise InputError(f"{name}: expected three finite numbers, got {value!r}")
 
 
-def _require_order(name: str, start: float, end: float) -> None:
-    if not (math.isfinite(start) and math.isfinite(end) and start <= end):
-        raise InputError(f"{name}: expected an interval that starts before it ends, got {start!r} to {end!r} s")
+def _require_interval(name: str, value: tuple[float, ...], size: int) -> None:
+    if not _numbers(value, size) or value[0] > value[1]:
+        what = "(start, end)" if size == 2 else "(start, end, share)"
+        raise InputError(f"{name}: expected {what} with the start before the end, in s, got {value!r}")
+
+
+def _numbers(value: object, size: int) -> bool:
+    if not isinstance(value, tuple | list | np.ndarray) or len(value) != size:
+        return False
+    return all(isinstance(number, int | float | np.number) and math.isfinite(number) for number in value)

@@ -50,7 +50,7 @@ class Street:
         """One point (n, 3) in the path's world, m, for each time (n,): before the car of that time, not always seen."""
         n = len(t)
         here = np.interp(t, self._times, self._travelled).astype(np.int64)
-        ahead = np.minimum(4.0 + rng.lognormal(np.log(26.0), 0.95, n), 280.0)
+        ahead = np.minimum(4.0 + rng.lognormal(np.log(23.0), 0.95, n), 280.0)
         last = len(self._frames) - 1
         driven = np.minimum(here + ahead.astype(np.int64), last)
         start = self._straight[np.minimum(here, last)]
