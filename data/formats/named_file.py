@@ -50,7 +50,7 @@ def regular_file(path: FilePath) -> Path:
     if not found:
         raise InputError("there is no such file; check the path")
     if file.is_dir():
-        raise InputError("this is a folder; give the recording's file")
+        raise InputError("this is a folder; give a file")
     if not file.is_file():
-        raise InputError("this is no ordinary file; give the recording's file")
+        raise InputError("this is no ordinary file; give a file")
     return file

@@ -1,0 +1,41 @@
+"""What several tests share: the real recordings, where they are, and a small recording of the course's form."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Callable[[str], Path]:
+    """The path of a real recording, such as `recordings("03.npz")`; the test is skipped where it is missing."""
+
+    def path(name: str) -> Path:
+        if not (RECORDINGS / name).is_file():
+            pytest.skip(f"{name} is not in {RECORDINGS} (set FGBASELINE_RECORDINGS)")
+        return RECORDINGS / name
+
+    return path
+
+
+@pytest.fixture
+def course_arrays() -> dict[str, Any]:
+    """The arrays of a later course file: 6 frames, 5 landmarks, 7 observations."""
+    random = np.random.default_rng(2)
+    features = np.full((4, 5, 6), -1.0)
+    for landmark, frame in ((0, 0), (0, 1), (1, 1), (2, 3), (4, 3), (4, 4), (4, 5)):
+        features[:, landmark, frame] = random.uniform(0.0, 600.0, 4)
+    return {
+        "time_stamps": 1.3e9 + 0.1 * np.arange(6)[None, :],
+        "linear_velocity": random.normal(size=(3, 6)),
+        "angular_velocity": random.normal(size=(3, 6)),
+        "K": np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]]),
+        "b": np.array(0.5),
+        "imu_T_cam": np.array([[0.0, 0, 1, 1.5], [1, 0, 0, 0.2], [0, 1, 0, -0.6], [0, 0, 0, 1]]),
+        "features": features,
+    }
