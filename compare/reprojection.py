@@ -1,0 +1,85 @@
+"""What an estimate says every pixel should have been, against what was measured."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data import Estimate, Sequence
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import se3
+
+from .statistics import summarised
+
+ROWS = ("uL", "vL", "uR", "vR")
+NEAR = 3.0
+"""px: below it an observation counts as explained"""
+
+
+def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
+    """One row for each observation of the sequence whose landmark and pose the estimate has, with the columns
+
+    `observation` (its index in the sequence), `frame`, `landmark`, `uL vL uR vR` measured minus predicted in px,
+    `error` the Euclidean norm of these four, `depth` in m in front of the left camera (the prediction follows the
+    same formula behind it), and `used`, whether the estimator used it.
+    """
+    o = sequence.observations
+    position = np.full((sequence.n_landmarks, 3), np.nan)
+    position[estimate.landmarks.index] = estimate.landmarks.position
+    has_pose: BoolArray = np.isfinite(estimate.world_T_imu[:, 0, 0])
+    chosen = np.flatnonzero(np.isfinite(position[o.landmark, 0]) & has_pose[o.frame])
+    cam_T_world = np.full_like(estimate.world_T_imu, np.nan)
+    cam_T_world[has_pose] = se3.inverse(estimate.world_T_imu[has_pose] @ sequence.imu_T_cam)
+    p_cam = se3.transform(cam_T_world[o.frame[chosen]], position[o.landmark[chosen]])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        residual = o.pixel[chosen] - sequence.camera.project(p_cam)
+    return pd.DataFrame(
+        {
+            "observation": chosen,
+            "frame": o.frame[chosen],
+            "landmark": o.landmark[chosen],
+            **{row: residual[:, i] for i, row in enumerate(ROWS)},
+            "error": np.linalg.norm(residual, axis=1),
+            "depth": p_cam[:, 2],
+            "used": estimate.used[chosen],
+        }
+    )
+
+
+def reprojection_summary(table: pd.DataFrame) -> dict[str, float | int]:
+    """Median, mean, RMSE, 95 % and largest error (px), share under 3 px, points behind the camera, and how many."""
+    n = len(table)
+    return {
+        **summarised(table["error"]),
+        "under_3px": float((table["error"] < NEAR).mean()) if n else float("nan"),
+        "behind_camera": int((table["depth"] <= 0).sum()),
+        "n": n,
+    }
+
+
+def component_summary(table: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """For each of uL, vL, uR, vR its bias (mean) and spread (standard deviation) over a reprojection table, px."""
+    return {row: {"bias": float(table[row].mean()), "spread": float(table[row].std(ddof=0))} for row in ROWS}
+
+
+def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
+    """Median, mean, RMSE, share under 3 px, points behind the camera and number for each `frame` or `landmark`."""
+    groups = table.assign(squared=table["error"] ** 2, near=table["error"] < NEAR, behind=table["depth"] <= 0).groupby(
+        what
+    )
+    result = groups.agg(
+        median=("error", "median"),
+        mean=("error", "mean"),
+        rmse=("squared", "mean"),
+        under_3px=("near", "mean"),
+        behind_camera=("behind", "sum"),
+        n=("error", "size"),
+    )
+    result["rmse"] = np.sqrt(result["rmse"])
+    return result
+
+
+def commonly_used(estimates: Iterable[Estimate]) -> BoolArray | None:
+    """(n,) the observations that every estimate used; estimates that use none by nature do not count, None if all."""
+    using = [estimate.used for estimate in estimates if estimate.used.any()]
+    return np.asarray(np.logical_and.reduce(using), dtype=np.bool_) if using else None

@@ -1,0 +1,102 @@
+"""Where one trajectory parts from another, frame by frame."""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from fgbaseline.data import Estimate, Truth
+from fgbaseline.geometry import FgbaselineError, FloatArray, so3
+
+from .alignment import align_se3
+from .statistics import summarised
+
+STANDING = 1e-3
+"""m between frames: below it a path has no direction of its own, and keeps the one it had"""
+
+
+def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
+    """How far each pose of an estimate is from the reference's, without any alignment (both start at the same pose).
+
+    `up` (3,) is the unit vector that points up in the world (`Sequence.up`). For the columns see `pose_errors`.
+    """
+    return pose_errors(estimate.world_T_imu, reference.world_T_imu, up)
+
+
+def truth_errors(
+    estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool = False
+) -> pd.DataFrame:
+    """How far each pose is from the true one: as it is, or after the SE(3) motion that fits all positions best.
+
+    Frames without truth, and frames that the estimator did not reach, are NaN. For the columns see `pose_errors`.
+    """
+    poses = estimate.world_T_imu
+    if aligned:
+        both = truth.known & np.isfinite(poses).all(axis=(1, 2))
+        if both.any():
+            poses = align_se3(poses[both, :3, 3], truth.world_T_imu[both, :3, 3]) @ poses
+    return pose_errors(poses, truth.world_T_imu, up)
+
+
+def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.DataFrame:
+    """A table with one row per frame of poses (T, 4, 4) against reference poses (T, 4, 4), indexed by `frame`:
+
+    `position` |p - p_ref| in m; `along`, `across` (to the left) and `up` its components in the reference's frame,
+    that is along the reference's direction of travel seen from above, square to it, and along `up`; `rotation_deg`
+    the angle of R_ref^T R; `travelled` the length of the reference's path so far, m. NaN where either pose is.
+    """
+    if poses.shape != reference.shape:
+        raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
+    difference = poses[:, :3, 3] - reference[:, :3, 3]
+    forward, left, upward = travel_frame(reference[:, :3, 3], np.asarray(up, dtype=np.float64))
+    finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(reference).all(axis=(1, 2))
+    angle = np.full(len(poses), np.nan)
+    relative = np.swapaxes(reference[finite, :3, :3], 1, 2) @ poses[finite, :3, :3]
+    angle[finite] = np.rad2deg(so3.rotation_angle(relative))
+    return pd.DataFrame(
+        {
+            "position": np.linalg.norm(difference, axis=1),
+            "along": np.einsum("ti,ti->t", difference, forward),
+            "across": np.einsum("ti,ti->t", difference, left),
+            "up": difference @ upward,
+            "rotation_deg": angle,
+            "travelled": distance_travelled(reference[:, :3, 3]),
+        },
+        index=pd.RangeIndex(len(poses), name="frame"),
+    )
+
+
+def distance_travelled(positions: FloatArray) -> FloatArray:
+    """(T,) length of the path through positions (T, 3), m; steps to or from an unknown position count as zero."""
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+
+
+def travel_frame(positions: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit vectors forward (T, 3) and left (T, 3) of a path (T, 3) seen from above, and upward (3,).
+
+    Forward is the horizontal part of the step around each frame; where the path stands, that of the last frame that
+    moved (before the first one, of that).
+    """
+    upward = up / np.linalg.norm(up)
+    step = np.gradient(positions, axis=0) if len(positions) > 1 else np.zeros_like(positions)
+    horizontal = step - np.outer(step @ upward, upward)
+    length = np.linalg.norm(horizontal, axis=1)
+    moving = np.flatnonzero(length > STANDING)
+    if len(moving) == 0:
+        sideways = np.eye(3)[int(np.argmin(np.abs(upward)))]
+        direction = np.cross(np.cross(upward, sideways), upward)
+        forward = np.tile(direction / np.linalg.norm(direction), (len(positions), 1))
+    else:
+        source = moving[np.maximum(np.searchsorted(moving, np.arange(len(positions)), side="right") - 1, 0)]
+        forward = horizontal[source] / length[source, None]
+    return forward, np.cross(upward, forward), upward
+
+
+def divergence_summary(table: pd.DataFrame) -> dict[str, float]:
+    """RMSE, mean, median, 95 %, largest and final position difference (m), and the rotation's RMSE and final (deg)."""
+    return {
+        **summarised(table["position"]),
+        "final": float(table["position"].iloc[-1]),
+        "rotation_rmse_deg": summarised(table["rotation_deg"])["rmse"],
+        "rotation_final_deg": float(table["rotation_deg"].iloc[-1]),
+    }
