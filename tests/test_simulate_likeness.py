@@ -1,17 +1,15 @@
 """Is a simulated drive like the real ones? `pytest -s tests/test_simulate_likeness.py` prints the table."""
 
-import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from fgbaseline.data.formats import read
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import disparity
 
-RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 CARS = [
     "03.npz",
     "ece276a_2020/0027.npz",
@@ -46,11 +44,8 @@ def line(name: str, numbers: list[float]) -> str:
     return f"{name:<22}" + "".join(cells)
 
 
-def test_a_simulated_town_lies_among_the_real_recordings() -> None:
-    missing = [name for name in CARS if not (RECORDINGS / name).exists()]
-    if missing:
-        pytest.skip(f"needs {', '.join(missing)} under {RECORDINGS}")
-    real = {name: statistics(read(RECORDINGS / name)) for name in CARS}
+def test_a_simulated_town_lies_among_the_real_recordings(recordings: Callable[[str], Path]) -> None:
+    real = {name: statistics(read(recordings(name))) for name in CARS}
     towns = [statistics(simulate(Simulation(seed=seed))) for seed in range(10)]
     town = [float(x) for x in np.mean(towns, axis=0)]
     print("\n" + HEAD)

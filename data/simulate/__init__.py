@@ -11,7 +11,7 @@ A simulated town lies among the real recordings; `pytest -s tests/test_simulate_
     26_drive_0009_sync_KLT   59.9   20.0  117.5   18.3     6    11    21    65    13    27    38    54   119
     26_drive_0036_sync_KLT   70.1   45.0  106.5   14.8     5    10    18    44    16    29    44    63    98
     30_drive_0027_sync_KLT   89.1   49.0  147.0   15.9     6    12    21    42     8    14    24    46    96
-    simulated, 10 seeds      69.9   48.0   93.1   14.2     5    10    18    39    11    21    37    70   133
+    simulated, 10 seeds      69.9   47.9   93.1   14.2     6    10    18    39    11    21    38    71   134
 """
 
 from .axes import AXIS_CONVENTIONS, axes_matrix, axes_name
