@@ -9,6 +9,7 @@ from .reprojection import (
     reprojection_by,
     reprojection_summary,
 )
+from .statistics import summarised
 from .trajectory import divergence, divergence_summary, pose_errors, truth_errors
 from .trust import Trust, Verdict, trust
 
@@ -25,6 +26,7 @@ __all__ = [
     "reprojection",
     "reprojection_by",
     "reprojection_summary",
+    "summarised",
     "trust",
     "truth_errors",
 ]

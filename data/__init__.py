@@ -3,6 +3,7 @@
 from .calibrated import Calibration, NoiseSettings, calibrated
 from .documented import documented
 from .estimate import Estimate, Event, Landmarks, Progress, Status
+from .formats import attach_truth, read, read_kitti, read_tum, write_npz, write_tum
 from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
 from .registry import estimator_names, find_estimator
@@ -24,8 +25,14 @@ __all__ = [
     "Sequence",
     "Status",
     "Truth",
+    "attach_truth",
     "calibrated",
     "documented",
     "estimator_names",
     "find_estimator",
+    "read",
+    "read_kitti",
+    "read_tum",
+    "write_npz",
+    "write_tum",
 ]

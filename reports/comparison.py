@@ -1,8 +1,10 @@
 """A run: every estimator on one problem, and all comparisons that tables, figures and the page draw on."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -14,6 +16,8 @@ from fgbaseline.geometry import FgbaselineError, FloatArray
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""
+Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
+"""around the work of a named estimator: gives what is told of every frame"""
 NO_REFERENCE = "no estimator gave an answer to compare with"
 
 
@@ -64,7 +68,12 @@ class Run:
         return [result for result in self.results.values() if result.answered]
 
 
-def solve_all(problem: Problem, names: list[str], progress_of: Callable[[str], Progress | None]) -> dict[str, Estimate]:
+def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
+    """Nobody is told of progress."""
+    return nullcontext(None)
+
+
+def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
     """Each named estimator's answer, in the order of the names; a failure is an answer and stops nothing.
 
     What one run gives along with another (`isam2-online` with `isam2`) is not solved again.
@@ -78,7 +87,8 @@ def solve_all(problem: Problem, names: list[str], progress_of: Callable[[str], P
             continue
         start = time.perf_counter()
         try:
-            estimate = solve(problem, progress_of(name))
+            with watch(name) as progress:
+                estimate = solve(problem, progress)
         except (FgbaselineError, ArithmeticError, np.linalg.LinAlgError, RuntimeError, ValueError, IndexError) as error:
             reason = (
                 f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no text'}"

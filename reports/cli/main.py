@@ -1,0 +1,71 @@
+"""The entry point: finds the command, and turns bad input into one sentence and exit code 2."""
+
+import importlib
+import os
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+import click
+
+COMMANDS = {"run": "run", "simulate": "simulate"}
+"""command -> module of this package that holds it under the name `command`"""
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+class _Commands(click.Group):
+    """Imports the module of a command when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f".{COMMANDS[cmd_name]}", __package__).command
+        return command
+
+
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example: fgbaseline run drive.npz --out out/drive",
+)
+@click.version_option(package_name="fgbaseline")
+def group() -> None:
+    """How far is a visual-inertial filter from what the data supports?
+
+    Runs an EKF and a factor-graph reference (GTSAM iSAM2) on the same problem and shows where they part.
+    """
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Runs the command line and exits: 0 well, 1 with a failed estimator, 2 on bad input, 130 when interrupted."""
+    # Small matrices everywhere: more than one BLAS thread only makes them wait for each other.
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        code = group.main(arguments, standalone_mode=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        click.echo("interrupted; nothing was written", err=True)
+        sys.exit(INTERRUPTED)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(BAD_INPUT)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        from fgbaseline.geometry import FgbaselineError
+
+        if not isinstance(error, FgbaselineError):
+            raise
+        click.echo(f"fgbaseline: {error}", err=True)
+        sys.exit(BAD_INPUT)
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001
+    raise KeyboardInterrupt

@@ -1,0 +1,71 @@
+"""What a person sees of a run: progress, the main table and where the report is."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from fgbaseline.data import Status
+
+from .. import job, page
+from ..run_folder import MARK, write_run
+from ..schema import Summary
+from ..whole_folder import require_free, whole_folder
+from .progress import reporter
+
+FAILED = 1
+
+
+def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
+    """Runs, writes the folder and tells of it; gives the exit code: 1 where an estimator failed, else 0."""
+    job.check_estimators(settings.estimators)
+    sequence = job.read_sequence(settings)
+    place = out or Path("out") / sequence.name
+    require_free(place, force=force, mark=MARK)
+    told = reporter()
+    told.say(
+        f"{sequence.name}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
+        f"{sequence.n_landmarks} tracks"
+    )
+    problem = job.pose_problem(sequence, settings)
+    run = job.solve(problem, settings, told.estimator)
+    told.say("writing the report")
+    with whole_folder(place, force=force, mark=MARK) as folder:
+        summary = write_run(run, folder)
+    _print_table(summary)
+    for sentence in page.verdict(run):
+        click.echo(sentence)
+    click.echo(f"\nThe report is in {place / 'report.html'}")
+    failed = any(result.estimate.status is Status.FAILED for result in run.results.values())
+    return FAILED if failed else 0
+
+
+def _print_table(summary: Summary) -> None:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    has_truth = any(e.ate is not None for e in summary.estimators.values())
+    for title in ("estimator", "status", "seconds", "reprojection, px", "under 3 px", "from the reference, m"):
+        table.add_column(title, justify="left" if title in ("estimator", "status") else "right")
+    if has_truth:
+        table.add_column("ATE, m", justify="right")
+    for name, e in summary.estimators.items():
+        row = [
+            name,
+            e.status,
+            f"{e.seconds:.1f}",
+            _number(e.reprojection.median),
+            _share(e.reprojection.under_3px),
+            "reference"
+            if name == summary.reference.name
+            else _number(None if e.divergence is None else e.divergence.rmse),
+        ]
+        table.add_row(*row, *([_number(None if e.ate is None else e.ate.rmse)] if has_truth else []))
+    Console().print(table)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"

@@ -1,0 +1,94 @@
+"""`fgbaseline run`: every estimator, the comparison and the report."""
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
+
+
+class FeatureCount(click.ParamType[int | str]):
+    """A number of landmarks, or 'all'."""
+
+    name = "N|all"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
+        """The number, or 'all'."""
+        if value == "all":
+            return "all"
+        try:
+            number = int(str(value))
+        except ValueError:
+            number = 0
+        if number < 1:
+            self.fail(f"expected a whole number of at least 1 or 'all', got {value!r}", param, ctx)
+        return number
+
+
+@click.command(
+    epilog="Example: fgbaseline run drive.npz --truth poses.txt --truth-frame camera --out out/drive",
+)
+@click.argument("sequence", required=False, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder to write.  [default: out/NAME]")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
+@click.option(
+    "--preset",
+    type=click.Choice(["calibrated", "documented"]),
+    default="calibrated",
+    show_default=True,
+    help="How the problem is posed: what the data supports, or as the report has it.",
+)
+@click.option("--estimators", default=DEFAULT_ESTIMATORS, show_default=True, help="Names, separated by commas.")
+@click.option(
+    "--features",
+    type=FeatureCount(),
+    help="How many landmarks, those seen most often.  [default: all; 1000 for the documented preset]",
+)
+@click.option(
+    "--landmarks",
+    type=click.Choice(["in-turn", "held"]),
+    default="in-turn",
+    show_default=True,
+    help="Whether the documented SLAM updates landmarks in turn with the pose or holds the mapping's.",
+)
+@click.option("--truth", type=click.Path(path_type=Path), help="Ground truth: a KITTI or TUM file.")
+@click.option(
+    "--truth-frame", type=click.Choice(["camera", "imu"]), help="The body whose poses the ground truth gives."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the simulated drive.")
+def command(
+    sequence: Path | None,
+    out: Path | None,
+    force: bool,
+    preset: Literal["calibrated", "documented"],
+    estimators: str,
+    features: int | Literal["all"] | None,
+    landmarks: str,
+    truth: Path | None,
+    truth_frame: Literal["camera", "imu"] | None,
+    seed: int,
+) -> int:
+    """Run all estimators on SEQUENCE, compare them and write a report.
+
+    Without SEQUENCE: on a simulated drive of a minute through a town, with known truth.
+
+    Exits 0 when every estimator gave an answer, 1 when one failed (the report is written all the same), 2 on bad
+    input.
+    """
+    from fgbaseline.data import Reading
+
+    from ..job import RunSettings
+    from .report import report
+
+    settings = RunSettings(
+        sequence=sequence,
+        preset=preset,
+        estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
+        features=features,
+        landmarks=Reading(landmarks),
+        truth=truth,
+        truth_frame=truth_frame,
+        seed=seed,
+    )
+    return report(settings, out, force=force)

@@ -1,0 +1,86 @@
+"""The main job: from a recording and the user's wishes to a run that can be reported."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from fgbaseline.data import (
+    Problem,
+    Reading,
+    Sequence,
+    calibrated,
+    documented,
+    estimator_names,
+    read,
+)
+from fgbaseline.data.documented import DEFAULT_FEATURES
+from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.geometry import InputError
+
+from .comparison import Run, Watch, compare_all, solve_all, unwatched
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What the user asked for."""
+
+    sequence: Path | None = None
+    """None for the simulated drive"""
+    preset: Literal["calibrated", "documented"] = "calibrated"
+    estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+    features: int | Literal["all"] | None = None
+    """None for the preset's default"""
+    landmarks: Reading = Reading.IN_TURN
+    truth: Path | None = None
+    truth_frame: BodyFrame | None = None
+    seed: int = 0
+
+    def record(self) -> dict[str, str | int | float | bool | None]:
+        """The settings as `summary.json` has them."""
+        return {
+            "sequence": None if self.sequence is None else str(self.sequence),
+            "preset": self.preset,
+            "estimators": ",".join(self.estimators),
+            "features": self.features or (DEFAULT_FEATURES if self.preset == "documented" else "all"),
+            "landmarks": str(self.landmarks),
+            "truth": None if self.truth is None else str(self.truth),
+            "truth_frame": self.truth_frame,
+            "seed": self.seed,
+        }
+
+
+def check_estimators(names: tuple[str, ...]) -> None:
+    """Raises InputError for no name, an unknown one, or one given twice."""
+    installed = estimator_names()
+    if not names:
+        raise InputError(f"estimators: name at least one of {', '.join(installed)}")
+    for name in names:
+        if name not in installed:
+            raise InputError(f"estimators: there is no '{name}'; installed are {', '.join(installed)}")
+        if names.count(name) > 1:
+            raise InputError(f"estimators: '{name}' is named twice")
+
+
+def read_sequence(settings: RunSettings) -> Sequence:
+    """The recording, with its truth; raises InputError."""
+    if settings.sequence is None:
+        if settings.truth is not None:
+            raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
+        return simulate(Simulation(seed=settings.seed))
+    return read(settings.sequence, settings.truth, settings.truth_frame)
+
+
+def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
+    """The problem that the preset makes of a recording."""
+    features = None if settings.features == "all" else settings.features
+    if settings.preset == "documented":
+        if settings.features is None:
+            features = DEFAULT_FEATURES
+        return documented(sequence, features, settings.landmarks)
+    return calibrated(sequence, features)
+
+
+def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched) -> Run:
+    """All estimators on the problem, and their comparison."""
+    return compare_all(problem, solve_all(problem, settings.estimators, watch), settings.record())

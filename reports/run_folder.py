@@ -1,0 +1,66 @@
+"""What a run leaves behind: tables, trajectories, figures and the page."""
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from fgbaseline.compare import reprojection_by
+from fgbaseline.data import Estimate, write_tum
+
+from . import figures, page
+from .comparison import Result, Run
+from .schema import Summary
+from .summary import metrics_table, summarise
+
+MARK = "summary.json"
+"""the file by which a run's folder is known"""
+
+
+def write_run(run: Run, folder: Path) -> Summary:
+    """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary."""
+    summary = summarise(run)
+    for name in ("trajectories", "landmarks", "series", "figures"):
+        (folder / name).mkdir()
+    for name, result in run.results.items():
+        _write_series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
+        if result.answered:
+            write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
+            write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
+    metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
+    drawn: Mapping[str, Figure] = figures.draw(run)
+    figures.save(drawn, folder / "figures")
+    as_dict = summary.model_dump(mode="json", by_alias=True)
+    (folder / "report.html").write_text(page.render(run, as_dict, drawn), encoding="utf-8")
+    (folder / MARK).write_text(json.dumps(as_dict, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return summary
+
+
+def write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
+    """id,x,y,z,n_used of every landmark of an estimate, m, in the world frame."""
+    landmarks = estimate.landmarks
+    used = run.problem.sequence.observations.landmark[estimate.used]
+    n_used = np.bincount(used, minlength=run.problem.sequence.n_landmarks)[landmarks.index]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["id", "x", "y", "z", "n_used"])
+        for index, position, n in zip(landmarks.index.tolist(), landmarks.position.tolist(), n_used, strict=True):
+            writer.writerow([index, *position, int(n)])
+
+
+def _write_series(run: Run, result: Result) -> pd.DataFrame:
+    """One row per frame: divergence, error to truth, reprojection, NEES and time."""
+    T = run.problem.n_frames
+    table = pd.DataFrame({"t": run.problem.sequence.t}, index=pd.RangeIndex(T, name="frame"))
+    for prefix, errors in (("divergence", result.divergence), ("truth", result.truth)):
+        if errors is not None:
+            table = table.join(errors.add_prefix(f"{prefix}_"))
+    table = table.join(reprojection_by(result.reprojection, "frame").add_prefix("reprojection_"))
+    if result.nees is not None:
+        table["nees"] = result.nees
+    table["seconds"] = result.estimate.seconds if len(result.estimate.seconds) == T else np.nan
+    return table

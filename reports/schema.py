@@ -1,0 +1,139 @@
+"""The shape of `summary.json`. Its JSON schema, with these descriptions, is `docs/summary.schema.json`."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA = "fgbaseline/summary/1"
+"""raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
+
+Number = float | None
+"""null for what is not a number; `notes` then says why"""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Spread(_Part):
+    """Statistics of errors in m, over the frames that have one."""
+
+    rmse: Number
+    mean: Number
+    median: Number
+    p95: Number
+    max: Number
+
+
+class Divergence(Spread):
+    """Of each pose from the reference's, m, without alignment."""
+
+    final: Number
+    rotation_rmse_deg: Number
+    rotation_final_deg: Number
+
+
+class Reprojection(Spread):
+    """Norm of the four pixel differences (uL, vL, uR, vR), px."""
+
+    under_3px: Annotated[Number, Field(description="share, 0 to 1")]
+    behind_camera: Annotated[int, Field(description="observations whose landmark lies behind the camera")]
+    n: int
+
+
+class Component(_Part):
+    """Measured minus predicted, px, over all observations of the estimated landmarks."""
+
+    bias: Number
+    spread: Number
+
+
+class ObservationCount(_Part):
+    """How much of what the problem offered was used."""
+
+    offered: Annotated[int, Field(description="observations of the problem, after its mask")]
+    used: int
+    share: Number
+
+
+class Nees(_Part):
+    """Normalised estimation error squared of the poses against truth; 6 is expected."""
+
+    mean: Number
+    median: Number
+    frames: int
+
+
+class TruthCount(_Part):
+    """How many frames the truth metrics rest on."""
+
+    frames: int
+    missing: Annotated[int, Field(description="frames without truth, or that the estimator did not reach")]
+
+
+class EstimatorSummary(_Part):
+    """One estimator."""
+
+    status: Annotated[str, Field(description="ok, recovered or failed")]
+    reason: str
+    seconds: Annotated[float, Field(description="for the whole answer, s")]
+    frames_per_second: Number
+    reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
+    reprojection_used: Annotated[Reprojection, Field(description="over those it used")]
+    reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
+    components: dict[str, Component]
+    divergence: Divergence | None
+    ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
+    ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
+    truth: TruthCount | None
+    nees: Nees | None
+    landmarks: int
+    observations: ObservationCount
+    events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
+    notes: Annotated[dict[str, str], Field(description="why a value is null, by its key")]
+
+
+class SequenceSummary(_Part):
+    """What was recorded."""
+
+    name: str
+    source: str
+    form: str
+    frames: int
+    duration_s: float
+    observations: int
+    tracks: int
+    path_length_m: Annotated[Number, Field(description="of the truth, else of the reference")]
+    remarks: list[str]
+
+
+class ProblemSummary(_Part):
+    """What was asked."""
+
+    preset: str
+    features: int
+    diagnosed: bool
+    excluded: Annotated[dict[str, int], Field(description="reason -> observations that take no part")]
+    pixel_sigma: float
+    remarks: list[str]
+
+
+class ReferenceSummary(_Part):
+    """What the divergence is measured from."""
+
+    name: str | None
+    trust: Annotated[str, Field(description="trusted, doubtful or untrusted")]
+    reasons: list[str]
+
+
+class Summary(_Part):
+    """A run."""
+
+    schema_: Annotated[str, Field(alias="schema")] = SCHEMA
+    sequence: SequenceSummary
+    problem: ProblemSummary
+    reference: ReferenceSummary
+    estimators: dict[str, EstimatorSummary]
+    settings: dict[str, str | int | float | bool | None]
+    versions: dict[str, str]
+    machine: dict[str, str | int]

@@ -1,0 +1,175 @@
+"""All the figures of a run, as `summary.json` and `metrics.csv` hold them."""
+
+import math
+import os
+import platform
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline import compare
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.geometry import FloatArray
+
+from .comparison import Result, Run
+from .schema import EstimatorSummary, Summary
+
+LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
+
+
+def summarise(run: Run) -> Summary:
+    """The summary of a run; what is not a number is None, and its reason stands in `notes`."""
+    sequence, problem = run.problem.sequence, run.problem
+    return Summary.model_validate(
+        _finite(
+            {
+                "sequence": {
+                    "name": sequence.name,
+                    "source": sequence.source,
+                    "form": sequence.form,
+                    "frames": sequence.n_frames,
+                    "duration_s": float(sequence.t[-1] - sequence.t[0]),
+                    "observations": len(sequence.observations),
+                    "tracks": sequence.n_landmarks,
+                    "path_length_m": path_length(run),
+                    "remarks": list(sequence.remarks),
+                },
+                "problem": {
+                    "preset": problem.preset,
+                    "features": len(problem.features),
+                    "diagnosed": problem.diagnosed,
+                    "excluded": excluded_counts(problem),
+                    "pixel_sigma": math.sqrt(problem.pixel_variance),
+                    "remarks": list(problem.remarks),
+                },
+                "reference": {
+                    "name": run.reference,
+                    "trust": run.trust.verdict.name.lower(),
+                    "reasons": list(run.trust.reasons),
+                },
+                "estimators": {name: _estimator(run, result) for name, result in run.results.items()},
+                "settings": dict(run.settings),
+                "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+                "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count() or 0},
+            }
+        )
+    )
+
+
+def path_length(run: Run) -> float:
+    """m: the length of the true path, else of the reference's, over the frames that have one."""
+    truth = run.problem.sequence.truth
+    if truth is not None:
+        return _length(truth.world_T_imu)
+    return math.nan if run.reference is None else _length(run.results[run.reference].estimate.world_T_imu)
+
+
+def excluded_counts(problem: Problem) -> dict[str, int]:
+    """Reason, in words -> how many observations of the sequence it keeps out of the problem."""
+    counts = np.bincount(problem.excluded, minlength=len(Excluded))
+    return {
+        reason.name.lower().replace("_", " "): int(counts[reason])
+        for reason in Excluded
+        if reason is not Excluded.NO and counts[reason]
+    }
+
+
+def metrics_table(summary: Summary) -> pd.DataFrame:
+    """`metrics.csv`: estimator, metric (its path in the summary) and value, one row for each number."""
+    rows = [
+        (name, metric, value) for name, estimator in summary.estimators.items() for metric, value in _numbers(estimator)
+    ]
+    return pd.DataFrame(rows, columns=["estimator", "metric", "value"])
+
+
+def _numbers(estimator: EstimatorSummary) -> Iterator[tuple[str, float | int | None]]:
+    def walk(prefix: str, value: Any) -> Iterator[tuple[str, float | int | None]]:
+        if isinstance(value, Mapping):
+            for key, inner in value.items():
+                yield from walk(f"{prefix}.{key}" if prefix else str(key), inner)
+        elif value is None or isinstance(value, int | float):
+            yield prefix, value
+
+    yield from walk("", estimator.model_dump(exclude={"notes", "status", "reason"}))
+
+
+def _estimator(run: Run, result: Result) -> dict[str, Any]:
+    estimate, table = result.estimate, result.reprojection
+    common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
+    offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())
+    seconds = estimate.seconds_total
+    reprojection = {
+        "reprojection": compare.reprojection_summary(table),
+        "reprojection_used": compare.reprojection_summary(table[table["used"]]),
+        "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
+    }
+    return {
+        "status": str(estimate.status),
+        "reason": estimate.reason,
+        "seconds": seconds,
+        "frames_per_second": run.problem.n_frames / seconds if seconds > 0 else math.nan,
+        **reprojection,
+        "components": compare.component_summary(table),
+        "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
+        "ate": None if result.truth_aligned is None else compare.summarised(result.truth_aligned["position"]),
+        "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
+        "truth": None if result.truth is None else _truth_count(result.truth),
+        "nees": None if result.nees is None else _nees(result.nees),
+        "landmarks": len(estimate.landmarks),
+        "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
+        "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
+        "notes": _notes(run, result, reprojection),
+    }
+
+
+def _notes(run: Run, result: Result, reprojection: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    notes = {}
+    if not result.answered:
+        return {"*": f"the estimator failed: {result.estimate.reason}"}
+    if not len(result.estimate.landmarks):
+        notes["reprojection"] = notes["components"] = "it estimated no landmarks"
+    if not result.estimate.used.any():
+        notes["reprojection_used"] = "it uses no observations"
+    if not reprojection["reprojection_common"]["n"]:
+        notes["reprojection_common"] = "there are no observations that every estimator used"
+    if run.reference is None:
+        notes["divergence"] = "there is no reference to diverge from"
+    if result.truth is None:
+        notes["ate"] = notes["ate_unaligned"] = notes["truth"] = notes["nees"] = "the recording has no truth"
+    elif not np.isfinite(result.truth["position"].iloc[-1]):
+        notes["ate_unaligned.final"] = "the last frame has no truth"
+    if result.nees is not None and not np.isfinite(result.nees).any():
+        notes["nees"] = "it gives no covariance"
+    if not run.problem.mask.any():
+        notes["observations.share"] = "the problem has no observations"
+    return notes
+
+
+def _truth_count(table: pd.DataFrame) -> dict[str, int]:
+    frames = int(table["position"].notna().sum())
+    return {"frames": frames, "missing": len(table) - frames}
+
+
+def _nees(values: FloatArray) -> dict[str, float | int]:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return {"mean": math.nan, "median": math.nan, "frames": 0}
+    return {"mean": float(np.mean(known)), "median": float(np.median(known)), "frames": len(known)}
+
+
+def _length(poses: FloatArray) -> float:
+    positions = poses[np.isfinite(poses).all(axis=(1, 2)), :3, 3]
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+
+
+def _finite(value: Any) -> Any:
+    """The same tree with None for every float that is not finite."""
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
