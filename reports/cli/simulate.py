@@ -29,44 +29,39 @@ class Interval(click.ParamType[tuple[float, ...]]):
         return numbers
 
 
-def option(name: str, help: str, **more: Any) -> Any:
-    """An option that is passed on only where it is given: defaults stand in `Simulation`."""
-    return click.option(name, help=help, **more)
-
-
 @click.command(
     epilog="Example: fgbaseline simulate drive.npz --path loop --duration 120 --burst 20:22:0.5 --seed 7",
 )
 @click.argument("output", type=click.Path(path_type=Path))
-@option("--path", "Where it goes.  [default: town]", type=click.Choice(PATHS))
-@option("--along", "Recording whose velocities to follow (path 'along').", type=click.Path(path_type=Path))
-@option("--along-gyro-bias", "rad/s, taken off the velocities of --along first.", type=(float, float, float))
-@option("--duration", "Seconds.  [default: 60, or all of --along]", type=float)
-@option("--frame-rate", "Frames a second.  [default: 10]", type=float)
-@option("--seed", "Same seed, same bytes.  [default: 0]", type=int)
-@option("--sigma-linear", "m/s, noise of a velocity sample.  [default: 0.1]", type=float)
-@option("--sigma-angular", "rad/s, noise of a rate sample.  [default: 0.01]", type=float)
-@option("--gyro-bias", "rad/s, in recorded axes.", type=(float, float, float))
-@option("--velocity-scale", "Recorded over true velocity.  [default: 1]", type=float)
-@option("--time-offset", "s: a velocity stamped t is that of t + offset.  [default: 0]", type=float)
-@option("--velocity-of-interval", "What a sample says.  [default: after]", type=click.Choice(INTERVALS))
-@option("--linear-axes", "Axis convention of the linear velocity, such as x,-y,-z.")
-@option("--angular-axes", "Axis convention of the angular velocity.")
-@option("--features-per-frame", "Points tracked at a time.  [default: 70]", type=float)
-@option("--track-length", "Median frames until a point is lost.  [default: 14]", type=float)
-@option("--returning-share", "Share of tracks that are lost and found again.", type=float)
-@option("--return-after", "s from the first sight of such a track to its second.", type=float)
-@option("--sigma-pixel", "px, noise of each row.  [default: 0.5]", type=float)
-@option("--row-correlation", "Between the noise of vL and vR.  [default: 0]", type=float)
-@option("--wrong-share", "Share of wrong matches.  [default: 0.03]", type=float)
-@option(
+@click.option("--path", help="Where it goes.  [default: town]", type=click.Choice(PATHS))
+@click.option("--along", help="Recording whose velocities to follow (path 'along').", type=click.Path(path_type=Path))
+@click.option("--along-gyro-bias", help="rad/s, taken off the velocities of --along first.", type=(float, float, float))
+@click.option("--duration", help="Seconds.  [default: 60, or all of --along]", type=float)
+@click.option("--frame-rate", help="Frames a second.  [default: 10]", type=float)
+@click.option("--seed", help="Same seed, same bytes.  [default: 0]", type=int)
+@click.option("--sigma-linear", help="m/s, noise of a velocity sample.  [default: 0.1]", type=float)
+@click.option("--sigma-angular", help="rad/s, noise of a rate sample.  [default: 0.01]", type=float)
+@click.option("--gyro-bias", help="rad/s, in recorded axes.", type=(float, float, float))
+@click.option("--velocity-scale", help="Recorded over true velocity.  [default: 1]", type=float)
+@click.option("--time-offset", help="s: a velocity stamped t is that of t + offset.  [default: 0]", type=float)
+@click.option("--velocity-of-interval", help="What a sample says.  [default: after]", type=click.Choice(INTERVALS))
+@click.option("--linear-axes", help="Axis convention of the linear velocity, such as x,-y,-z.")
+@click.option("--angular-axes", help="Axis convention of the angular velocity.")
+@click.option("--features-per-frame", help="Points tracked at a time.  [default: 70]", type=float)
+@click.option("--track-length", help="Median frames until a point is lost.  [default: 14]", type=float)
+@click.option("--returning-share", help="Share of tracks that are lost and found again.", type=float)
+@click.option("--return-after", help="s from the first sight of such a track to its second.", type=float)
+@click.option("--sigma-pixel", help="px, noise of each row.  [default: 0.5]", type=float)
+@click.option("--row-correlation", help="Between the noise of vL and vR.  [default: 0]", type=float)
+@click.option("--wrong-share", help="Share of wrong matches.  [default: 0.03]", type=float)
+@click.option(
     "--burst",
-    "Seconds, seconds and share of wrong matches; repeatable.",
+    help="Share of wrong matches between two times, s; repeatable.",
     type=Interval("START", "END", "SHARE"),
     multiple=True,
 )
-@option("--blackout", "Seconds without features; repeatable.", type=Interval("START", "END"), multiple=True)
-@option("--moving-share", "Share of observations on things that move.", type=float)
+@click.option("--blackout", help="Time without features, s; repeatable.", type=Interval("START", "END"), multiple=True)
+@click.option("--moving-share", help="Share of observations on things that move.", type=float)
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def command(output: Path, along: Path | None, force: bool, **given: Any) -> None:
     """Simulate a recording and write it to OUTPUT (.npz) with its truth.
