@@ -20,7 +20,7 @@ class LandmarkBlocks:
         m = len(problem.features)
         prior = problem.landmark_prior
         self.camera: StereoCamera = problem.sequence.camera
-        self.cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
+        self.cam_T_imu = se3.affine_inverse(problem.sequence.imu_T_cam)
         self.imu_T_cam = problem.sequence.imu_T_cam
         self.known: BoolArray = np.full(m, prior is not None)
         if prior is None:

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import qr, solve_triangular
 
 from fgbaseline.data.problem import HuberKernel
 from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
@@ -43,23 +44,28 @@ class PosePosterior(NamedTuple):
 
 
 def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
-    """Equation 13 in a form whose cost is linear in the observations, and that keeps the covariance symmetric.
+    """Equation 13 in a form whose cost is linear in the observations, and that keeps the covariance positive.
 
-    With Sigma = L L^T and A = H^T V^-1 H: (I - K H) Sigma = L (I + L^T A L)^-1 L^T =: Sigma+, and
-    K (z - z~) = Sigma+ H^T V^-1 (z - z~). The eigenvalues of I + L^T A L, none below 1, are those of
+    With Sigma = L L^T and B = V^-1/2 H L: (I - K H) Sigma = L (I + B^T B)^-1 L^T, and L^-1 K (z - z~) is the least
+    squares solution of [B; I] x = [V^-1/2 (z - z~); 0]. The QR decomposition [B; I] = Q R gives both without forming
+    B^T B, which a landmark near the camera plane would leave with no correct digit; rows by size and column pivoting
+    make it accurate row by row (Cox and Higham, 1998). The eigenvalues of R^T R, none below 1, are those of
     (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance.
-    `weight` (n,) is 1 / V of each observation. Raises numpy's LinAlgError where `covariance` is not positive definite.
+
+    `weight` (n,) is 1 / V of each observation. Raises numpy's LinAlgError where `covariance` is not positive definite
+    or the innovation not finite.
     """
-    H = innovation.jacobian.reshape(-1, 6)
-    row_weight = np.repeat(weight, 4)
-    weighted_H = H * row_weight[:, None]
-    A = weighted_H.T @ H
+    if not (np.isfinite(innovation.jacobian).all() and np.isfinite(innovation.residual).all()):
+        raise np.linalg.LinAlgError("the innovation is not finite")
     L = np.linalg.cholesky(covariance)
-    eigenvalues, Q = np.linalg.eigh(np.eye(6) + L.T @ A @ L)
-    half = (L @ Q) / np.sqrt(eigenvalues)
-    posterior = half @ half.T
-    gradient = weighted_H.T @ innovation.residual.reshape(-1)
-    return PosePosterior(posterior @ gradient, posterior, float(eigenvalues[-1]))
+    root = np.repeat(np.sqrt(weight), 4)
+    stacked = np.vstack([(root[:, None] * innovation.jacobian.reshape(-1, 6)) @ L, np.eye(6)])
+    right = np.concatenate([root * innovation.residual.reshape(-1), np.zeros(6)])
+    by_size = np.argsort(-np.abs(stacked).max(axis=1), kind="stable")
+    Q, R, pivot = qr(stacked[by_size], mode="economic", pivoting=True)
+    half = solve_triangular(R, L[:, pivot].T, trans="T").T
+    correction: FloatArray = half @ (Q.T @ right[by_size])
+    return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2)
 
 
 def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
         blocks = LandmarkBlocks(problem)
     else:
         blocks, _ = map_along(problem, dead_reckoned_path(problem.increment, problem.initial_pose))
-    camera, cam_T_imu = problem.sequence.camera, se3.inverse(problem.sequence.imu_T_cam)
+    camera, cam_T_imu = problem.sequence.camera, se3.affine_inverse(problem.sequence.imu_T_cam)
     steps = se3.exp(problem.increment)
     poses = np.full((T, 4, 4), np.nan)
     covariances = np.full((T, 6, 6), np.nan)
@@ -63,8 +63,8 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                 weight[known] = robust_weight(innovation, covariance, problem.pixel_variance, problem.kernel)
                 try:
                     posterior = pose_posterior(covariance, innovation, weight[known])
-                except np.linalg.LinAlgError:
-                    failure = f"the pose covariance is not positive definite before the update of frame {k}"
+                except np.linalg.LinAlgError as error:
+                    failure = f"the pose cannot be updated at frame {k}: {error}"
                     break
                 pose, covariance = pose @ se3.exp(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SINGULAR_CONDITION:

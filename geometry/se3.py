@@ -73,6 +73,20 @@ def inverse(pose: ArrayLike) -> FloatArray:
     return result
 
 
+def affine_inverse(matrix: ArrayLike) -> FloatArray:
+    """The inverse (..., 4, 4) of matrices [[A, p], [0, 1]] (..., 4, 4); A need not be a rotation to the last digit.
+
+    Recorded extrinsics are rotations to 1e-8 only; where landmarks pass near the camera plane that is enough to show.
+    """
+    T = np.asarray(matrix, dtype=np.float64)
+    result = np.zeros_like(T)
+    A_inverse = np.linalg.inv(T[..., :3, :3])
+    result[..., :3, :3] = A_inverse
+    result[..., :3, 3] = -(A_inverse @ T[..., :3, 3, None])[..., 0]
+    result[..., 3, 3] = 1.0
+    return result
+
+
 def adjoint(pose: ArrayLike) -> FloatArray:
     """6x6 adjoints (..., 6, 6) of poses (..., 4, 4), with `T exp(xi) T^-1 == exp(adjoint(T) xi)`, order [v, w]."""
     T = np.asarray(pose, dtype=np.float64)
