@@ -1,0 +1,45 @@
+"""All figures of a run, in the order in which the page shows them."""
+
+from collections.abc import Callable
+
+from matplotlib.figure import Figure
+
+from fgbaseline.reports.comparison import Run
+
+from .errors import divergence, error_to_truth, height
+from .health import nees, time_per_frame
+from .paths import path_with_landmarks, paths_overlaid, paths_side_by_side
+from .reprojections import reprojection_distribution, reprojection_over_time
+from .style import in_style
+
+OVER_TIME: tuple[Callable[[Run], Figure | None], ...] = (
+    divergence,
+    error_to_truth,
+    height,
+    reprojection_over_time,
+    reprojection_distribution,
+    nees,
+    time_per_frame,
+)
+"""each answers None where the run has nothing for it to show"""
+
+
+def draw(run: Run) -> dict[str, Figure]:
+    """The figures of a run by name, as `DIR/figures` and the page have them; none where no estimator answered.
+
+    `paths_overlaid`, `paths_side_by_side`, `path_NAME` for each estimator that answered, then those over time that
+    have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations.
+    """
+    if not run.answered:
+        return {}
+    with in_style():
+        figures = {"paths_overlaid": paths_overlaid(run), "paths_side_by_side": paths_side_by_side(run)}
+        figures |= {f"path_{result.name}": path_with_landmarks(run, result) for result in run.answered}
+        for draw_one in OVER_TIME:
+            figure = draw_one(run)
+            if figure is not None:
+                figures[draw_one.__name__] = figure
+        for figure in figures.values():
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")  # what constrained layout found stays, whatever is written first
+    return figures
