@@ -1,0 +1,33 @@
+"""Numbers as a person reads them: three significant digits, a dash for what is not one."""
+
+from collections.abc import Iterable
+from math import isfinite
+
+DASH = "–"
+
+
+def number(value: object) -> str:
+    """A number to three significant digits (whole from 1000 on, counts in full), or a dash for None and NaN."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        return DASH
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    size = abs(value)
+    if size == 0.0 or 1e-3 <= size < 999.5:
+        return f"{value:#.3g}".rstrip(".").replace("-", "\N{MINUS SIGN}")
+    if 999.5 <= size < 1e6:
+        return number(round(value)).replace("-", "\N{MINUS SIGN}")
+    mantissa, exponent = f"{value:.2e}".split("e")
+    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa} × 10{raised}".replace("-", "\N{MINUS SIGN}")
+
+
+def per_cent(share: float) -> str:
+    """A share of one as per cent."""
+    return f"{100.0 * share:.3g} %"
+
+
+def listed(items: Iterable[str]) -> str:
+    """`a, b and c`."""
+    every = list(items)
+    return " and ".join([", ".join(every[:-1]), every[-1]] if len(every) > 1 else every)

@@ -1,0 +1,109 @@
+"""The page from a run: what goes where."""
+
+from collections import Counter
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from fgbaseline.data import Event
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures import colours
+
+from .embedding import picture
+from .numbers import number, per_cent
+from .table import main_table
+from .verdict import verdict
+
+MOST_EVENTS = 200
+"""of an estimator that are listed one by one"""
+REASONS: Mapping[str, str] = {
+    "feature_not_chosen": "its feature is not among those asked for",
+    "disparity": "its disparity is too small to tell the depth",
+    "rows": "its rows in the left and right image disagree",
+    "prediction": "it contradicts its own track, carried along by the velocities",
+    "short": "what is left of its track is too short to check",
+    "geometry": "its point is not determined, or lies behind a camera",
+    "moving": "its point moved",
+}
+
+
+def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) -> str:
+    """`report.html`: one file that needs no other and asks for nothing.
+
+    `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` gave. All text
+    that comes from files is escaped.
+    """
+    pictures = {name: picture(name, figure) for name, figure in figures.items()}
+    return (
+        environment()
+        .get_template("report.html")
+        .render(
+            css=Markup(_text("report.css")),  # noqa: S704 - our own file
+            run=run,
+            summary=summary,
+            sequence=summary.get("sequence", {}),
+            problem=summary.get("problem", {}),
+            verdict=verdict(run),
+            trust=run.trust.verdict.name.lower(),
+            table=main_table(run, summary.get("estimators", {})),
+            pictures=pictures,
+            paths=[p for name, p in pictures.items() if name.startswith("path_")],
+            colours=colours(run),
+            excluded=_excluded(summary),
+            events=_events(run),
+        )
+    )
+
+
+def environment() -> Environment:
+    """Templates beside this module; everything is escaped, and an unknown name is an error."""
+    jinja = Environment(
+        loader=FunctionLoader(_text), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    jinja.filters["number"] = number
+    jinja.filters["flat"] = flat
+    return jinja
+
+
+def flat(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """The leaves of nested settings as (dotted name, text)."""
+    leaves: list[tuple[str, str]] = []
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            leaves += flat(value, f"{above}{key}.")
+        elif isinstance(value, list | tuple):
+            leaves.append((f"{above}{key}", ", ".join(map(str, value))))
+        else:
+            leaves.append((f"{above}{key}", "–" if value is None else str(value)))
+    return leaves
+
+
+def _excluded(summary: Mapping[str, Any]) -> list[tuple[str, int, str]]:
+    """Reason in words, how many, and their share of all observations; the most frequent first."""
+    counts: Mapping[str, int] = summary.get("problem", {}).get("excluded") or {}
+    total = max(1, int(summary.get("sequence", {}).get("observations") or 0))
+    ranked = sorted(((r, n) for r, n in counts.items() if n and r.lower() != "no"), key=lambda item: -item[1])
+    return [(REASONS.get(r.lower(), r.replace("_", " ")), n, per_cent(n / total)) for r, n in ranked]
+
+
+def _events(run: Run) -> list[tuple[str, list[tuple[str, int]], tuple[Event, ...], int]]:
+    """Estimator, how many of each kind, the first so many, and how many more there are; one run's events once."""
+    listed = []
+    seen: set[int] = set()
+    for name, result in run.results.items():
+        events = result.estimate.events
+        if not events or id(events) in seen:
+            continue
+        seen.add(id(events))
+        names = ", ".join(n for n, r in run.results.items() if r.estimate.events is events) or name
+        kinds = Counter(event.kind for event in events).most_common()
+        listed.append((names, kinds, events[:MOST_EVENTS], max(0, len(events) - MOST_EVENTS)))
+    return listed
+
+
+def _text(name: str) -> str:
+    return files("fgbaseline.reports.page").joinpath(name).read_text(encoding="utf-8")
