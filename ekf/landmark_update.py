@@ -3,7 +3,10 @@
 With the poses given, landmarks are conditionally independent: the report's 3M x 3M covariance is exactly block
 diagonal, and its update equals, block by block,
 
-    Lambda <- Lambda + H^T V^-1 H    and    mu <- mu + Lambda^-1 H^T V^-1 (z - z~).
+    Sigma^-1 <- Sigma^-1 + H^T V^-1 H    and    mu <- mu + Sigma H^T V^-1 (z - z~).
+
+The blocks are kept as square roots R with Sigma^-1 = R^T R, updated by the QR decomposition of [V^-1/2 H; R]: a
+landmark near the camera plane, whose H is without bound, then leaves a covariance that is still positive.
 """
 
 import numpy as np
@@ -14,7 +17,7 @@ from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
 
 class LandmarkBlocks:
-    """The means (m, 3) and 3x3 information matrices (m, 3, 3) of m independent landmarks, in the world frame."""
+    """The means (m, 3) and covariances (m, 3, 3) of m independent landmarks, in the world frame."""
 
     def __init__(self, problem: Problem) -> None:
         m = len(problem.features)
@@ -25,10 +28,11 @@ class LandmarkBlocks:
         self.known: BoolArray = np.full(m, prior is not None)
         if prior is None:
             self.mean = np.full((m, 3), np.nan)
-            self.information = np.zeros((m, 3, 3))
+            self.root_information = np.zeros((m, 3, 3))
         else:
             self.mean = prior.mean.copy()
-            self.information = np.broadcast_to(np.linalg.inv(prior.covariance), (m, 3, 3)).copy()
+            root = np.linalg.cholesky(np.linalg.inv(prior.covariance)).T
+            self.root_information = np.broadcast_to(root, (m, 3, 3)).copy()
 
     def update(self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray) -> None:
         """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
@@ -43,21 +47,16 @@ class LandmarkBlocks:
             self.mean[row[fresh]] = se3.transform(world_T_cam, self.camera.triangulate(pixel[fresh]))
             self.known[row[fresh]] = True
         p_cam = se3.transform(cam_T_world, self.mean[row])
-        H = self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
-        weighted_Ht = np.swapaxes(H, 1, 2) * weight[:, None, None]
-        information = self.information[row] + weighted_Ht @ H
-        innovation = pixel - self.camera.project(p_cam)
-        gradient = (weighted_Ht @ innovation[:, :, None])[:, :, 0]
-        self.mean[row] += solve_3x3(information, gradient)
-        self.information[row] = information
+        whiten = np.sqrt(weight)[:, None, None]
+        H = whiten * self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
+        innovation = whiten * (pixel - self.camera.project(p_cam))[:, :, None]
+        Q, R = np.linalg.qr(np.concatenate([H, self.root_information[row]], axis=1))
+        self.mean[row] += np.linalg.solve(R, np.swapaxes(Q[:, :4], 1, 2) @ innovation)[:, :, 0]
+        self.root_information[row] = R
 
     def covariance(self) -> FloatArray:
         """(m, 3, 3) m^2; NaN for landmarks that were never seen."""
-        covariance = np.full_like(self.information, np.nan)
-        covariance[self.known] = np.linalg.inv(self.information[self.known])
+        covariance = np.full_like(self.root_information, np.nan)
+        half = np.linalg.inv(self.root_information[self.known])
+        covariance[self.known] = half @ np.swapaxes(half, 1, 2)
         return 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
-
-
-def solve_3x3(matrix: FloatArray, vector: FloatArray) -> FloatArray:
-    """x (n, 3) with matrix @ x = vector, for symmetric positive definite matrices (n, 3, 3)."""
-    return np.asarray(np.linalg.solve(matrix, vector[:, :, None])[:, :, 0], dtype=np.float64)

@@ -68,6 +68,16 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
     return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2)
 
 
+def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
+    """(6, 6) (I - K H) Sigma with the arithmetic that equation 13 prints, whatever that loses.
+
+    Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
+    """
+    H = innovation.jacobian.reshape(-1, 6)
+    gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + np.diag(np.repeat(1.0 / weight, 4)))
+    return np.asarray((np.eye(6) - gain @ H) @ covariance, dtype=np.float64)
+
+
 def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatArray) -> FloatArray:
     """Sigma (6, 6) after a motion `step` (4, 4) with noise W (6, 6): F Sigma F^T + W, F = exp(-tau u^curly) (eq. 9)."""
     F = se3.adjoint(se3.inverse(step))

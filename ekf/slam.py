@@ -8,14 +8,22 @@ from threadpoolctl import threadpool_limits
 from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem, Reading
-from fgbaseline.geometry import se3
+from fgbaseline.geometry import FloatArray, se3
 
 from .landmark_update import LandmarkBlocks
 from .mapping import map_along
-from .pose_update import pose_innovation, pose_posterior, predicted_covariance, robust_weight
+from .pose_update import (
+    PoseInnovation,
+    pose_innovation,
+    pose_posterior,
+    predicted_covariance,
+    printed_covariance,
+    robust_weight,
+)
 
-SINGULAR_CONDITION = 1.0 / np.finfo(np.float64).eps
-"""beyond this the inverse that equation 13 prints has no correct digit"""
+SUSPECT_CONDITION = 1.0 / np.sqrt(np.finfo(np.float64).eps)
+"""of the innovation covariance: beyond it the rounding of (I - K H) Sigma, eps times the condition, may outweigh the
+smallest eigenvalue, which is one over the condition"""
 
 
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
@@ -23,12 +31,12 @@ def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
 
     At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9), update the pose with
     the landmarks as they stand (13), update the landmarks with the updated pose (11, 12; skipped where the problem's
-    reading holds them at the mapping's). Frames where the printed equations have lost all digits (a numerically
-    singular innovation covariance) are told as events, and the status is then `recovered`.
+    reading holds them at the mapping's). Frames where the covariance as printed is no longer positive definite (a
+    numerically singular innovation covariance) are told as events, and the status is then `recovered`.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("ekf", "no observations", problem.n_frames, len(problem.excluded))
-    with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+    with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _run(problem, progress)
 
 
@@ -66,9 +74,12 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                 except np.linalg.LinAlgError as error:
                     failure = f"the pose cannot be updated at frame {k}: {error}"
                     break
+                predicted = covariance
                 pose, covariance = pose @ se3.exp(posterior.correction), posterior.covariance
-                if posterior.innovation_condition > SINGULAR_CONDITION:
-                    events.append(_singular(k, posterior.innovation_condition))
+                if posterior.innovation_condition > SUSPECT_CONDITION:
+                    lost = _loss_as_printed(predicted, innovation, weight[known])
+                    if lost:
+                        events.append(_singular(k, posterior.innovation_condition, lost))
         if not (np.isfinite(pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
             break
@@ -95,12 +106,21 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     )
 
 
-def _singular(frame: int, condition: float) -> Event:
+def _loss_as_printed(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
+    """What (I - K H) Sigma as printed loses; empty where it stays positive definite."""
+    try:
+        printed = printed_covariance(covariance, innovation, weight)
+        smallest = float(np.linalg.eigvalsh(0.5 * (printed + printed.T))[0])
+    except np.linalg.LinAlgError:
+        return "has no inverse in double precision"
+    return "" if smallest > 0.0 else f"leaves (I - K H) Sigma as printed with an eigenvalue of {smallest:.1e}"
+
+
+def _singular(frame: int, condition: float, lost: str) -> Event:
     return Event(
         frame,
         "innovation covariance singular",
-        f"H Sigma H^T + V has condition number {condition:.1e}: a landmark is at the camera plane, and "
-        "(I - K H) Sigma as printed would not stay positive definite",
+        f"H Sigma H^T + V, with a condition number of {condition:.1e} from a landmark near the camera plane, {lost}",
     )
 
 
@@ -110,6 +130,7 @@ def _verdict(failure: str, events: list[Event], n_frames: int) -> tuple[Status, 
     if events:
         return Status.RECOVERED, (
             f"the innovation covariance was numerically singular at {len(events)} of {n_frames} frames, "
-            f"first at frame {events[0].frame}; the printed equations lose positive definiteness there"
+            f"first at frame {events[0].frame}: the printed equations lose positive definiteness there, "
+            "the form used here does not"
         )
     return Status.OK, ""

@@ -1,5 +1,6 @@
 """Points from many views, with the poses given: damped Gauss-Newton over all tracks at once."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -85,7 +86,7 @@ def triangulate_tracks(
 
 
 def _sum_by_row(values: FloatArray, row: NDArray[np.int64], n_rows: int) -> FloatArray:
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), math.prod(values.shape[1:]))
     sums = np.empty((n_rows, flat.shape[1]))
     for i, column in enumerate(flat.T):
         sums[:, i] = np.bincount(row, weights=column, minlength=n_rows)

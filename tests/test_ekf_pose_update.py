@@ -16,6 +16,7 @@ from fgbaseline.ekf.pose_update import (
     pose_innovation,
     pose_posterior,
     predicted_covariance,
+    printed_covariance,
     robust_weight,
 )
 from fgbaseline.geometry import FloatArray, se3
@@ -106,6 +107,18 @@ def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> No
         known = one.covariance @ direction
         expected = one.covariance - np.outer(known, known) / (direction @ known)
         np.testing.assert_allclose(both.covariance, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite() -> None:
+    random = np.random.default_rng(5)
+    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(random))
+    sigma, weight = covariance_of(random, 0.01), np.full(8, 1.0 / 15.0)
+    ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
+    np.testing.assert_allclose(printed, ours, rtol=0.0, atol=1e-9 * sigma.max())
+    innovation.jacobian[0] *= 1e8
+    ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
+    assert np.linalg.eigvalsh(0.5 * (printed + printed.T))[0] < 0.0
+    assert np.linalg.eigvalsh(ours)[0] > -1e-16 * sigma.max()
 
 
 @given(SEEDS)
