@@ -36,7 +36,9 @@ def divergence(run: Run) -> Figure | None:
     if not tables or run.reference is None:
         return None
     doubt = "" if run.trust.verdict is Verdict.TRUSTED else f" ({run.trust.verdict.name.lower()})"
-    return _panels(run, tables, f"Divergence from {plain(run.reference)}{doubt}{_farthest(tables)}")
+    own = run.results[run.reference].estimate.by_products
+    farthest = _farthest({name: table for name, table in tables.items() if name not in own} or tables)
+    return _panels(run, tables, f"Divergence from {plain(run.reference)}{doubt}{farthest}")
 
 
 def error_to_truth(run: Run) -> Figure | None:

@@ -18,7 +18,7 @@ DECADES = 1.5
 def seconds(run: Run) -> FloatArray:
     """(T,) time since the first frame, s."""
     t = run.problem.sequence.t
-    return np.subtract(t, t[0])
+    return np.asarray(t - t[0], dtype=np.float64)
 
 
 def time_axis(run: Run, axes: list[Axes]) -> None:
@@ -62,12 +62,16 @@ def fit_signed(run: Run, axes: Axes, series: Mapping[str, FloatArray], reach: fl
 
 
 def note_leaving(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], low: float, high: float) -> None:
-    """A note of which series (T,) go beyond the panel, from when on and how far."""
+    """A note of which series (T,), m, go beyond the panel, from when on and how far."""
     leaving = []
     for name, values in series.items():
         beyond = np.flatnonzero((values < low) | (values > high))
         if len(beyond):
             farthest = values[beyond[np.argmax(np.abs(values[beyond]))]]
-            leaving.append(f"{plain(name)} leaves the panel at {t[beyond[0]]:.1f} s, as far as {farthest:.3g}")
+            leaving.append(f"{plain(name)} leaves the panel at {t[beyond[0]]:.1f} s, {_signed(farthest)} m")
     if leaving:
         note(axes, "; ".join(leaving))
+
+
+def _signed(value: float) -> str:
+    return f"to {value:.3g}".replace("-", "\N{MINUS SIGN}")

@@ -174,7 +174,7 @@ def _draw_ends(axes: Axes, path: FloatArray) -> list[Line2D]:
 def _parting(run: Run, result: Result) -> str:
     if result.divergence is None or result.name == run.reference:
         return ""
-    return f", up to {result.divergence['position'].max():.3g} m off"
+    return f", ≤ {result.divergence['position'].max():.3g} m from {plain(run.reference or '')}"
 
 
 def _outside(box: Window, points: FloatArray, what: str) -> list[str]:

@@ -18,10 +18,10 @@ from .style import head, line, sheet, swatch
 NEAR = 3.0
 """px: what the tables count as explained"""
 WRONG = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
-"""reasons that say a match is wrong, or its point not standing"""
+"""reasons that say a match is wrong, its point not standing, or the velocities wrong that carry the track along"""
 COARSE = (Excluded.DISPARITY, Excluded.SHORT)
 """reasons that say a match tells little"""
-BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "wrong matches": "#c0392b"}
+BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
 
@@ -89,7 +89,7 @@ def median_by_frame(table: pd.DataFrame, n_frames: int) -> FloatArray:
 
 
 def matches_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) how many matches each frame has in the problem, too coarse, and wrong, by the names of BANDS."""
+    """(T,) how many matches each frame has in the problem, too coarse, and contradicting, by the names of BANDS."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
     reasons = [(Excluded.NO,), COARSE, WRONG]
     return {

@@ -29,7 +29,7 @@ class Departure:
     """share of the matches within `AROUND` that the mask excluded as contradicting their tracks; None without a mask"""
 
 
-def far(run: Run, result: Result) -> float:
+def far(result: Result) -> float:
     """From how many metres on an estimator has left the reference: 5 m, or 1 % of the path where that is less."""
     return min(FAR, FAR_SHARE * path_length(result)) or FAR
 
@@ -44,7 +44,7 @@ def departure(run: Run, result: Result) -> Departure | None:
     if result.divergence is None:
         return None
     position = result.divergence["position"].to_numpy(dtype=np.float64)
-    beyond = position > far(run, result)
+    beyond = position > far(result)
     if not beyond.any():
         return None
     k = int(np.argmax(beyond))

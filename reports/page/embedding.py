@@ -19,16 +19,15 @@ CAPTIONS: Mapping[str, str] = {
     "divergence": "Distance and angle from the reference, and the distance split along its direction of travel, "
     "to its left and up.",
     "error_to_truth": "The same from the truth, without any alignment: all start at the true pose.",
-    "height": "Height above the start.",
+    "height": "Along the direction that the recording's reader says is up.",
     "reprojection_over_time": "Above, the median error over all observations of the landmarks that an estimator has. "
     "Below, the matches of each frame; the mask excludes those that contradict their own track.",
-    "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over those "
-    "it used. Farther left is better.",
+    "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over "
+    "those it used. Farther left is better.",
     "nees": "Inside the band a covariance tells the truth about the error; above it the estimator claims to know more "
     "than it does.",
     "time_per_frame": "Below the dotted line an estimator keeps up with the camera.",
 }
-PATH_CAPTION = "Path from above, where the camera looks every so often, and the landmarks."
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ def picture(name: str, figure: Figure) -> Picture:
         name=name,
         source=f"data:image/{form};base64,{b64encode(content).decode('ascii')}",
         title=str(figure.get_label()).replace(r"\$", "$"),
-        caption=CAPTIONS.get(name, PATH_CAPTION),
+        caption=CAPTIONS.get(name, ""),
         width=round(100 * width),
         height=round(100 * height),
     )

@@ -42,7 +42,7 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
         environment()
         .get_template("report.html")
         .render(
-            css=Markup(_text("report.css")),  # noqa: S704 - our own file
+            css=Markup(_text("report.css")),
             run=run,
             summary=summary,
             sequence=summary.get("sequence", {}),

@@ -38,8 +38,10 @@ COLUMNS = (
     Column(REFERENCE, "final, m", ("divergence", "final"), best=-1),
     Column(REFERENCE, "rotation RMSE, °", ("divergence", "rotation_rmse_deg"), best=-1),
     Column(REPROJECTION, "median, px", ("reprojection", "median"), best=-1, absent=NO_LANDMARK),
-    Column(REPROJECTION, "95 %, px", ("reprojection", "p95"), best=-1, absent=NO_LANDMARK),
-    Column(REPROJECTION, "under 3 px, %", ("reprojection", "under_3px"), 100.0, best=1, absent=NO_LANDMARK),
+    Column(REPROJECTION, "95\N{NO-BREAK SPACE}%, px", ("reprojection", "p95"), best=-1, absent=NO_LANDMARK),
+    Column(
+        REPROJECTION, "under 3\N{NO-BREAK SPACE}px, %", ("reprojection", "under_3px"), 100.0, best=1, absent=NO_LANDMARK
+    ),
     Column(
         REPROJECTION,
         "median of common, px",

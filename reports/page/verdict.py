@@ -1,6 +1,7 @@
 """What the numbers of a run mean, in words: every sentence has a number or a reason, and none flatters."""
 
 from collections.abc import Callable, Iterable
+from pathlib import PurePath
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def _truth(run: Run) -> list[str]:
     truth = run.problem.sequence.truth
     if truth is None:
         return []
-    n, T = int(truth.known.sum()), run.problem.n_frames
+    source, n, T = PurePath(truth.source).name, int(truth.known.sum()), run.problem.n_frames
     coverage = (
         f"all {number(T)} frames"
         if n == T
@@ -66,11 +67,9 @@ def _truth(run: Run) -> list[str]:
     errors = {r.name: _ate(r) for r in run.answered}
     ranked = sorted((name for name in errors if np.isfinite(errors[name])), key=lambda name: errors[name])
     if not ranked:
-        return [
-            f"The truth ({truth.source}; {coverage}) cannot be compared with: no estimator has a pose where it does."
-        ]
+        return [f"The truth ({source}; {coverage}) cannot be compared with: no estimator has a pose where it does."]
     each = listed(f"{number(errors[name])} m for {name}" for name in ranked)
-    sentences = [f"Against the truth ({truth.source}; {coverage}), the error of the aligned path is {each} (RMSE)."]
+    sentences = [f"Against the truth ({source}; {coverage}), the error of the aligned path is {each} (RMSE)."]
     reference = run.reference
     if reference in errors:
         better = [name for name in ranked if errors[name] < errors[reference] and name not in by_products(run)]
@@ -90,13 +89,13 @@ def _nearest(run: Run) -> list[str]:
     sentences = []
     if others:
         first, *rest = (f"{number(_divergence(r))} m ({_of_path(r)})" for r in others)
-        text = f"Nearest to {run.reference} is {others[0].name}: {first} away, RMSE over {_length(others[0])}"
+        text = f"Nearest to {run.reference} is {others[0].name}, {first} away (RMSE along {_length(others[0])})"
         if rest:
-            text += "; then " + listed(f"{r.name} with {away}" for r, away in zip(others[1:], rest, strict=True))
+            text += ", then " + listed(f"{r.name} with {away}" for r, away in zip(others[1:], rest, strict=True))
         sentences.append(text + ".")
     for result in own:
         sentences.append(
-            f"{result.name} is the same run before later frames correct it: these move its poses by "
+            f"{result.name} is the same run, each pose as known when its frame came: what came later moved them by "
             f"{number(_divergence(result))} m RMSE."
         )
     return sentences
@@ -104,26 +103,22 @@ def _nearest(run: Run) -> list[str]:
 
 def _departures(run: Run) -> list[str]:
     sentences = []
+    overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     for result in compared(run):
-        if result.name in by_products(run) or not np.isfinite(_divergence(result)):
+        if result.divergence is None or result.name in by_products(run) or not np.isfinite(_divergence(result)):
             continue
-        limit, left = far(run, result), departure(run, result)
+        limit, left = f"{far(result):.3g} m", departure(run, result)
         if left is None:
-            assert result.divergence is not None
-            largest = divergence_summary(result.divergence)["max"]
-            sentences.append(
-                f"{result.name} stays within {number(limit)} m of {run.reference} throughout: {number(largest)} m at most."
-            )
+            most = number(divergence_summary(result.divergence)["max"])
+            sentences.append(f"{result.name} stays within {limit} of {run.reference} throughout: {most} m at most.")
             continue
-        text = (
-            f"{result.name} first leaves {run.reference} by more than {number(limit)} m at {left.seconds:.1f} s "
-            f"(frame {left.frame}) and is beyond that in {per_cent(left.beyond)} of the frames from there on"
-        )
-        overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
+        stay = "for good" if left.beyond == 1.0 else f"and is that far in {per_cent(left.beyond)} of the frames after"
+        when = f"at {left.seconds:.1f} s (frame {left.frame})"
+        text = f"{result.name} is first more than {limit} from {run.reference} {when}, {stay}"
         if left.wrong is not None and overall is not None:
             text += (
-                f"; within {AROUND:g} s of that moment the mask excluded {per_cent(left.wrong)} of the matches as wrong, "
-                f"against {per_cent(overall)} over the whole recording"
+                f"; within {AROUND:g} s of that the mask excluded {per_cent(left.wrong)} of the matches "
+                f"({per_cent(overall)} in the whole recording)"
             )
         sentences.append(text + ".")
     return sentences
@@ -175,7 +170,7 @@ def _common_observations(run: Run) -> list[str]:
     ranked = sorted(medians, key=lambda name: medians[name])
     each = listed(f"{number(medians[name])} px for {name}" for name in ranked)
     return [
-        f"Over the {number(len(common))} observations that every estimator used, the median reprojection error is {each}."
+        f"Over the {number(len(common))} observations that all of them used, the median reprojection error is {each}."
     ]
 
 
@@ -189,8 +184,8 @@ def _mask(run: Run) -> list[str]:
     shares = [wrong_share(problem, second == s) or 0.0 for s in range(int(second[-1]) + 1)]
     worst = int(np.argmax(shares))
     return [
-        f"The mask excluded {per_cent(overall)} of the matches as wrong, most of all in the second from {worst} s on: "
-        f"{per_cent(shares[worst])}."
+        f"The mask excluded {per_cent(overall)} of the matches for contradicting their own tracks as the velocities carry "
+        f"them along, most in the second from {worst} s on: {per_cent(shares[worst])}."
     ]
 
 
