@@ -41,7 +41,7 @@ class Scene:
     def sequence(self) -> Sequence:
         """The recording, with its truth."""
         random = np.random.default_rng(self.seed)
-        u = np.tile(self.velocity, (self.frames, 1)) + 0.1 * random.normal(size=(self.frames, 6))
+        u = np.tile(self.velocity, (self.frames, 1)) + np.repeat([0.1, 0.01], 3) * random.normal(size=(self.frames, 6))
         path = dead_reckoned_path(u[:-1] * DT)
         cameras = path @ KITTI.imu_T_cam
         depth = random.uniform(8.0, 30.0, self.n_points)
