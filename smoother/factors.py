@@ -11,7 +11,8 @@ import numpy as np
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
-from .convention import landmark_key, pose_key, reordered
+from .convention import reordered
+from .keys import LandmarkKeys, pose_key
 
 HELD_SIGMA = 1e-6
 """m and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
@@ -23,6 +24,7 @@ class Factors:
     def __init__(self, problem: Problem) -> None:
         camera = problem.sequence.camera
         self.problem = problem
+        self.key = LandmarkKeys()
         self.calibration = gtsam.Cal3_S2Stereo(camera.fu, camera.fv, 0.0, camera.cu, camera.cv, camera.baseline)
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
         self.stereo_noise = stereo_noise(problem)
@@ -48,7 +50,7 @@ class Factors:
             gtsam.StereoPoint2(uL, uR, 0.5 * (vL + vR)),
             self.stereo_noise,
             pose_key(frame),
-            landmark_key(landmark),
+            self.key(landmark),
             self.calibration,
             False,
             False,
@@ -61,7 +63,7 @@ class Factors:
         assert prior is not None
         row = int(np.searchsorted(self.problem.features, landmark))
         noise = gtsam.noiseModel.Gaussian.Covariance(prior.covariance)
-        return gtsam.PriorFactorPoint3(landmark_key(landmark), prior.mean[row], noise)
+        return gtsam.PriorFactorPoint3(self.key(landmark), prior.mean[row], noise)
 
 
 def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:

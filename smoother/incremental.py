@@ -10,9 +10,10 @@ from fgbaseline.data.estimate import Event, Landmarks, Progress
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .convention import described_key, landmark_key, pose_key, reordered
+from .convention import reordered
 from .factors import Factors
 from .journal import IndeterminateSystemError, RestorableISAM2
+from .keys import landmark_of, pose_key, thresholds
 from .values import depths, points_of, poses_of
 from .waiting import Entry, EntryRule, WaitingLandmarks
 
@@ -21,16 +22,23 @@ ATTEMPTS_PER_FRAME = 20
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
 MIN_DEPTH = 0.3
-"""m; a landmark nearer to the plane of a camera that saw it, or behind it, is what makes a system indeterminate: its
-Jacobian is unbounded, or zero"""
+"""m; a landmark nearer to the plane of a camera that saw it, or behind it, makes a system indeterminate: its Jacobian
+is unbounded, or zero"""
+MIN_DISPARITY = 0.05
+"""px; so does one so far away that no step along its ray changes what the camera sees"""
+UNDONE = "it came to lie behind a camera that saw it, at its plane or at infinity"
 
 
 @dataclass(frozen=True, slots=True)
 class ISAM2Settings:
     """How the graph is solved; none of these moves its optimum."""
 
-    relinearize_threshold: float = 0.01
-    relinearize_skip: int = 1
+    relinearize_position: float = 0.05
+    """m, of a pose"""
+    relinearize_rotation: float = 0.005
+    """rad, of a pose"""
+    relinearize_landmark: float = 0.005
+    """as a share of its distance"""
     entry: EntryRule = field(default_factory=EntryRule)
 
 
@@ -55,8 +63,10 @@ class IncrementalSmoother:
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
         params = gtsam.ISAM2Params()
-        params.setRelinearizeThreshold(settings.relinearize_threshold)
-        params.relinearizeSkip = settings.relinearize_skip
+        params.setRelinearizeThreshold(
+            thresholds(settings.relinearize_position, settings.relinearize_rotation, settings.relinearize_landmark)
+        )
+        params.relinearizeSkip = 1
         self.isam = RestorableISAM2(params)
         self.problem = problem
         self.observations = problem.observations()
@@ -95,13 +105,15 @@ class IncrementalSmoother:
                 self.waiting.add(landmark, i)
                 waiting.append(landmark)
         entries = {entry.landmark: entry for entry in self.waiting.enter(waiting, self.online)}
+        for entry in entries.values():
+            self.factors.key.place(entry.landmark, float(np.linalg.norm(entry.start - guess[:3, 3])))
         self._update(k, guess, _Pending(motion, entries, seen))
         self.online[k] = self.isam.tree.calculateEstimatePose3(pose_key(k)).matrix()
         self.online_covariance[k] = reordered(self.isam.tree.marginalCovariance(pose_key(k)))
         for i in observed:
             landmark = int(self.observations.landmark[i])
             if landmark in self.in_graph:
-                self._online_landmark[landmark] = self.isam.tree.calculateEstimatePoint3(landmark_key(landmark))
+                self._online_landmark[landmark] = self.isam.tree.calculateEstimatePoint3(self.factors.key(landmark))
 
     def _update(self, k: int, guess: FloatArray, pending: _Pending) -> None:
         for _ in range(ATTEMPTS_PER_FRAME):
@@ -125,26 +137,28 @@ class IncrementalSmoother:
         GTSAM names a variable near the trouble, seldom the culprit. That is a landmark which the last solution sent
         behind a camera or onto its plane; only where there is none, the named one is taken.
         """
-        culprits = [j for j in self.behind_camera(k) if j not in pending.removed]
+        culprits = [j for j in self.undone(k, self.isam.tree.calculateEstimate()) if j not in pending.removed]
         if culprits:
             for landmark in culprits:
-                self._drop(k, landmark, pending, "it came to lie behind a camera that saw it, or at its plane")
+                self._drop(k, landmark, pending, UNDONE)
             return True
         named = self._named_landmark(error)
         if named is not None:
             self._drop(k, named, pending, "the system was indeterminate near it")
         return named is not None
 
-    def behind_camera(self, n_frames: int) -> list[int]:
-        """Landmarks in the graph of the first `n_frames` frames that are less than MIN_DEPTH in front of a camera."""
+    def undone(self, n_frames: int, values: gtsam.Values) -> list[int]:
+        """Landmarks in the graph of the first `n_frames` frames that are no point in front of all their cameras."""
         if not self.in_graph:
             return []
-        values = self.isam.tree.calculateEstimate()
+        camera = self.problem.sequence.camera
         index = np.sort(np.fromiter(self.in_graph, dtype=np.int64))
         taken = np.sort([i for observed in self.in_graph.values() for i in observed if i != PRIOR])
         o = self.observations.select(taken)
-        depth = depths(self.problem, o, poses_of(values, n_frames), index, points_of(values, index.tolist()))
-        return [int(j) for j in np.unique(o.landmark[depth < MIN_DEPTH])]
+        position = points_of(values, index.tolist(), self.factors.key)
+        depth = depths(self.problem, o, poses_of(values, n_frames), index, position)
+        sane = (depth > MIN_DEPTH) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
+        return [int(j) for j in np.unique(o.landmark[~sane])]
 
     def _try(self, k: int, guess: FloatArray, pending: _Pending) -> None:
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
@@ -153,7 +167,7 @@ class IncrementalSmoother:
             graph.push_back(factor)
         owner: list[tuple[int, int]] = []
         for entry in pending.entries.values():
-            values.insert(landmark_key(entry.landmark), entry.start)
+            values.insert(self.factors.key(entry.landmark), entry.start)
             if self.problem.landmark_prior is not None:
                 graph.push_back(self.factors.landmark_prior(entry.landmark))
                 owner.append((entry.landmark, PRIOR))
@@ -175,22 +189,19 @@ class IncrementalSmoother:
         o = self.observations
         return self.factors.stereo(int(o.frame[observation]), landmark, o.pixel[observation])
 
-    def drop_behind(self) -> None:
-        """After the last frame: gives up every landmark that lies behind a camera that saw it.
+    def drop_undone(self, values: gtsam.Values) -> bool:
+        """After the last frame: gives up every landmark whose geometry came undone; False if there is none.
 
         Such a landmark pulls at nothing (its Jacobian is zero) and its residual means nothing.
         """
         last = self.problem.n_frames - 1
-        for landmark in self.behind_camera(last + 1):
-            slots = list(self.in_graph[landmark].values())
+        undone = self.undone(last + 1, values)
+        slots = [slot for landmark in undone for slot in self.in_graph.pop(landmark).values()]
+        if undone:
             self.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), slots)
-            del self.in_graph[landmark]
-            self.dropped.add(landmark)
-            self.events.append(
-                Event(
-                    last, "landmark dropped", "at the end it lay behind a camera that saw it, or at its plane", landmark
-                )
-            )
+        self.dropped.update(undone)
+        self.events += [Event(last, "landmark dropped", UNDONE, landmark) for landmark in undone]
+        return bool(undone)
 
     def online_landmarks(self) -> Landmarks:
         """Every landmark as known at the frame that saw it last."""
@@ -198,10 +209,8 @@ class IncrementalSmoother:
         return Landmarks(index, np.array([self._online_landmark[int(j)] for j in index]).reshape(-1, 3))
 
     def _named_landmark(self, error: IndeterminateSystemError) -> int | None:
-        if error.key is None:
-            return None
-        kind, index = described_key(error.key)
-        return index if kind == "landmark" and index not in self.dropped else None
+        landmark = None if error.key is None else landmark_of(error.key)
+        return None if landmark in self.dropped else landmark
 
     def _drop(self, k: int, landmark: int, pending: _Pending, reason: str) -> None:
         pending.entries.pop(landmark, None)

@@ -1,6 +1,6 @@
 """From GTSAM's values to arrays."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import gtsam
 import numpy as np
@@ -9,7 +9,7 @@ from fgbaseline.data.observations import IntArray, Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
-from .convention import landmark_key, pose_key
+from .keys import pose_key
 
 
 def poses_of(values: gtsam.Values, n_frames: int) -> FloatArray:
@@ -17,9 +17,9 @@ def poses_of(values: gtsam.Values, n_frames: int) -> FloatArray:
     return np.array([values.atPose3(pose_key(k)).matrix() for k in range(n_frames)]).reshape(-1, 4, 4)
 
 
-def points_of(values: gtsam.Values, landmarks: Iterable[int]) -> FloatArray:
-    """(m, 3) positions of landmarks, by their indices in the sequence."""
-    return np.array([values.atPoint3(landmark_key(j)) for j in landmarks]).reshape(-1, 3)
+def points_of(values: gtsam.Values, landmarks: Iterable[int], key: Callable[[int], int]) -> FloatArray:
+    """(m, 3) positions of landmarks, by their indices in the sequence, which `key` turns into GTSAM's."""
+    return np.array([values.atPoint3(key(j)) for j in landmarks]).reshape(-1, 3)
 
 
 def depths(

@@ -13,13 +13,12 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .convention import landmark_key, pose_key, reordered
+from .convention import reordered
 from .incremental import PRIOR, GivenUpError, IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
+from .keys import pose_key
+from .relinearised import compact, relinearised
 from .values import points_of, poses_of
-
-FINAL_UPDATES = 10
-"""at most, after the last frame: each relinearises what has moved beyond the threshold"""
 
 
 def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
@@ -53,12 +52,11 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     smoother = IncrementalSmoother(problem, settings)
     try:
         smoother.run(seconds, progress)
-        _relinearise(smoother)
+        graph, values = _relinearise(smoother)
     except (GivenUpError, IndeterminateSystemError) as error:
         return Estimate.failed("isam2", str(error), T, len(problem.excluded))
-    values = smoother.isam.tree.calculateEstimate()
     index = np.sort(np.fromiter(smoother.in_graph, dtype=np.int64))
-    pose_covariance, landmark_covariance = _marginals(smoother, values, index.tolist())
+    covariance = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _verdict(events)
     used = problem.spread(_used(smoother))
@@ -77,8 +75,8 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     final = Estimate(
         name="isam2",
         world_T_imu=poses_of(values, T),
-        covariance=pose_covariance,
-        landmarks=Landmarks(index, points_of(values, index.tolist()), landmark_covariance),
+        covariance=covariance,
+        landmarks=Landmarks(index, points_of(values, index.tolist(), smoother.factors.key)),
         used=used,
         status=status,
         reason=reason,
@@ -93,24 +91,30 @@ def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
     return replace(estimate, by_products={other.name: replace(other, by_products={})})
 
 
-def _relinearise(smoother: IncrementalSmoother) -> None:
-    """Updates without new factors until nothing has moved beyond the threshold; then gives up what lies behind."""
-    for _ in range(FINAL_UPDATES):
-        result = smoother.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values())
-        if result.getVariablesRelinearized() == 0:
-            break
-    smoother.drop_behind()
+def _relinearise(smoother: IncrementalSmoother) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """The whole graph and its solution, relinearised, without the landmarks whose geometry came undone."""
+    while True:
+        graph, values = compact(smoother.isam.tree.getFactorsUnsafe()), smoother.isam.tree.calculateEstimate()
+        try:
+            values = relinearised(graph, values)
+        except RuntimeError as error:
+            text = str(error).strip().partition("\n")[0]
+            smoother.events.append(
+                Event(smoother.problem.n_frames - 1, "final relinearisation failed", f"{text}; the last update stands")
+            )
+        if not smoother.drop_undone(values):
+            return graph, values
 
 
-def _marginals(
-    smoother: IncrementalSmoother, values: gtsam.Values, landmarks: list[int]
-) -> tuple[FloatArray, FloatArray]:
-    """(T, 6, 6) of the poses, order [v, w], and (m, 3, 3) of the landmarks, at the final linearisation."""
-    marginals = gtsam.Marginals(smoother.isam.tree.getFactorsUnsafe(), values)
+def _marginals(smoother: IncrementalSmoother, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> FloatArray:
+    """(T, 6, 6) of the poses, order [v, w]; NaN where the system is indeterminate at its solution."""
     T = smoother.problem.n_frames
-    poses = np.array([marginals.marginalCovariance(pose_key(k)) for k in range(T)])
-    points = np.array([marginals.marginalCovariance(landmark_key(j)) for j in landmarks]).reshape(-1, 3, 3)
-    return reordered(poses), points
+    try:
+        marginals = gtsam.Marginals(graph, values)
+        return reordered([marginals.marginalCovariance(pose_key(k)) for k in range(T)])
+    except RuntimeError:
+        smoother.events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
+        return np.full((T, 6, 6), np.nan)
 
 
 def _used(smoother: IncrementalSmoother) -> BoolArray:
