@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from fgbaseline.reports.comparison import Run
 
@@ -40,6 +42,19 @@ def draw(run: Run) -> dict[str, Figure]:
             if figure is not None:
                 figures[draw_one.__name__] = figure
         for figure in figures.values():
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")  # what constrained layout found stays, whatever is written first
+            lay_out(figure)
     return figures
+
+
+def lay_out(figure: Figure) -> None:
+    """Places the panels for good, at round positions.
+
+    The solver of constrained layout answers differently in the last digits from one time to the next, and from one
+    drawing of a figure to its next: a figure would not have the same bytes twice.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))

@@ -14,7 +14,7 @@ from .frames import fit_log_or_linear, fit_signed, note_leaving, seconds, time_a
 from .lettering import plain
 from .style import TRUTH_LINE, head, line, sheet
 from .view import TopView
-from .window import common_window, robust_window, span
+from .window import common_window, span
 
 PANELS = {
     "position": "distance, m",
@@ -58,7 +58,7 @@ def height(run: Run) -> Figure:
     handles = axes[0].plot(t, true, **TRUTH_LINE) if true is not None else []
     for result in run.answered:
         handles += axes[0].plot(t, heights[result.name], **line(run, result))
-    least = LEVEL * max((w.side for w in map(robust_window, positions) if w is not None), default=1.0)
+    least = LEVEL * common_window(positions, None if truth is None else truth.world_T_imu[:, :3, 3]).side
     box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
     box = box.grown(0.06 * box.side + 0.05)
     axes[0].set_ylim(float(box.low[0]), float(box.high[0]))
@@ -75,7 +75,8 @@ def _panels(run: Run, tables: Mapping[str, pd.DataFrame], title: str) -> Figure:
     handles = []
     columns = {c: {name: _array(table, c) for name, table in tables.items()} for c in PANELS}
     travelled = max((float(np.nanmax(_array(table, "travelled"))) for table in tables.values()), default=0.0)
-    reach = span((v for c in ("along", "across", "up") for v in columns[c].values()), 0.05 * travelled)
+    components = [np.concatenate([columns[c][name] for c in ("along", "across", "up")]) for name in tables]
+    reach = span(components, 0.05 * travelled)
     for panel, (column, title_of_axis) in zip(axes, PANELS.items(), strict=True):
         for name, values in columns[column].items():
             handles += panel.plot(t, values, **line(run, run.results[name]))

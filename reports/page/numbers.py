@@ -13,7 +13,9 @@ def number(value: object) -> str:
     if isinstance(value, int):
         return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
     size = abs(value)
-    if size == 0.0 or 1e-3 <= size < 999.5:
+    if size == 0.0:
+        return "0"
+    if 1e-3 <= size < 999.5:
         return f"{value:#.3g}".rstrip(".").replace("-", "\N{MINUS SIGN}")
     if 999.5 <= size < 1e6:
         return number(round(value)).replace("-", "\N{MINUS SIGN}")

@@ -21,7 +21,7 @@ from .verdict import verdict
 MOST_EVENTS = 200
 """of an estimator that are listed one by one"""
 REASONS: Mapping[str, str] = {
-    "feature_not_chosen": "its feature is not among those asked for",
+    "feature not chosen": "its feature is not among those asked for",
     "disparity": "its disparity is too small to tell the depth",
     "rows": "its rows in the left and right image disagree",
     "prediction": "it contradicts its own track, carried along by the velocities",
@@ -53,6 +53,7 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
             pictures=pictures,
             paths=[p for name, p in pictures.items() if name.startswith("path_")],
             colours=colours(run),
+            components=_components(summary),
             excluded=_excluded(summary),
             events=_events(run),
         )
@@ -82,12 +83,18 @@ def flat(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
     return leaves
 
 
+def _components(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Bias and spread of uL, vL, uR and vR by estimator, where an estimator has any."""
+    components = {name: e.get("components") or {} for name, e in summary.get("estimators", {}).items()}
+    return {n: c for n, c in components.items() if any(row.get("bias") is not None for row in c.values())}
+
+
 def _excluded(summary: Mapping[str, Any]) -> list[tuple[str, int, str]]:
     """Reason in words, how many, and their share of all observations; the most frequent first."""
     counts: Mapping[str, int] = summary.get("problem", {}).get("excluded") or {}
     total = max(1, int(summary.get("sequence", {}).get("observations") or 0))
-    ranked = sorted(((r, n) for r, n in counts.items() if n and r.lower() != "no"), key=lambda item: -item[1])
-    return [(REASONS.get(r.lower(), r.replace("_", " ")), n, per_cent(n / total)) for r, n in ranked]
+    ranked = sorted(((r, n) for r, n in counts.items() if n), key=lambda item: -item[1])
+    return [(REASONS.get(r.replace("_", " "), r), n, per_cent(n / total)) for r, n in ranked]
 
 
 def _events(run: Run) -> list[tuple[str, list[tuple[str, int]], tuple[Event, ...], int]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from math import isfinite
 from typing import Any
 
@@ -51,7 +52,7 @@ COLUMNS = (
     ),
     Column(COST, "matches used, %", ("observations", "share"), 100.0, absent="there are no observations"),
     Column(COST, "time, s", ("seconds",), best=-1, absent="not measured"),
-    Column(COST, "per frame, ms", ("seconds_per_frame",), 1e3, best=-1, absent="not measured"),
+    Column(COST, "frames per s", ("frames_per_second",), best=1, absent="not measured"),
 )
 
 
@@ -94,44 +95,45 @@ def main_table(run: Run, estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     What belongs to the reference's own run is near to it by nature and is not called best.
     """
     answered = [name for name in run.results if name in estimators and run.results[name].answered]
-    columns = [c for c in COLUMNS if any(_value(estimators[name], c) is not None for name in answered)]
+    values = {c: {name: _value(estimators[name], c) for name in answered} for c in COLUMNS}
+    columns = [c for c in COLUMNS if any(value is not None for value in values[c].values())]
     columns = [c for c in columns if c.group != REFERENCE or len(answered) > 1]
+    opens = {c: i > 0 and columns[i - 1].group != c.group for i, c in enumerate(columns)}
+    best = {c: _best(run, c, values[c]) for c in columns}
     notes: dict[str, str] = {}
-    rows = []
-    best = {c: _best(run, c, {name: _value(estimators[name], c) for name in answered}) for c in columns}
-    colour = colours(run)
-    for name, result in run.results.items():
-        cells = []
-        if name in answered:
-            for i, c in enumerate(columns):
-                opens = i > 0 and columns[i - 1].group != c.group
-                cells.append(_cell(run, name, c, _value(estimators[name], c), best[c], notes, opens))
-        status, reason = result.estimate.status.value, result.estimate.reason
-        rows.append(Row(name, colour[name], status, reason, name == run.reference, cells))
-    groups: list[tuple[str, int]] = []
-    for c in columns:
-        title = f"divergence from {run.reference}" if c.group == REFERENCE else c.group
-        same = bool(groups) and groups[-1][0] == title
-        groups = [*groups[:-1], (title, groups[-1][1] + 1)] if same else [*groups, (title, 1)]
-    headings = [Cell(c.heading, opens_group=i > 0 and columns[i - 1].group != c.group) for i, c in enumerate(columns)]
+
+    def cell(name: str, c: Column) -> Cell:
+        value = values[c][name]
+        if c.group == REFERENCE and name == run.reference:
+            return Cell("reference" if opens[c] or c is columns[0] else "", opens_group=opens[c])
+        if value is None:
+            mark = notes.setdefault(_why_absent(estimators[name], c), chr(ord("a") + len(notes) % 26))
+            return Cell(DASH, note=mark, opens_group=opens[c])
+        return Cell(number(float(value) * c.scale), best=value == best[c], opens_group=opens[c])
+
+    rows = [
+        Row(
+            name=name,
+            colour=colour,
+            status=run.results[name].estimate.status.value,
+            reason=run.results[name].estimate.reason,
+            reference=name == run.reference,
+            cells=[cell(name, c) for c in columns] if name in answered else [],
+        )
+        for name, colour in colours(run).items()
+    ]
+    groups = [
+        (f"divergence from {run.reference}" if group == REFERENCE else group, len(list(same)))
+        for group, same in groupby(c.group for c in columns)
+    ]
+    headings = [Cell(c.heading, opens_group=opens[c]) for c in columns]
     return Table(groups, headings, rows, [(mark, text) for text, mark in notes.items()])
 
 
-def _cell(
-    run: Run,
-    name: str,
-    column: Column,
-    value: float | int | None,
-    best: float | None,
-    notes: dict[str, str],
-    opens: bool,
-) -> Cell:
-    if column.group == REFERENCE and name == run.reference:
-        return Cell("reference" if column.heading == "RMSE, m" else "", opens_group=opens)
-    if value is None:
-        mark = notes.setdefault(f"{column.group}, {column.heading}: {column.absent}", chr(ord("a") + len(notes) % 26))
-        return Cell(DASH, note=mark, opens_group=opens)
-    return Cell(number(float(value) * column.scale), best=value == best, opens_group=opens)
+def _why_absent(estimator: Mapping[str, Any], column: Column) -> str:
+    """What the summary's notes say of a missing value, by its own key or that of what it belongs to."""
+    notes: Mapping[str, str] = estimator.get("notes") or {}
+    return notes.get(".".join(column.path)) or notes.get(column.path[0]) or column.absent
 
 
 def _best(run: Run, column: Column, values: Mapping[str, float | int | None]) -> float | int | None:

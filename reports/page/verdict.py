@@ -184,8 +184,8 @@ def _mask(run: Run) -> list[str]:
     shares = [wrong_share(problem, second == s) or 0.0 for s in range(int(second[-1]) + 1)]
     worst = int(np.argmax(shares))
     return [
-        f"The mask excluded {per_cent(overall)} of the matches for contradicting their own tracks as the velocities carry "
-        f"them along, most in the second from {worst} s on: {per_cent(shares[worst])}."
+        f"The mask excluded {per_cent(overall)} of the matches for contradicting their own tracks as the velocities "
+        f"carry them along, most in the second from {worst} s on: {per_cent(shares[worst])}."
     ]
 
 
