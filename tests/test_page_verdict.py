@@ -9,6 +9,7 @@ from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.page import verdict
 from fgbaseline.reports.page.departure import departure
+from fgbaseline.reports.page.numbers import number
 
 from .reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
 from .synthetic import plain_problem
@@ -147,7 +148,7 @@ def test_overconfidence_is_told_as_a_ratio_of_errors() -> None:
     nees = run.results["ekf"].nees
     assert nees is not None
     mean = float(np.nanmean(nees))
-    assert f"{np.sqrt(mean / 6):.3g} times for ekf" in told(run, "True errors against")
+    assert f"{number(np.sqrt(mean / 6))} times for ekf (NEES {number(mean)})" in told(run, "True errors against")
 
 
 def test_a_path_with_holes_is_said_to_have_them() -> None:
