@@ -7,6 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
+
+settings.register_profile("fgbaseline", deadline=None)  # a busy machine is no failure
+settings.load_profile("fgbaseline")
 
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 
