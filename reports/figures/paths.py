@@ -106,9 +106,8 @@ def _truth(run: Run, view: TopView) -> FloatArray | None:
 
 def _panels(box: Window, rows: int, columns: int) -> tuple[Figure, list[Axes]]:
     """Panels as high as the box asks for, at equal scales."""
-    width, height = np.maximum(box.high - box.low, 1e-9)
-    shape = float(np.clip(height / width, *SLIMMEST))
-    panel = (WIDTH - 0.7) / columns * shape
+    width, height = box.high - box.low
+    panel = (WIDTH - 0.7) / columns * height / width
     figure = Figure(figsize=(WIDTH, rows * (panel + 0.25) + 0.95))
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     return figure, list(grid.ravel())
@@ -125,7 +124,11 @@ def _frame(axes: Axes, box: Window, *, labelled: bool = True) -> None:
 
 
 def _padded(box: Window) -> Window:
-    return box.grown(max(0.04 * box.side, 0.5))
+    """The box with a margin, and neither slimmer nor higher than a panel may be."""
+    box = box.grown(max(0.04 * box.side, 0.5))
+    width, height = box.high - box.low
+    missing = np.array([height / SLIMMEST[1] - width, width * SLIMMEST[0] - height]).clip(min=0.0)
+    return Window(box.low - 0.5 * missing, box.high + 0.5 * missing)
 
 
 def _with_landmarks(box: Window, landmarks: FloatArray) -> Window:
