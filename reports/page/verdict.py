@@ -51,7 +51,8 @@ def _reference(run: Run) -> list[str]:
         Verdict.DOUBTFUL: "a small distance from it says more than a large one",
         Verdict.UNTRUSTED: "distances from it say how much two answers disagree, and not which one is right",
     }[run.trust.verdict]
-    return [f"The reference, {run.reference}, is {run.trust.verdict.name.lower()}: {reasons}; {meaning}."]
+    so = f"; {meaning}" if compared(run) else ""
+    return [f"The reference, {run.reference}, is {run.trust.verdict.name.lower()}: {reasons}{so}."]
 
 
 def _truth(run: Run) -> list[str]:
