@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from fgbaseline.data import Estimate, Sequence
+from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import se3
 
@@ -80,6 +80,7 @@ def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
 
 
 def commonly_used(estimates: Iterable[Estimate]) -> BoolArray | None:
-    """(n,) the observations that every estimate used; estimates that use none by nature do not count, None if all."""
-    using = [estimate.used for estimate in estimates if estimate.used.any()]
+    """(n,) the observations that every estimate used. Those that use none by nature, and those that failed on the way,
+    do not count; None where that leaves none."""
+    using = [e.used for e in estimates if e.used.any() and e.status is not Status.FAILED]
     return np.asarray(np.logical_and.reduce(using), dtype=np.bool_) if using else None

@@ -1,1 +1,1 @@
-""""""
+"""A run, its figures, its page and the command line."""

@@ -1,23 +1,17 @@
-"""A run: every estimator on one problem, and all comparisons that tables, figures and the page draw on."""
+"""A run: the answers of all estimators, and every comparison that tables, figures and the page draw on."""
 
-import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.data import Estimate, Problem, Progress, Status, find_estimator
+from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.geometry import FgbaselineError, FloatArray
+from fgbaseline.geometry import FloatArray
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""
-Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
-"""around the work of a named estimator: gives what is told of every frame"""
 NO_REFERENCE = "no estimator gave an answer to compare with"
 
 
@@ -66,38 +60,6 @@ class Run:
     def answered(self) -> list[Result]:
         """The results that have a trajectory."""
         return [result for result in self.results.values() if result.answered]
-
-
-def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
-    """Nobody is told of progress."""
-    return nullcontext(None)
-
-
-def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
-    """Each named estimator's answer, in the order of the names; a failure is an answer and stops nothing.
-
-    What one run gives along with another (`isam2-online` with `isam2`) is not solved again.
-    """
-    answers: dict[str, Estimate] = {}
-    given: dict[str, Estimate] = {}
-    for name in names:
-        solve = find_estimator(name)
-        if name in given:
-            answers[name] = given[name]
-            continue
-        start = time.perf_counter()
-        try:
-            with watch(name) as progress:
-                estimate = solve(problem, progress)
-        except (FgbaselineError, ArithmeticError, np.linalg.LinAlgError, RuntimeError, ValueError, IndexError) as error:
-            reason = (
-                f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no text'}"
-            )
-            estimate = Estimate.failed(name, reason, problem.n_frames, len(problem.excluded))
-            estimate = replace(estimate, seconds_total=time.perf_counter() - start)
-        answers[name] = estimate
-        given |= estimate.by_products
-    return answers
 
 
 def compare_all(problem: Problem, estimates: Mapping[str, Estimate], settings: Mapping[str, object]) -> Run:

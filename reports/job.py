@@ -18,7 +18,8 @@ from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
 
-from .comparison import Run, Watch, compare_all, solve_all, unwatched
+from .comparison import Run, compare_all
+from .solving import Watch, solve_all, unwatched
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +60,23 @@ def check_estimators(names: tuple[str, ...]) -> None:
         if name not in installed:
             raise InputError(f"estimators: there is no '{name}'; installed are {', '.join(installed)}")
         if names.count(name) > 1:
-            raise InputError(f"estimators: '{name}' is named twice")
+            raise InputError(f"estimators: '{name}' is named twice; name it once")
+        if "/" in name or "\\" in name or name.startswith("."):
+            raise InputError(f"estimators: '{name}' can be no file's name; register it under another")
 
 
 def read_sequence(settings: RunSettings) -> Sequence:
     """The recording, with its truth; raises InputError."""
     if settings.sequence is None:
-        if settings.truth is not None:
+        if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
         return simulate(Simulation(seed=settings.seed))
+    if settings.truth is not None and settings.truth_frame is None:
+        raise InputError(
+            f"truth: {settings.truth} may have the poses of either body; add --truth-frame camera or --truth-frame imu"
+        )
+    if settings.truth is None and settings.truth_frame is not None:
+        raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
     return read(settings.sequence, settings.truth, settings.truth_frame)
 
 

@@ -1,4 +1,4 @@
-"""Reprojection tables are measured minus predicted, observation by observation, and their summaries plain statistics."""
+"""Reprojection tables are measured minus predicted, row by row, and their summaries plain statistics."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_one_moved_pixel_is_one_residual_of_that_size_and_sign(row: int) -> None
 
 
 def test_the_error_is_the_norm_of_all_four_differences() -> None:
-    pixel = EXACT.observations.pixel + [1.0, -2.0, 4.0, 2.0]
+    pixel = EXACT.observations.pixel + np.array([1.0, -2.0, 4.0, 2.0])
     table = compare.reprojection(with_pixels(EXACT, pixel), true_answer(EXACT))
     np.testing.assert_allclose(table["error"], 5.0)
     assert compare.reprojection_summary(table)["under_3px"] == 0.0

@@ -1,4 +1,4 @@
-"""Trajectory errors are those of evo, alignment is the best rigid motion, and along, across and up are where they are."""
+"""Errors are those of evo, alignment is the best rigid motion, and along, across and up are what they say."""
 
 from dataclasses import replace
 

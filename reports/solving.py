@@ -1,0 +1,104 @@
+"""The answers of all estimators to one problem, ours and those of other packages, none of which can stop the others."""
+
+import time
+import traceback
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import PurePath
+from typing import TypeAlias
+
+import numpy as np
+
+from fgbaseline.data import Estimate, Problem, Progress, Status, find_estimator
+from fgbaseline.geometry import FgbaselineError, so3
+
+Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
+"""around the work of a named estimator: gives what is told of every frame"""
+ROTATION_TOLERANCE = 1e-6
+
+
+def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
+    """Nobody is told of progress."""
+    return nullcontext(None)
+
+
+def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
+    """Each named estimator's answer, in the order of the names; a failure is an answer and stops nothing.
+
+    What one run gives along with another (`isam2-online` with `isam2`) is not solved again.
+    """
+    answers: dict[str, Estimate] = {}
+    given: dict[str, Estimate] = {}
+    for name in names:
+        if name in given:
+            answers[name] = given[name]
+            continue
+        start = time.perf_counter()
+        try:
+            with watch(name) as progress:
+                estimate = checked(find_estimator(name)(problem, progress), name, problem)
+                given |= {other: checked(e, other, problem) for other, e in estimate.by_products.items()}
+        except Exception as error:  # whatever somebody's filter may raise
+            estimate = Estimate.failed(name, told(error), problem.n_frames, len(problem.excluded))
+            estimate = replace(estimate, seconds_total=time.perf_counter() - start)
+        answers[name] = estimate
+    return answers
+
+
+def told(error: Exception) -> str:
+    """An exception in a sentence: what it is, what it says and the line it comes from."""
+    text = str(error).strip().partition("\n")[0]
+    if isinstance(error, FgbaselineError) and text:
+        return text
+    where = traceback.extract_tb(error.__traceback__)
+    line = f" ({PurePath(where[-1].filename).name}, line {where[-1].lineno})" if where else ""
+    return f"{type(error).__name__}: {text or 'no text'}{line}"
+
+
+def checked(answer: object, name: str, problem: Problem) -> Estimate:
+    """The answer under the name it was asked for. Raises FgbaselineError where it cannot be compared or written."""
+    if not isinstance(answer, Estimate):
+        raise FgbaselineError(f"it returned {type(answer).__name__} in place of an Estimate")
+    T, n = problem.n_frames, len(problem.excluded)
+    _require_shape("world_T_imu", answer.world_T_imu, (T, 4, 4))
+    _require_shape("used", answer.used, (n,))
+    if answer.used.dtype != np.bool_:
+        raise FgbaselineError(f"its used has the type {answer.used.dtype}, expected bool")
+    if answer.covariance is not None:
+        _require_shape("covariance", answer.covariance, (T, 6, 6))
+    if len(answer.seconds):
+        _require_shape("seconds", answer.seconds, (T,))
+    _require_landmarks(answer, problem)
+    if answer.status is not Status.FAILED:
+        _require_path(answer)
+    return replace(answer, name=name)
+
+
+def _require_shape(field: str, array: object, expected: tuple[int, ...]) -> None:
+    shape = np.shape(array) if isinstance(array, np.ndarray) else type(array).__name__
+    if shape != expected:
+        raise FgbaselineError(f"its {field} is {shape}, expected an array {expected}")
+
+
+def _require_landmarks(answer: Estimate, problem: Problem) -> None:
+    index, m = answer.landmarks.index, len(answer.landmarks)
+    _require_shape("landmarks.position", answer.landmarks.position, (m, 3))
+    if m and not (np.all(np.diff(index) > 0) and index[0] >= 0 and index[-1] < problem.sequence.n_landmarks):
+        raise FgbaselineError(
+            f"its landmarks.index must rise and name landmarks of the sequence, 0 to {problem.sequence.n_landmarks - 1}"
+        )
+
+
+def _require_path(answer: Estimate) -> None:
+    poses = answer.world_T_imu
+    known = ~np.isnan(poses).all(axis=(1, 2))
+    if not known.any():
+        raise FgbaselineError("it gave no pose at all")
+    defect = np.where(np.isfinite(poses).all(axis=(1, 2)), 0.0, np.inf)
+    rigid = known & (defect == 0.0)
+    defect[rigid] = so3.rotation_defect(poses[rigid, :3, :3])
+    wrong = np.flatnonzero(known & ~(defect <= ROTATION_TOLERANCE))
+    if len(wrong):
+        k = int(wrong[0])
+        raise FgbaselineError(f"its pose of frame {k} is no rigid motion (rotation off by {defect[k]:.3g})")
