@@ -10,20 +10,24 @@ from fgbaseline.geometry import InputError
 
 
 def require_free(place: Path, *, force: bool, mark: str) -> None:
-    """Raises InputError where `place` exists and may not be replaced.
+    """Raises InputError where `place` exists and may not be replaced, or where no folder can be made.
 
-    With `force` an empty folder may be, and one that holds the file `mark`, which says that it is of our making.
+    With `force` an empty folder may be replaced, and one that holds the file `mark`, which says that it is of our
+    making.
     """
-    if not place.exists() and not place.is_symlink():
-        return
-    if not place.is_dir() or place.is_symlink():
-        raise InputError(f"{place}: it exists and is no folder; choose another --out")
-    if not any(place.iterdir()):
-        return
-    if not force:
-        raise InputError(f"{place}: the folder exists; choose another --out, or replace it with --force")
-    if not (place / mark).is_file():
-        raise InputError(f"{place}: --force replaces only what an earlier run wrote, and this folder has no {mark}")
+    with _refusals(place):
+        if not place.exists() and not place.is_symlink():
+            _require_room(place)
+        elif not place.is_dir() or place.is_symlink():
+            raise InputError(f"{place}: it exists and is no folder; choose another --out")
+        elif any(place.iterdir()):
+            if not force:
+                raise InputError(f"{place}: the folder exists; choose another --out, or replace it with --force")
+            if not (place / mark).is_file():
+                raise InputError(
+                    f"{place}: --force replaces only what an earlier run wrote, and this folder has no {mark}; "
+                    "choose another --out"
+                )
 
 
 @contextmanager
@@ -35,31 +39,54 @@ def whole_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
     place = place.absolute()
     require_free(place, force=force, mark=mark)
     building = place.with_name(f".{place.name}.{os.getpid()}.partial")
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        building.mkdir()
-    except OSError as error:
-        raise InputError(f"{place}: cannot be written: {error.strerror or error}") from None
-    try:
-        yield building
-        require_free(place, force=force, mark=mark)
-        if place.exists():
+    new_parents = [parent for parent in place.parents if not parent.exists()]
+    with _refusals(place):
+        try:
+            building.mkdir(parents=True)
+            yield building
+            require_free(place, force=force, mark=mark)
             _replace(place, building)
-        else:
-            building.rename(place)
-    except OSError as error:
-        raise InputError(f"{place}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(building, ignore_errors=True)
+        finally:
+            shutil.rmtree(building, ignore_errors=True)
+            _remove_empty(new_parents)
+
+
+def _require_room(place: Path) -> None:
+    parent = next(parent for parent in place.absolute().parents if parent.exists())
+    if not parent.is_dir():
+        raise InputError(f"{place}: {parent} is no folder; choose another --out")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"{place}: {parent} may not be written to; choose another --out, or change its permissions")
 
 
 def _replace(place: Path, building: Path) -> None:
-    """`building` in place of the folder `place`, which is put back if that fails."""
+    """`building` in place of the folder `place`, if there is one; that one comes back if it fails or is interrupted."""
     old = place.with_name(f".{place.name}.{os.getpid()}.old")
-    place.rename(old)
     try:
+        if place.exists():
+            place.rename(old)
         building.rename(place)
-    except OSError:
-        old.rename(place)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+    finally:
+        if not place.exists() and old.exists():
+            old.rename(place)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Removes folders, innermost first, up to the first that holds something."""
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:
+            return
+
+
+@contextmanager
+def _refusals(place: Path) -> Iterator[None]:
+    """Within it, an OSError comes out as an InputError that names the folder."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{place}: the folder cannot be written ({error.strerror or error}); choose another --out"
+        ) from error
