@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 PACKAGES := geometry data ekf smoother compare reports
 OUT ?= out/simulated
 
-.PHONY: run test lint types arrows install wheel clean
+.PHONY: run test lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
@@ -39,6 +39,9 @@ $(VENV)/tools.stamp: pyproject.toml
 	$(BIN)/pip install -qq --no-build-isolation --config-settings editable_mode=strict -e . --group dev
 	@rm -f $(VENV)/files.stamp
 	touch $@
+
+schema: install
+	$(BIN)/python -m fgbaseline.reports.schema > docs/summary.schema.json
 
 wheel: install
 	$(BIN)/python -m build

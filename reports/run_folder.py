@@ -27,7 +27,7 @@ def write_run(run: Run, folder: Path) -> Summary:
     for name in ("trajectories", "landmarks", "series", "figures"):
         (folder / name).mkdir()
     for name, result in run.results.items():
-        _write_series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
+        series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
             write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
@@ -52,10 +52,11 @@ def write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
             writer.writerow([index, *position, int(n)])
 
 
-def _write_series(run: Run, result: Result) -> pd.DataFrame:
-    """One row per frame: divergence, error to truth, reprojection, NEES and time."""
+def series(run: Run, result: Result) -> pd.DataFrame:
+    """One row per frame: time stamp, divergence, error to truth, reprojection, NEES and seconds spent."""
     T = run.problem.n_frames
-    table = pd.DataFrame({"t": run.problem.sequence.t}, index=pd.RangeIndex(T, name="frame"))
+    stamps = [repr(t) for t in run.problem.sequence.t.tolist()]  # in full: nine digits of a Unix time are seconds
+    table = pd.DataFrame({"t": stamps}, index=pd.RangeIndex(T, name="frame"))
     for prefix, errors in (("divergence", result.divergence), ("truth", result.truth)):
         if errors is not None:
             table = table.join(errors.add_prefix(f"{prefix}_"))

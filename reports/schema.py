@@ -1,10 +1,11 @@
-"""The shape of `summary.json`. Its JSON schema, with these descriptions, is `docs/summary.schema.json`."""
+"""The shape of `summary.json`. `make schema` writes it, with these descriptions, to `docs/summary.schema.json`."""
 
-from typing import Annotated
+import json
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-SCHEMA = "fgbaseline/summary/1"
+SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
 
 Number = float | None
@@ -74,8 +75,8 @@ class TruthCount(_Part):
 class EstimatorSummary(_Part):
     """One estimator."""
 
-    status: Annotated[str, Field(description="ok, recovered or failed")]
-    reason: str
+    status: Literal["ok", "recovered", "failed"]
+    reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
     seconds: Annotated[float, Field(description="for the whole answer, s")]
     frames_per_second: Number
     reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
@@ -90,7 +91,7 @@ class EstimatorSummary(_Part):
     landmarks: int
     observations: ObservationCount
     events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
-    notes: Annotated[dict[str, str], Field(description="why a value is null, by its key")]
+    notes: Annotated[dict[str, str], Field(description="why values are null: by key, for all below it; * for all")]
 
 
 class SequenceSummary(_Part):
@@ -103,7 +104,9 @@ class SequenceSummary(_Part):
     duration_s: float
     observations: int
     tracks: int
-    path_length_m: Annotated[Number, Field(description="of the truth, else of the reference")]
+    path_length_m: Annotated[
+        Number, Field(description="of the truth, else of the reference; null where there is neither")
+    ]
     remarks: list[str]
 
 
@@ -122,14 +125,14 @@ class ReferenceSummary(_Part):
     """What the divergence is measured from."""
 
     name: str | None
-    trust: Annotated[str, Field(description="trusted, doubtful or untrusted")]
-    reasons: list[str]
+    trust: Literal["trusted", "doubtful", "untrusted"]
+    reasons: Annotated[list[str], Field(description="what the trust rests on, worst first")]
 
 
 class Summary(_Part):
     """A run."""
 
-    schema_: Annotated[str, Field(alias="schema")] = SCHEMA
+    schema_: Annotated[Literal["fgbaseline/summary/1"], Field(alias="schema")] = SCHEMA
     sequence: SequenceSummary
     problem: ProblemSummary
     reference: ReferenceSummary
@@ -137,3 +140,13 @@ class Summary(_Part):
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
     machine: dict[str, str | int]
+
+
+def json_schema() -> str:
+    """The JSON schema of `summary.json`, as text."""
+    schema = Summary.model_json_schema(by_alias=True, mode="serialization")
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
+
+
+if __name__ == "__main__":
+    print(json_schema())

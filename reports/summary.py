@@ -4,7 +4,7 @@ import math
 import os
 import platform
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -102,17 +102,14 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
     common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
     offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())
     seconds = estimate.seconds_total
-    reprojection = {
-        "reprojection": compare.reprojection_summary(table),
-        "reprojection_used": compare.reprojection_summary(table[table["used"]]),
-        "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
-    }
-    return {
+    values = {
         "status": str(estimate.status),
         "reason": estimate.reason,
         "seconds": seconds,
         "frames_per_second": run.problem.n_frames / seconds if seconds > 0 else math.nan,
-        **reprojection,
+        "reprojection": compare.reprojection_summary(table),
+        "reprojection_used": compare.reprojection_summary(table[table["used"]]),
+        "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
         "components": compare.component_summary(table),
         "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
         "ate": None if result.truth_aligned is None else compare.summarised(result.truth_aligned["position"]),
@@ -122,31 +119,53 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
         "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
-        "notes": _notes(run, result, reprojection),
     }
+    return {**values, "notes": notes(result, _nulls(values))}
 
 
-def _notes(run: Run, result: Result, reprojection: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    notes = {}
+def notes(result: Result, nulls: Iterable[str]) -> dict[str, str]:
+    """Why the values at the paths `nulls` are no numbers, by key: for all that lies below it, `*` for all."""
+    estimate = result.estimate
     if not result.answered:
-        return {"*": f"the estimator failed: {result.estimate.reason}"}
-    if not len(result.estimate.landmarks):
-        notes["reprojection"] = notes["components"] = "it estimated no landmarks"
-    if not result.estimate.used.any():
-        notes["reprojection_used"] = "it uses no observations"
-    if not reprojection["reprojection_common"]["n"]:
-        notes["reprojection_common"] = "there are no observations that every estimator used"
-    if run.reference is None:
-        notes["divergence"] = "there is no reference to diverge from"
-    if result.truth is None:
-        notes["ate"] = notes["ate_unaligned"] = notes["truth"] = notes["nees"] = "the recording has no truth"
-    elif not np.isfinite(result.truth["position"].iloc[-1]):
-        notes["ate_unaligned.final"] = "the last frame has no truth"
-    if result.nees is not None and not np.isfinite(result.nees).any():
-        notes["nees"] = "it gives no covariance"
-    if not run.problem.mask.any():
-        notes["observations.share"] = "the problem has no observations"
-    return notes
+        return {"*": f"the estimator failed: {estimate.reason}"}
+    reached = bool(np.isfinite(estimate.world_T_imu[-1]).all())
+    last = "the last frame has no truth" if reached else "it did not reach the last frame"
+    no_truth = result.truth is None
+    reasons = {
+        "reprojection": None if len(estimate.landmarks) else "it estimated no landmarks",
+        "reprojection_used": None if estimate.used.any() else "it uses no observations",
+        "reprojection_common": "it has none of the observations that every estimator used",
+        "components": None if len(estimate.landmarks) else "it estimated no landmarks",
+        "divergence": "there is no reference to diverge from" if result.divergence is None else None,
+        "divergence.final": "it or the reference did not reach the last frame",
+        "divergence.rotation_final_deg": "it or the reference did not reach the last frame",
+        "ate": "the recording has no truth" if no_truth else "no frame has both a pose and a truth",
+        "ate_unaligned": "the recording has no truth" if no_truth else None,
+        "ate_unaligned.final": last,
+        "ate_unaligned.rotation_final_deg": last,
+        "truth": "the recording has no truth",
+        "nees": "the recording has no truth"
+        if no_truth
+        else "it gives no covariance"
+        if estimate.covariance is None
+        else "no frame has both a truth and a positive definite covariance",
+        "frames_per_second": "it took no measurable time",
+        "observations.share": "the problem has no observations",
+    }
+    told: dict[str, str] = {}
+    for null in nulls:
+        key = next((k for k in (null.partition(".")[0], null) if reasons.get(k)), null)
+        told[key] = reasons.get(key) or "it is not a finite number"
+    return told
+
+
+def _nulls(value: Any, path: str = "") -> Iterator[str]:
+    """The paths of all values that are, or will be, null."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _nulls(inner, f"{path}.{key}" if path else str(key))
+    elif value is None or (isinstance(value, float) and not math.isfinite(value)):
+        yield path
 
 
 def _truth_count(table: pd.DataFrame) -> dict[str, int]:
