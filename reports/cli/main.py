@@ -50,10 +50,13 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = group.main(arguments, standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
     except (click.exceptions.Abort, KeyboardInterrupt):
-        click.echo("interrupted; nothing was written", err=True)
+        click.echo("fgbaseline: interrupted; no half-written file or folder is left", err=True)
         sys.exit(INTERRUPTED)
-    except click.ClickException as error:
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
+        sys.exit(BAD_INPUT)
+    except click.ClickException as error:
+        click.echo(f"fgbaseline: {_sentence(error)}", err=True)
         sys.exit(BAD_INPUT)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -65,6 +68,13 @@ def main(arguments: list[str] | None = None) -> NoReturn:
             raise
         click.echo(f"fgbaseline: {error}", err=True)
         sys.exit(BAD_INPUT)
+
+
+def _sentence(error: click.ClickException) -> str:
+    """What is wrong with the command line, on one line, and where help is."""
+    text = " ".join(error.format_message().split()).rstrip(".")
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    return text if context is None else f"{text}; see {context.command_path} --help"
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001

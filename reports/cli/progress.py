@@ -53,7 +53,7 @@ class BarReporter:
 
 
 class LineReporter:
-    """For a file or a pipe: a line when an estimator starts, every ten seconds, and when it is done."""
+    """For a file or a pipe: a line when an estimator starts, every ten seconds, and when it has ended."""
 
     INTERVAL = 10.0
 
@@ -75,7 +75,7 @@ class LineReporter:
                 self.say(f"{name}: frame {done} of {total}, {done / (now - start):.0f} frames/s")
 
         yield progress
-        self.say(f"{name}: done after {time.monotonic() - start:.1f} s")
+        self.say(f"{name}: ended after {time.monotonic() - start:.1f} s")
 
 
 def reporter() -> Reporter:

@@ -6,8 +6,6 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from fgbaseline.data import Status
-
 from .. import job, page
 from ..run_folder import MARK, write_run
 from ..schema import Summary
@@ -15,6 +13,8 @@ from ..whole_folder import require_free, whole_folder
 from .progress import reporter
 
 FAILED = 1
+UNWRAPPED = 120
+"""columns of the table where no terminal says how many there are"""
 
 
 def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
@@ -30,6 +30,9 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     )
     problem = job.pose_problem(sequence, settings)
     run = job.solve(problem, settings, told.estimator)
+    for name, result in run.results.items():
+        if not result.answered:
+            told.say(f"{name} failed: {result.estimate.reason}")
     told.say("writing the report")
     with whole_folder(place, force=force, mark=MARK) as folder:
         summary = write_run(run, folder)
@@ -37,8 +40,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     for sentence in page.verdict(run):
         click.echo(sentence)
     click.echo(f"\nThe report is in {place / 'report.html'}")
-    failed = any(result.estimate.status is Status.FAILED for result in run.results.values())
-    return FAILED if failed else 0
+    return 0 if len(run.answered) == len(run.results) else FAILED
 
 
 def _print_table(summary: Summary) -> None:
@@ -60,7 +62,8 @@ def _print_table(summary: Summary) -> None:
             else _number(None if e.divergence is None else e.divergence.rmse),
         ]
         table.add_row(*row, *([_number(None if e.ate is None else e.ate.rmse)] if has_truth else []))
-    Console().print(table)
+    console = Console()
+    Console(width=None if console.is_terminal else max(console.width, UNWRAPPED)).print(table)
 
 
 def _number(value: float | None) -> str:

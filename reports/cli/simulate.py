@@ -72,6 +72,8 @@ def command(output: Path, along: Path | None, force: bool, **given: Any) -> None
     from fgbaseline.data.simulate import Simulation, simulate
     from fgbaseline.geometry import InputError
 
+    if output.suffix != ".npz":
+        raise InputError(f"{output}: a recording is written as .npz; give a name that ends so")
     if output.exists() and not force:
         raise InputError(f"{output}: the file exists; choose another, or replace it with --force")
     settings = {name: value for name, value in given.items() if value not in (None, ())}
