@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from fgbaseline.data import (
     Problem,
@@ -18,8 +18,13 @@ from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
 
-from .comparison import Run, compare_all
 from .solving import Watch, solve_all, unwatched
+
+if TYPE_CHECKING:
+    from .comparison import Run
+
+MARK = "summary.json"
+"""the file by which a run's folder is known"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +95,8 @@ def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
     return calibrated(sequence, features)
 
 
-def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched) -> Run:
+def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched) -> "Run":
     """All estimators on the problem, and their comparison."""
+    from .comparison import compare_all  # pandas: not before the input is known to be good
+
     return compare_all(problem, solve_all(problem, settings.estimators, watch), settings.record())

@@ -14,11 +14,9 @@ from fgbaseline.data import Estimate, write_tum
 
 from . import figures, page
 from .comparison import Result, Run
+from .job import MARK
 from .schema import Summary
 from .summary import metrics_table, summarise
-
-MARK = "summary.json"
-"""the file by which a run's folder is known"""
 
 
 def write_run(run: Run, folder: Path) -> Summary:

@@ -1,16 +1,15 @@
 """What a person sees of a run: progress, the main table and where the report is."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.table import Table
 
-from .. import job, page
-from ..run_folder import MARK, write_run
-from ..schema import Summary
+from .. import job
 from ..whole_folder import require_free, whole_folder
-from .progress import reporter
+
+if TYPE_CHECKING:
+    from ..schema import Summary
 
 FAILED = 1
 UNWRAPPED = 120
@@ -22,7 +21,13 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     job.check_estimators(settings.estimators)
     sequence = job.read_sequence(settings)
     place = out or Path("out") / sequence.name
-    require_free(place, force=force, mark=MARK)
+    require_free(place, force=force, mark=job.MARK)
+
+    # Half a second of imports: bad input is told before.
+    from .. import page
+    from ..run_folder import write_run
+    from .progress import reporter
+
     told = reporter()
     told.say(
         f"{sequence.name}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
@@ -34,7 +39,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
         if not result.answered:
             told.say(f"{name} failed: {result.estimate.reason}")
     told.say("writing the report")
-    with whole_folder(place, force=force, mark=MARK) as folder:
+    with whole_folder(place, force=force, mark=job.MARK) as folder:
         summary = write_run(run, folder)
     _print_table(summary)
     for sentence in page.verdict(run):
@@ -43,7 +48,10 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     return 0 if len(run.answered) == len(run.results) else FAILED
 
 
-def _print_table(summary: Summary) -> None:
+def _print_table(summary: "Summary") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     table = Table(box=None, header_style="bold", pad_edge=False)
     has_truth = any(e.ate is not None for e in summary.estimators.values())
     for title in ("estimator", "status", "seconds", "reprojection, px", "under 3 px", "from the reference, m"):
