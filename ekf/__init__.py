@@ -1,7 +1,10 @@
-"""The documented filter: dead reckoning (equation 9), landmark mapping (10 to 12) and visual-inertial SLAM (13)."""
+"""The filters: dead reckoning (equation 9), landmark mapping (10 to 12), the documented SLAM (13) and the joint one."""
 
 from .dead_reckoning import dead_reckoning
+from .joint import joint_ekf
+from .joint_settings import JointSettings, Linearisation
+from .landmark_chart import Coordinates
 from .mapping import landmark_mapping
 from .slam import ekf
 
-__all__ = ["dead_reckoning", "ekf", "landmark_mapping"]
+__all__ = ["Coordinates", "JointSettings", "Linearisation", "dead_reckoning", "ekf", "joint_ekf", "landmark_mapping"]

@@ -1,0 +1,77 @@
+"""The joint filter as an estimator: EKF-SLAM with one state, and every covariance in it."""
+
+import time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.problem import Problem
+
+from .joint_filter import JointFilter
+from .joint_settings import JointSettings
+from .joint_state import POSE
+from .screening import Rejection
+
+
+def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
+    """One state: the pose and every landmark, with all cross-covariances.
+
+    A landmark enters with its first observation (or at the problem's prior) and leaves with its last one in the
+    recording: poses and active landmarks are exactly those of the filter that keeps them all; those that left keep
+    the value and covariance of that moment.
+    """
+    if len(problem.observations()) == 0:
+        return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
+    with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _run(problem, progress, settings or JointSettings())
+
+
+def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -> Estimate:
+    start = time.perf_counter()
+    T = problem.n_frames
+    joint = JointFilter(problem, settings)
+    poses = np.full((T, 4, 4), np.nan)
+    covariances = np.full((T, 6, 6), np.nan)
+    seconds = np.zeros(T)
+    failure = ""
+    for k, seen in enumerate(problem.observations().by_frame(T)):
+        frame_start = time.perf_counter()
+        joint.add_frame(k, seen)
+        covariance = joint.state.P[:POSE, :POSE]
+        if not (np.isfinite(joint.state.pose).all() and np.isfinite(covariance).all()):
+            failure = f"the pose is not finite after the update of frame {k}"
+            break
+        poses[k], covariances[k] = joint.state.pose, covariance
+        seconds[k] = time.perf_counter() - frame_start
+        if progress is not None:
+            progress(k + 1, T)
+    status, reason = _verdict(failure, joint.events)
+    known = np.isfinite(joint.position).all(axis=1)
+    return Estimate(
+        name="joint-ekf",
+        world_T_imu=poses,
+        covariance=covariances,
+        landmarks=Landmarks(problem.features[known], joint.position[known], joint.covariance[known]),
+        used=problem.spread(joint.used),
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=time.perf_counter() - start,
+        events=tuple(joint.events),
+    )
+
+
+def _verdict(failure: str, events: list[Event]) -> tuple[Status, str]:
+    if failure:
+        return Status.FAILED, failure
+    trouble = {
+        Rejection.FRAME: "most observations disagreed with the prediction, which took no part",
+        Rejection.SINGULAR: "the joint covariance was no longer positive definite",
+    }
+    told = []
+    for kind, what in trouble.items():
+        frames = sorted({event.frame for event in events if event.kind == kind})
+        if frames:
+            told.append(f"at {len(frames)} frames, first at frame {frames[0]}, {what}")
+    return (Status.RECOVERED, "; ".join(told)) if told else (Status.OK, "")

@@ -1,0 +1,183 @@
+"""The joint filter, frame by frame: predict, update pose and landmarks at once, let landmarks in and out."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fgbaseline.data.estimate import Event
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+
+from .joint_settings import JointSettings, Linearisation
+from .joint_state import ABSENT, POSE, JointState
+from .joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
+from .landmark_chart import Coordinates, chart, coordinates_of, homogeneous, rigid_motion
+from .screening import Rejection, screened
+from .stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
+
+MIN_COSINE = 0.05
+"""of the angle between the optical axis and the ray to a landmark: beyond it (87 degrees) it counts as behind the
+camera; at its plane the Jacobian is without bound"""
+UNDETERMINED = "landmark never determined"
+
+
+class _Seen(NamedTuple):
+    """n observations of active landmarks, linearised."""
+
+    observed: IntArray
+    """(n,) into the problem's observations"""
+    H: StackedJacobian
+    residual: FloatArray
+    """(n, 3)"""
+    cosine: FloatArray
+    """(n,)"""
+
+
+class JointFilter:
+    """One run of the filter over one problem: its state, what left it, and what was rejected."""
+
+    def __init__(self, problem: Problem, settings: JointSettings) -> None:
+        m, o = len(problem.features), problem.observations()
+        self.problem = problem
+        self.settings = settings
+        self.camera = problem.sequence.camera
+        self.imu_T_cam = problem.sequence.imu_T_cam
+        self.cam_T_imu = se3.affine_inverse(problem.sequence.imu_T_cam)
+        self.row_variance = problem.pixel_variance * ROW_VARIANCE
+        self.row = problem.feature_row(o.landmark)
+        self.measured = measured_rows(o.pixel)
+        self.last_frame = np.full(m, -1, dtype=np.int64)
+        self.last_frame[self.row] = o.frame  # sorted by frame: the last one stays
+        self.steps = se3.exp(problem.increment)
+        self.transitions = se3.adjoint(se3.inverse(self.steps))
+        self.state = JointState(problem.initial_pose, problem.initial_covariance, m)
+        self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
+        self.position = np.full((m, 3), np.nan)
+        self.covariance = np.full((m, 3, 3), np.nan)
+        self.events: list[Event] = []
+
+    def add_frame(self, k: int, seen: slice) -> None:
+        """Frame k with its observations (a slice of the problem's)."""
+        if k > 0:
+            self._predict(k)
+        index = np.arange(seen.start, seen.stop)
+        row = self.row[index]
+        if self.problem.landmark_prior is not None:
+            self._enter_at_prior(row[self.state.slot_of[row] == ABSENT])
+        known = self.state.slot_of[row] != ABSENT
+        if self._update(k, index[known]):
+            self._enter_at_first_sight(index[~known])
+        self._leave(k, row[self.last_frame[row] == k])
+
+    def _predict(self, k: int) -> None:
+        state, step, transition = self.state, self.steps[k - 1], self.transitions[k - 1]
+        if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
+            transition = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose)
+        state.predict(step, transition, self.problem.increment_covariance[k - 1])
+
+    def _update(self, k: int, index: IntArray) -> bool:
+        """Observations `index` (n,) of active landmarks; False where the frame as a whole is not believed."""
+        if len(index) == 0:
+            return True
+        seen = self._in_front(k, self._linearised(index))
+        if len(seen.observed) == 0:
+            return True
+        state = self.state
+        innovation = Innovation.of(seen.H, seen.residual, state.P)
+        verdict = screened(innovation.squared_norm(self.row_variance), self.problem.kernel, self.settings)
+        if verdict.rejection is not None:
+            self._reject(k, verdict.rejection, ~verdict.taken)
+            if not verdict.taken.any():
+                return verdict.rejection is not Rejection.FRAME
+        variance = self.row_variance / verdict.weight[verdict.taken, None]
+        try:
+            self._apply(correct(innovation.select(verdict.taken), variance, state.P))
+        except NotPositiveDefiniteError:
+            self._reject(k, Rejection.SINGULAR, verdict.taken)
+            return False
+        self.used[seen.observed[verdict.taken]] = True
+        if not np.all(np.diagonal(state.P) >= 0.0):
+            self.events.append(Event(k, Rejection.SINGULAR, "P - W^T W has a negative variance after the update"))
+        return True
+
+    def _linearised(self, index: IntArray) -> _Seen:
+        state, slot = self.state, self.state.slot_of[self.row[index]]
+        charts = state.charts[slot]
+        seen = now = sight(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
+        if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
+            seen = sight(self.camera, self.cam_T_imu, state.predicted_pose, homogeneous(charts, state.first[slot]))
+        H = StackedJacobian(slot, seen.by_pose, seen.by_point @ charts[:, :, :3])
+        return _Seen(index, H, self.measured[index] - now.predicted, np.minimum(now.cosine, seen.cosine))
+
+    def _in_front(self, k: int, seen: _Seen) -> _Seen:
+        front = seen.cosine > MIN_COSINE
+        if front.all():
+            return seen
+        self._reject(k, Rejection.BEHIND, ~front)
+        return _Seen(seen.observed[front], seen.H.select(front), seen.residual[front], seen.cosine[front])
+
+    def _apply(self, delta: FloatArray) -> None:
+        """Moves the state by delta (size,), and P along with it where the settings say so.
+
+        N = [Ad(T^-1); nu], nu the landmarks' `rigid_motion`. With - before and + after the move, B takes N- to N+:
+        [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]].
+        """
+        state = self.state
+        before = state.pose
+        invariant = self.settings.linearisation is Linearisation.INVARIANT
+        nu = rigid_motion(state.charts, state.xi) if invariant else None
+        state.pose = before @ se3.exp(delta[:POSE])
+        state.xi[:] += delta[POSE:].reshape(-1, 3)
+        if nu is not None:
+            by_pose = (rigid_motion(state.charts, state.xi) - nu) @ se3.adjoint(before)
+            state.transport(se3.adjoint(se3.exp(-delta[:POSE])), by_pose)
+
+    def _enter_at_prior(self, row: IntArray) -> None:
+        prior, n = self.problem.landmark_prior, len(row)
+        assert prior is not None
+        charts, covariance = np.broadcast_to(np.eye(4), (n, 4, 4)), np.broadcast_to(prior.covariance, (n, 3, 3))
+        self.state.enter(row, charts, prior.mean[row], np.zeros((n, 3, POSE)), covariance)
+
+    def _enter_at_first_sight(self, index: IntArray) -> None:
+        """Landmarks start where one observation each puts them, seen from the pose as it is known now.
+
+        That is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
+        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n.
+        """
+        if self.settings.coordinates is Coordinates.WORLD:  # no point of it is at infinity
+            index = index[self.measured[index, 0] > self.measured[index, 1]]
+        n, state = len(index), self.state
+        if n == 0:
+            return
+        first_estimate = self.settings.linearisation is Linearisation.FIRST_ESTIMATE
+        world_T_cam = state.pose @ self.imu_T_cam
+        points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
+        charts = np.broadcast_to(chart(self.settings.coordinates, world_T_cam), (n, 4, 4))
+        xi = coordinates_of(charts, points)
+        at = state.predicted_pose if first_estimate else state.pose
+        seen = sight(self.camera, self.cam_T_imu, at, homogeneous(charts, xi))
+        inverse = np.linalg.inv(seen.by_point @ charts[:, :, :3])
+        covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
+        state.enter(self.row[index], charts, xi, -inverse @ seen.by_pose, covariance)
+        self.used[index] = True
+
+    def _leave(self, k: int, row: IntArray) -> None:
+        """Landmarks (n,) that no later frame sees leave with what is known of them now."""
+        active = self.state.slot_of[row] != ABSENT
+        for j in self.problem.features[row[~active]].tolist():
+            self.events.append(Event(k, UNDETERMINED, "no frame that was believed saw it", j))
+        leaving = row[active]
+        if len(leaving) == 0:
+            return
+        points = self.state.world_points(leaving)
+        finite = points.in_sight & np.isfinite(points.position).all(axis=1)
+        self.position[leaving[finite]] = points.position[finite]
+        self.covariance[leaving[finite]] = points.covariance[finite]
+        for j in self.problem.features[leaving[~finite]].tolist():
+            self.events.append(Event(k, UNDETERMINED, "its sights put it at infinity or beyond", j))
+        self.state.leave(leaving)
+
+    def _reject(self, k: int, why: Rejection, rejected: BoolArray) -> None:
+        n = int(np.count_nonzero(rejected))
+        self.events.append(Event(k, why, f"{n} of {len(rejected)} observations of known landmarks take no part"))

@@ -1,0 +1,145 @@
+"""The state of the joint filter: the pose and every active landmark, with all their covariances.
+
+The error state is [delta (6), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, then the
+coordinates of each active landmark in its chart. Its covariance lives in one square array that grows by doubling;
+a landmark that leaves is overwritten by the last one, so that the active part is always the upper left square.
+"""
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FloatArray
+
+from .landmark_chart import WorldPoints, world_points
+
+POSE = 6
+ABSENT = -1
+
+
+class JointState:
+    """Pose, active landmarks, and one covariance over all of them."""
+
+    def __init__(self, pose: FloatArray, covariance: FloatArray, n_features: int, capacity: int = 64) -> None:
+        self.pose = pose
+        self.predicted_pose = pose
+        """(4, 4) the pose before the frame's update"""
+        self.count = 0
+        self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
+        """(m,) slot of each of the problem's features; ABSENT where it is not active"""
+        self._P = np.zeros((POSE + 3 * capacity, POSE + 3 * capacity))
+        self._P[:POSE, :POSE] = covariance
+        self._row = np.zeros(capacity, dtype=np.int64)
+        self._xi, self._first = np.zeros((capacity, 3)), np.zeros((capacity, 3))
+        self._charts = np.zeros((capacity, 4, 4))
+
+    def _double(self) -> None:
+        P = np.zeros((2 * len(self._P), 2 * len(self._P)))
+        P[: self.size, : self.size] = self.P
+        self._P = P
+        self._row = np.concatenate([self._row, np.zeros_like(self._row)])
+        self._xi = np.concatenate([self._xi, np.zeros_like(self._xi)])
+        self._first = np.concatenate([self._first, np.zeros_like(self._first)])
+        self._charts = np.concatenate([self._charts, np.zeros_like(self._charts)])
+
+    @property
+    def size(self) -> int:
+        """The dimension of the error state."""
+        return POSE + 3 * self.count
+
+    @property
+    def P(self) -> FloatArray:  # noqa: N802
+        """(size, size) the covariance, a view."""
+        return self._P[: self.size, : self.size]
+
+    @property
+    def row(self) -> IntArray:
+        """(count,) the feature in each slot, a view."""
+        return self._row[: self.count]
+
+    @property
+    def xi(self) -> FloatArray:
+        """(count, 3) the landmarks' coordinates in their charts, a view."""
+        return self._xi[: self.count]
+
+    @property
+    def first(self) -> FloatArray:
+        """(count, 3) the coordinates that each landmark entered with, a view."""
+        return self._first[: self.count]
+
+    @property
+    def charts(self) -> FloatArray:
+        """(count, 4, 4) the landmarks' charts, a view."""
+        return self._charts[: self.count]
+
+    def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
+        """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them."""
+        P = self.P
+        moved = transition @ P[:POSE]
+        P[:POSE, POSE:] = moved[:, POSE:]
+        P[POSE:, :POSE] = moved[:, POSE:].T
+        own = moved[:, :POSE] @ transition.T + noise
+        P[:POSE, :POSE] = 0.5 * (own + own.T)
+        self.pose = self.predicted_pose = self.pose @ step
+
+    def transport(self, turn: FloatArray, by_pose: FloatArray) -> None:
+        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (count, 3, 6)."""
+        P, G = self.P, by_pose.reshape(3 * self.count, POSE)
+        own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
+        half = G @ (cross + 0.5 * own @ G.T)
+        P[POSE:, POSE:] += half + half.T
+        P[:POSE, POSE:] = turn @ (cross + own @ G.T)
+        P[POSE:, :POSE] = P[:POSE, POSE:].T
+        turned = turn @ own @ turn.T
+        P[:POSE, :POSE] = 0.5 * (turned + turned.T)
+
+    def enter(
+        self, row: IntArray, charts: FloatArray, xi: FloatArray, by_pose: FloatArray, covariance: FloatArray
+    ) -> None:
+        """n landmarks become active, with an error of G delta + e each.
+
+        G = `by_pose` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
+        """
+        n, old, new = len(row), self.size, self.size + 3 * len(row)
+        while self.count + n > len(self._row):
+            self._double()
+        slots = slice(self.count, self.count + n)
+        self._row[slots], self._charts[slots], self._xi[slots], self._first[slots] = row, charts, xi, xi
+        self.slot_of[row] = np.arange(self.count, self.count + n)
+        P, G = self._P, by_pose.reshape(3 * n, POSE)
+        cross = G @ P[:POSE, :old]
+        P[old:new, :old] = cross
+        P[:old, old:new] = cross.T
+        own = cross[:, :POSE] @ G.T
+        P[old:new, old:new] = 0.5 * (own + own.T)
+        index = old + np.arange(3 * n).reshape(n, 3)
+        P[index[:, :, None], index[:, None, :]] += 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
+        self.count += n
+
+    def leave(self, row: IntArray) -> None:
+        """Active landmarks are marginalised out: their rows and columns go, everything else stays as it is."""
+        leaving = self.slot_of[row]
+        left = self.count - len(leaving)
+        goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
+        goes[leaving] = True
+        holes = np.flatnonzero(goes[:left])
+        movers = left + np.flatnonzero(~goes[left:])
+        for array in (self._row, self._xi, self._first, self._charts):
+            array[holes] = array[movers]
+        to, source = self._indices(holes), self._indices(movers)
+        P = self.P
+        P[to, :] = P[source, :]
+        P[:, to] = P[:, source]
+        self.slot_of[row] = ABSENT
+        self.slot_of[self._row[holes]] = holes
+        self.count = left
+
+    def world_points(self, row: IntArray) -> WorldPoints:
+        """Active landmarks in metres, with their covariances."""
+        slot = self.slot_of[row]
+        index = self._indices(slot).reshape(-1, 3)
+        return world_points(self._charts[slot], self._xi[slot], self._P[index[:, :, None], index[:, None, :]])
+
+    @staticmethod
+    def _indices(slot: IntArray) -> IntArray:
+        """(3n,) rows of P of the landmarks in slots (n,)."""
+        return (POSE + 3 * slot[:, None] + np.arange(3)).reshape(-1)

@@ -1,0 +1,117 @@
+"""The joint update: what a frame's observations say of the pose and every active landmark.
+
+H has, for an observation, the six columns of the pose and the three of its landmark; nothing else is stored. With
+S = H P H^T + R = L L^T and W = L^-1 H P the update is
+
+    delta = W^T L^-1 r    and    P <- P - W^T W,
+
+which is K = P H^T S^-1 and (I - K H) P with every product formed once, symmetric to the last bit.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg.blas import dtrsm, dtrsv
+from scipy.linalg.lapack import dpotrf
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FloatArray
+
+from .joint_state import POSE
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StackedJacobian:
+    """H of n observations: (3n, size), with nine columns that are not zero in each block of three rows."""
+
+    slot: IntArray
+    """(n,) of the landmark that each observation sees"""
+    by_pose: FloatArray
+    """(n, 3, 6)"""
+    by_landmark: FloatArray
+    """(n, 3, 3)"""
+
+    def times(self, matrix: FloatArray) -> FloatArray:
+        """H A (3n, c) of a matrix A (size, c)."""
+        n, c = len(self.slot), matrix.shape[1]
+        product = self.by_landmark @ matrix[POSE:].reshape(-1, 3, c)[self.slot]
+        product += (self.by_pose.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
+        return product.reshape(3 * n, c)
+
+    def select(self, chosen: BoolArray) -> "StackedJacobian":
+        """Only the chosen observations."""
+        return StackedJacobian(self.slot[chosen], self.by_pose[chosen], self.by_landmark[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Innovation:
+    """What n observations say beyond the prediction, and how sure the prediction was of them."""
+
+    H: StackedJacobian
+    residual: FloatArray
+    """(n, 3) measured minus predicted, px"""
+    HP: FloatArray
+    """(3n, size)"""
+    HPHt: FloatArray
+    """(3n, 3n)"""
+
+    @staticmethod
+    def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
+        """The innovation of residuals (n, 3) under a covariance (size, size)."""
+        HP = H.times(P)
+        return Innovation(H, residual, HP, H.times(np.ascontiguousarray(HP.T)))
+
+    def __len__(self) -> int:
+        return len(self.residual)
+
+    @cached_property
+    def blocks(self) -> FloatArray:
+        """(n, 3, 3) H P H^T of each observation alone."""
+        n = len(self)
+        index = np.arange(n)
+        return self.HPHt.reshape(n, 3, n, 3)[index, :, index, :]
+
+    def squared_norm(self, variance: FloatArray) -> FloatArray:
+        """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,)): chi-square with 3 degrees
+        of freedom, where all is as assumed."""
+        whitened = np.linalg.solve(self.blocks + np.diag(variance), self.residual[:, :, None])[:, :, 0]
+        norm: FloatArray = np.einsum("ni,ni->n", self.residual, whitened)
+        return norm
+
+    def select(self, chosen: BoolArray) -> "Innovation":
+        """Only the chosen observations."""
+        if chosen.all():
+            return self
+        rows = np.repeat(chosen, 3)
+        return Innovation(
+            self.H.select(chosen), self.residual[chosen], self.HP[rows], np.ascontiguousarray(self.HPHt[rows][:, rows])
+        )
+
+
+class NotPositiveDefiniteError(Exception):
+    """H P H^T + R has no Cholesky factor: P is no covariance any more."""
+
+
+def correct(innovation: Innovation, variance: FloatArray, P: FloatArray) -> FloatArray:
+    """The correction delta (size,) of the error state; P (size, size) is updated in place.
+
+    `variance` (n, 3) is the diagonal of R, px^2. Uses the innovation up. Raises NotPositiveDefiniteError, P being
+    untouched.
+    """
+    L = _cholesky(innovation, variance)
+    W_transposed = dtrsm(1.0, L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    delta: FloatArray = W_transposed @ dtrsv(L, innovation.residual.reshape(-1), lower=1)
+    P -= W_transposed @ W_transposed.T
+    return delta
+
+
+def _cholesky(innovation: Innovation, variance: FloatArray) -> FloatArray:
+    """L (3n, 3n), lower, with L L^T = H P H^T + R."""
+    S = innovation.HPHt
+    S.reshape(-1)[:: len(S) + 1] += variance.reshape(-1)
+    L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
+    if failed or not np.isfinite(L[-1, -1]):
+        raise NotPositiveDefiniteError
+    factor: FloatArray = L
+    return factor

@@ -1,0 +1,83 @@
+"""Coordinates of a landmark in the joint filter: three numbers in a fixed projective chart of the world.
+
+A landmark's homogeneous world point is X = M [xi; 1] with a constant 4x4 matrix M, its chart:
+
+- M = I: xi is the point itself, in metres;
+- M = C Pi, with C = world_T_cam as estimated when the landmark was first seen and Pi [a, b, r, 1] = [a, b, 1, r]:
+  xi = (x/z, y/z, 1/z) as that camera saw it. What stereo measures (uL, uR, v) is linear in these three, so that their
+  error is as Gaussian as that of the pixels however far the point is, infinity included (Civera, Davison and Montiel,
+  IEEE T-RO 2008). There the camera of the first sight is part of the state; here C is a number, the choice of a map,
+  so that a landmark stays a point of the world with three coordinates.
+"""
+
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import FloatArray, so3
+
+_INVERSE_DEPTH = np.eye(4)[:, [0, 1, 3, 2]]
+
+
+class Coordinates(StrEnum):
+    """What the three numbers of a landmark without a prior are."""
+
+    INVERSE_DEPTH = "inverse-depth"
+    """(x/z, y/z, 1/z) in the camera as estimated at the first sight"""
+    WORLD = "world"
+    """x, y, z in m in the world"""
+
+
+def chart(coordinates: Coordinates, world_T_cam: FloatArray) -> FloatArray:
+    """M (4, 4) for landmarks that are first seen from a camera at `world_T_cam` (4, 4)."""
+    return np.eye(4) if coordinates is Coordinates.WORLD else world_T_cam @ _INVERSE_DEPTH
+
+
+def homogeneous(charts: FloatArray, xi: FloatArray) -> FloatArray:
+    """World points X = M [xi; 1] (n, 4) of coordinates xi (n, 3) in charts M (n, 4, 4)."""
+    return np.asarray((charts[:, :, :3] @ xi[:, :, None])[:, :, 0] + charts[:, :, 3], dtype=np.float64)
+
+
+def coordinates_of(charts: FloatArray, points: FloatArray) -> FloatArray:
+    """The coordinates xi (n, 3) in charts M (n, 4, 4) of homogeneous world points (n, 4)."""
+    xi = np.linalg.solve(charts, points[:, :, None])[:, :, 0]
+    return np.asarray(xi[:, :3] / xi[:, 3:], dtype=np.float64)
+
+
+def rigid_motion(charts: FloatArray, xi: FloatArray) -> FloatArray:
+    """(n, 3, 6) how coordinates (n, 3) change when the whole world moves by exp(g), g = [v, w] small.
+
+    hat(g) X = [[X4 I, -hat(X)], [0, 0]] g in the world, and d xi = Y_123 - xi Y_4 with Y = M^-1 hat(g) X in the chart.
+    """
+    X = homogeneous(charts, xi)
+    moved = np.zeros((len(X), 4, 6))
+    moved[:, :3, :3] = X[:, 3, None, None] * np.eye(3)
+    moved[:, :3, 3:] = -so3.hat3(X[:, :3])
+    Y = np.linalg.solve(charts, moved)
+    return np.asarray(Y[:, :3] - xi[:, :, None] * Y[:, 3:], dtype=np.float64)
+
+
+class WorldPoints(NamedTuple):
+    """Landmarks in metres."""
+
+    position: FloatArray
+    """(n, 3) m"""
+    covariance: FloatArray
+    """(n, 3, 3) m^2"""
+    in_sight: BoolArray
+    """(n,) whether the point is on this side of infinity"""
+
+
+def world_points(charts: FloatArray, xi: FloatArray, covariance: FloatArray) -> WorldPoints:
+    """Positions, and to first order their covariances, of coordinates (n, 3) with covariances (n, 3, 3).
+
+    Not finite at infinity.
+    """
+    X = homogeneous(charts, xi)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        position = X[:, :3] / X[:, 3:]
+        J = (charts[:, :3, :3] - position[:, :, None] * charts[:, 3:, :3]) / X[:, 3, None, None]
+        spread = J @ covariance @ np.swapaxes(J, 1, 2)
+    return WorldPoints(position, 0.5 * (spread + np.swapaxes(spread, 1, 2)), X[:, 3] > 0.0)

@@ -1,0 +1,67 @@
+"""Which of a frame's observations the joint filter believes, and how much."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.special import chdtri
+
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.problem import HuberKernel
+from fgbaseline.geometry import FloatArray
+
+from .joint_settings import JointSettings
+
+ROWS = 3
+"""degrees of freedom of an observation: uL, uR, (vL + vR) / 2"""
+DISAGREEMENT = 1.0 - 1e-6
+"""chi-square probability (5.5 sigma) beyond which an observation disagrees, when it is asked whether a whole frame
+does: so far out that noise assumed too small by half does not silence the filter, and matches that are wrong do"""
+MIN_VOTES = 5
+"""observations below which a frame has no majority"""
+
+
+class Rejection(StrEnum):
+    """Why observations that the problem offers take no part: the kinds of the filter's events."""
+
+    BEHIND = "behind the camera"
+    GATE = "outside the gate"
+    FRAME = "frame disagrees"
+    SINGULAR = "covariance lost"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Screened:
+    """The verdict on n observations."""
+
+    taken: BoolArray
+    """(n,)"""
+    weight: FloatArray
+    """(n,) the kernel's, by which the inverse of each one's noise is multiplied"""
+    rejection: Rejection | None = None
+    """why the others are not taken"""
+
+
+def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: JointSettings) -> Screened:
+    """The verdict on observations whose innovations have squared norms (n,), whitened by their own covariance.
+
+    A burst of bad matches costs its frame's matches: where most of them disagree none is believed, since the few that
+    agree do so by chance.
+    """
+    n = len(squared_norm)
+    weight = np.ones(n)
+    if kernel is not None:
+        weight = kernel.threshold / np.maximum(np.sqrt(squared_norm), kernel.threshold)
+    if settings.disagreeing_share is not None and n >= MIN_VOTES:
+        disagreeing = np.count_nonzero(~(squared_norm <= quantile(DISAGREEMENT)))
+        if disagreeing > settings.disagreeing_share * n:
+            return Screened(np.zeros(n, dtype=np.bool_), weight, Rejection.FRAME)
+    if settings.gate is not None:
+        taken = squared_norm <= quantile(settings.gate)
+        return Screened(taken, weight, None if taken.all() else Rejection.GATE)
+    return Screened(np.ones(n, dtype=np.bool_), weight)
+
+
+def quantile(probability: float) -> float:
+    """The chi-square quantile with the degrees of freedom of one observation."""
+    return float(chdtri(ROWS, 1.0 - probability))

@@ -1,0 +1,115 @@
+"""The joint filter is EKF-SLAM: equal to a literal dense one in which nothing ever leaves, to 1e-8."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from fgbaseline import ekf
+from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Problem, Sequence
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.geometry import FloatArray
+
+from .dense_joint_filter import DenseJointFilter, Moment
+from .synthetic import drive, matched
+
+TOLERANCE = 1e-8
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
+def returning() -> Sequence:
+    """40 frames in a room where half of the points are lost and found again after half a second."""
+    return simulate(
+        Simulation(
+            path="handheld",
+            duration=4.0,
+            features_per_frame=10.0,
+            returning_share=0.5,
+            return_after=0.5,
+            track_length=5.0,
+            wrong_share=0.0,
+            seed=4,
+        )
+    )
+
+
+def unmasked(sequence: Sequence) -> Problem:
+    """Every observation takes part, gaps and all, without a kernel."""
+    problem = matched(sequence)
+    return replace(
+        problem,
+        kernel=None,
+        excluded=np.zeros_like(problem.excluded),
+        features=np.unique(sequence.observations.landmark),
+    )
+
+
+def with_prior(problem: Problem) -> Problem:
+    """Some 10 cm of doubt about where each landmark truly is."""
+    truth = problem.sequence.truth
+    assert truth is not None
+    assert truth.landmarks is not None
+    off = 0.1 * np.random.default_rng(0).normal(size=(len(problem.features), 3))
+    mean = truth.landmarks[problem.features] + off
+    return replace(problem, landmark_prior=LandmarkPrior(mean, np.diag([0.01, 0.005, 0.02])))
+
+
+def uncertain_start(problem: Problem) -> Problem:
+    return replace(problem, initial_covariance=np.diag(np.repeat([1e-2, 1e-4], 3)))
+
+
+PROBLEMS = {
+    "town, kernel": matched(drive("town", 4.0, 10.0)),
+    "town, tight kernel": replace(matched(drive("town", 4.0, 10.0)), kernel=HuberKernel(1.0)),
+    "town": unmasked(drive("town", 4.0, 10.0)),
+    "town, prior": with_prior(unmasked(drive("town", 4.0, 10.0))),
+    "loop, uncertain start": uncertain_start(matched(drive("loop", 4.0, 10.0))),
+    "handheld": unmasked(drive("handheld", 4.0, 10.0)),
+    "returning": unmasked(returning()),
+    "returning, prior": with_prior(unmasked(returning())),
+}
+
+
+def same_covariance(actual: FloatArray, expected: FloatArray) -> None:
+    """Relative to the matrix; and entry by entry to 1e-6, (I - K H) P as printed having lost the other digits."""
+    difference = np.abs(actual - expected)
+    np.testing.assert_array_less(difference, TOLERANCE * np.linalg.norm(expected) + 1e-300)
+    sigma = np.sqrt(np.diag(expected))
+    np.testing.assert_array_less(difference, 1e-6 * np.outer(sigma, sigma) + 1e-300)
+
+
+def same_as_dense(problem: Problem, estimate: Estimate, moments: list[Moment]) -> None:
+    assert estimate.covariance is not None
+    assert estimate.landmarks.covariance is not None
+    for k, moment in enumerate(moments):
+        np.testing.assert_allclose(estimate.world_T_imu[k], moment.pose, rtol=0, atol=TOLERANCE)
+        same_covariance(estimate.covariance[k], moment.covariance)
+    np.testing.assert_array_equal(estimate.landmarks.index, problem.features)
+    o = problem.observations()
+    landmarks = estimate.landmarks
+    for j, position, covariance in zip(landmarks.index, landmarks.position, estimate.landmarks.covariance, strict=True):
+        point, spread = moments[o.frame[o.landmark == j].max()].landmarks[int(j)]
+        np.testing.assert_allclose(position, point, rtol=TOLERANCE, atol=TOLERANCE)
+        same_covariance(covariance, spread)
+
+
+@pytest.mark.parametrize("linearisation", Linearisation)
+@pytest.mark.parametrize("coordinates", Coordinates)
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_poses_and_landmarks_are_those_of_the_filter_that_keeps_everything(
+    name: str, coordinates: Coordinates, linearisation: Linearisation
+) -> None:
+    problem = PROBLEMS[name]
+    estimate = ekf.joint_ekf(problem, settings=JointSettings(coordinates, linearisation))
+    assert estimate.status == "ok"
+    assert estimate.events == ()
+    np.testing.assert_array_equal(estimate.used, problem.mask)
+    same_as_dense(problem, estimate, DenseJointFilter(problem, coordinates, linearisation).run())
