@@ -1,6 +1,12 @@
 """What several tests share: the real recordings, where they are, and a small recording of the course's form."""
 
+# ruff: noqa: E402
+
 import os
+
+for library in ("OPENBLAS", "OMP", "MKL"):  # before numpy: small matrices wait for each other in threads
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
