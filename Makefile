@@ -8,7 +8,6 @@ OUT ?= out/simulated
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
-	@echo "The report is in $(OUT)/report.html"
 
 test: install lint types arrows
 	$(BIN)/pytest -n 2
