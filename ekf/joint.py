@@ -46,7 +46,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
-    status, reason = _verdict(failure, joint.events)
+    status, reason = _verdict(failure, joint.events, T)
     known = np.isfinite(joint.position).all(axis=1)
     return Estimate(
         name="joint-ekf",
@@ -62,7 +62,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     )
 
 
-def _verdict(failure: str, events: list[Event]) -> tuple[Status, str]:
+def _verdict(failure: str, events: list[Event], n_frames: int) -> tuple[Status, str]:
     if failure:
         return Status.FAILED, failure
     trouble = {
@@ -73,5 +73,5 @@ def _verdict(failure: str, events: list[Event]) -> tuple[Status, str]:
     for kind, what in trouble.items():
         frames = sorted({event.frame for event in events if event.kind == kind})
         if frames:
-            told.append(f"at {len(frames)} frames, first at frame {frames[0]}, {what}")
+            told.append(f"at {len(frames)} of {n_frames} frames, first at frame {frames[0]}, {what}")
     return (Status.RECOVERED, "; ".join(told)) if told else (Status.OK, "")

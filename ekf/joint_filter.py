@@ -66,8 +66,14 @@ class JointFilter:
         if self.problem.landmark_prior is not None:
             self._enter_at_prior(row[self.state.slot_of[row] == ABSENT])
         known = self.state.slot_of[row] != ABSENT
-        if self._update(k, index[known]):
-            self._enter_at_first_sight(index[~known])
+        believed = self._update(k, index[known])
+        enters = ~known & believed
+        if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
+            enters &= self.measured[index, 0] > self.measured[index, 1]
+        if enters.any():
+            self._enter_at_first_sight(index[enters])
+        if not np.array_equal(enters, ~known):
+            self._reject(k, Rejection.ENTRY, ~enters[~known])
         self._leave(k, row[self.last_frame[row] == k])
 
     def _predict(self, k: int) -> None:
@@ -145,11 +151,7 @@ class JointFilter:
         That is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
         pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n.
         """
-        if self.settings.coordinates is Coordinates.WORLD:  # no point of it is at infinity
-            index = index[self.measured[index, 0] > self.measured[index, 1]]
         n, state = len(index), self.state
-        if n == 0:
-            return
         first_estimate = self.settings.linearisation is Linearisation.FIRST_ESTIMATE
         world_T_cam = state.pose @ self.imu_T_cam
         points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
@@ -180,4 +182,4 @@ class JointFilter:
 
     def _reject(self, k: int, why: Rejection, rejected: BoolArray) -> None:
         n = int(np.count_nonzero(rejected))
-        self.events.append(Event(k, why, f"{n} of {len(rejected)} observations of known landmarks take no part"))
+        self.events.append(Event(k, why, f"{n} of {len(rejected)} observations take no part"))

@@ -28,6 +28,8 @@ class Rejection(StrEnum):
     GATE = "outside the gate"
     FRAME = "frame disagrees"
     SINGULAR = "covariance lost"
+    ENTRY = "entry put off"
+    """the first sight of a landmark: in a frame that is not believed, or at infinity in world coordinates"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
