@@ -1,6 +1,7 @@
 """Recordings, the problem they pose, the answers to it, and the estimators that give them."""
 
 from .calibrated import Calibration, NoiseSettings, calibrated
+from .diagnose import Diagnosis, diagnose
 from .documented import documented
 from .estimate import Estimate, Event, Landmarks, Progress, Status
 from .formats import attach_truth, read, read_kitti, read_tum, write_npz, write_tum
@@ -11,6 +12,7 @@ from .sequence import Sequence, Truth
 
 __all__ = [
     "Calibration",
+    "Diagnosis",
     "Estimate",
     "Event",
     "Excluded",
@@ -27,6 +29,7 @@ __all__ = [
     "Truth",
     "attach_truth",
     "calibrated",
+    "diagnose",
     "documented",
     "estimator_names",
     "find_estimator",

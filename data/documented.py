@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, disparity
 
-from .motion import Interval, back_project, dead_reckoned_path, increments
+from .motion import Shift, back_project, dead_reckoned_path, increments
 from .observations import IntArray, Observations
 from .problem import Excluded, LandmarkPrior, Problem, Reading
 from .sequence import Sequence
@@ -27,7 +27,7 @@ def documented(
     """
     o = sequence.observations
     chosen = most_observed(o, sequence.n_landmarks, features)
-    step = increments(sequence, Interval.AFTER)
+    step = increments(sequence, Shift.AFTER)
     remarks = [
         "data taken as recorded; W = diag(0.5, 0.5, 0.5, 0.05, 0.05, 0.05) added once per step, V = I for mapping "
         "and 15 I for SLAM, landmark prior 0.01 I at the average back-projection"

@@ -1,6 +1,6 @@
 """From recorded velocities to motion increments and the dead-reckoned path."""
 
-from enum import StrEnum
+from enum import Enum
 
 import numpy as np
 
@@ -9,28 +9,33 @@ from fgbaseline.geometry import FloatArray, se3
 from .sequence import Sequence
 
 
-class Interval(StrEnum):
-    """Which samples move frame k to frame k+1."""
+class Shift(float, Enum):
+    """Usual answers to which interval a velocity sample belongs to, as a shift in intervals."""
 
-    AFTER = "after"
-    """u_k: a sample belongs to the interval after it (the report's reading)"""
-    MEAN = "mean"
-    """(u_k + u_(k+1)) / 2"""
-    BEFORE = "before"
-    """u_(k+1): a sample belongs to the interval before it"""
+    AFTER = 0.0
+    """u_k moves frame k to k+1 (the report's reading)"""
+    MIDDLE = -0.5
+    """u_k is the velocity at the instant of frame k: the mean of u_k and u_(k+1) moves k to k+1"""
+    BEFORE = -1.0
+    """u_(k+1) moves k to k+1"""
 
 
-def increments(sequence: Sequence, interval: Interval = Interval.AFTER) -> FloatArray:
-    """(T-1, 6) twists [v, w] times dt (m, rad), each the motion from one frame to the next (tau u of equation 9)."""
+def held_twist(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
+    """(T-1, 6) recorded velocity [v, w] of each interval, each sample held for one interval.
+
+    Sample k is held from `shift` intervals after its stamp on; between the whole ones, two neighbours share an interval
+    in proportion. The first and the last sample hold on beyond the ends.
+    """
     u = np.concatenate([sequence.linear_velocity, sequence.angular_velocity], axis=1)
-    match interval:
-        case Interval.AFTER:
-            sample = u[:-1]
-        case Interval.BEFORE:
-            sample = u[1:]
-        case Interval.MEAN:
-            sample = 0.5 * (u[:-1] + u[1:])
-    return sample * sequence.dt[:, None]
+    last = len(u) - 1
+    whole, part = divmod(-float(shift), 1.0)
+    first = np.clip(np.arange(last) + int(whole), 0, last)
+    return (1.0 - part) * u[first] + part * u[np.minimum(first + 1, last)]
+
+
+def increments(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
+    """(T-1, 6) twists [v, w] times dt (m, rad), each the motion from one frame to the next (tau u of equation 9)."""
+    return held_twist(sequence, shift) * sequence.dt[:, None]
 
 
 def dead_reckoned_path(increment: FloatArray, initial_pose: FloatArray | None = None) -> FloatArray:

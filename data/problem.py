@@ -30,6 +30,8 @@ class Excluded(IntEnum):
     """its point is not determined, or lies behind a camera"""
     MOVING = 7
     """its point moved"""
+    COPIED = 8
+    """a copy of the frame before: it was never tracked"""
 
 
 class Reading(StrEnum):

@@ -34,22 +34,70 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
     taken out and the run goes on; of the runs that remain the longest (ties: the first) takes part, since a track
     that jumps has changed its point.
     """
+    runs = _runs(sequence, world_T_imu, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
+    excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark
+    in_longest = _longest_run_of_each_track(landmark[kept], runs.run)
+    excluded[kept[~in_longest]] = Excluded.PREDICTION
+    kept = kept[in_longest]
+    left = np.bincount(landmark[kept], minlength=sequence.n_landmarks)
+    excluded[kept[left[landmark[kept]] < settings.min_track]] = Excluded.SHORT
+    return excluded
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SplitTracks:
+    """Tracks cut where they jump to another point."""
+
+    landmark: IntArray
+    """(n,) the landmark of each observation; pieces after a cut have new numbers from n_landmarks of the sequence on"""
+    n_landmarks: int
+    excluded: NDArray[np.uint8]
+    """(n,) an `Excluded` each"""
+
+
+def split_tracks(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
+    """As `exclusions`, but every run that is long enough takes part, as a landmark of its own.
+
+    `copied` (n,) are observations that repeat the frame before and were never tracked. The longest run of a track
+    keeps its number.
+    """
+    runs = _runs(sequence, world_T_imu, settings, copied)
+    excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark.copy()
+    length = np.bincount(runs.run)
+    long_enough = length >= settings.min_track
+    excluded[kept[~long_enough[runs.run]]] = Excluded.SHORT
+    in_longest = _longest_run_of_each_track(landmark[kept], runs.run)
+    cut = np.zeros(len(length), dtype=np.bool_)
+    cut[runs.run[~in_longest]] = True
+    cut &= long_enough
+    number = np.cumsum(cut) - 1 + sequence.n_landmarks
+    moved = cut[runs.run]
+    landmark[kept[moved]] = number[runs.run[moved]]
+    return SplitTracks(landmark, sequence.n_landmarks + int(cut.sum()), excluded)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Runs:
+    excluded: NDArray[np.uint8]
+    kept: IntArray
+    """observations that are in a run, sorted by track"""
+    run: IntArray
+    """the run of each of these, increasing"""
+
+
+def _runs(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> _Runs:
     o = sequence.observations
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > settings.max_row_mismatch] = Excluded.ROWS
     excluded[disparity(o.pixel) <= settings.min_disparity] = Excluded.DISPARITY
+    excluded[copied] = Excluded.COPIED
     order = o.by_track()
     order = order[excluded[order] == Excluded.NO]
     links = TrackLinks(sequence, world_T_imu, settings.prediction_gate)
     kept, lone = _without_lone_outliers(links, o.landmark, order)
     excluded[lone] = Excluded.PREDICTION
-    run_of = np.cumsum(np.r_[True, ~links.agree(kept[:-1], kept[1:])]) - 1 if len(kept) else kept
-    in_longest = _longest_run_of_each_track(o.landmark[kept], run_of)
-    excluded[kept[~in_longest]] = Excluded.PREDICTION
-    kept = kept[in_longest]
-    left = np.bincount(o.landmark[kept], minlength=sequence.n_landmarks)
-    excluded[kept[left[o.landmark[kept]] < settings.min_track]] = Excluded.SHORT
-    return excluded
+    run = np.cumsum(np.r_[True, ~links.agree(kept[:-1], kept[1:])]) - 1 if len(kept) else kept
+    return _Runs(excluded, kept, run)
 
 
 class TrackLinks:

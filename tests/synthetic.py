@@ -7,7 +7,7 @@ import numpy as np
 
 from fgbaseline import data
 from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Truth
-from fgbaseline.data.motion import Interval, dead_reckoned_path, increments
+from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.geometry import FloatArray, se3
@@ -92,7 +92,7 @@ def matched(sequence: Sequence) -> Problem:
     """The calibrated preset with the noise that `drive` simulates: 0.5 px, 0.1 m/s, 0.01 rad/s, held over the interval
     after the sample."""
     noise = data.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.01)
-    return data.calibrated(sequence, None, data.Calibration(noise=noise, interval=Interval.AFTER))
+    return data.calibrated(sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
 
 
 def position_errors(estimate: Estimate, sequence: Sequence) -> FloatArray:

@@ -10,7 +10,7 @@ from fgbaseline import compare, data, ekf, smoother
 from fgbaseline.compare import Verdict
 from fgbaseline.compare.trust import TrustLimits, motion_ratio, offered, pixel_ratio
 from fgbaseline.data import Estimate, Event, Problem, Status
-from fgbaseline.data.motion import Interval
+from fgbaseline.data.motion import Shift
 from fgbaseline.geometry import disparity
 
 from .synthetic import drive, matched, plain_problem
@@ -29,7 +29,7 @@ def reference() -> Estimate:
 def told(pixel: float = 0.5, linear: float = 0.1, angular: float = 0.01) -> Problem:
     """The same drive with another noise model, without a mask that would hide its consequences."""
     noise = data.NoiseSettings(pixel=pixel, linear_velocity=linear, angular_velocity=angular)
-    problem = data.calibrated(clean().sequence, None, data.Calibration(noise=noise, interval=Interval.AFTER))
+    problem = data.calibrated(clean().sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
     return replace(problem, kernel=None)
 
 
@@ -111,7 +111,7 @@ def test_offered_are_the_wanted_observations_with_a_disparity() -> None:
     problem = clean()
     o = problem.sequence.observations
     np.testing.assert_array_equal(offered(problem), disparity(o.pixel) > 1.0)
-    few = data.calibrated(problem.sequence, 10)
+    few = data.calibrated(problem.sequence, 10, settings=data.Calibration())
     np.testing.assert_array_equal(
         offered(few), (disparity(o.pixel) > 1.0) & (few.excluded != data.Excluded.FEATURE_NOT_CHOSEN)
     )

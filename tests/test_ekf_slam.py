@@ -95,7 +95,7 @@ def test_a_landmark_exactly_in_the_camera_plane_fails_with_its_frame_and_keeps_w
 
 def test_without_observations_there_is_no_filter_but_dead_reckoning_remains() -> None:
     sequence = replace(drive(), observations=data.Observations.none())
-    problem = data.calibrated(sequence)
+    problem = data.calibrated(sequence, settings=data.Calibration())
     estimate = ekf.ekf(problem)
     assert estimate.status is Status.FAILED
     assert estimate.reason == "no observations"
@@ -121,7 +121,7 @@ def test_on_clean_data_the_filter_is_nearer_to_the_truth_than_dead_reckoning() -
     for path in ("town", "loop", "handheld"):
         for seed in (1, 2, 3):
             sequence = drive(path, seconds=20.0, features_per_frame=70.0, seed=seed)
-            problem = data.calibrated(sequence)
+            problem = data.calibrated(sequence, settings=data.Calibration())
             filtered, reckoned = ekf.ekf(problem), ekf.dead_reckoning(problem)
             assert filtered.status is Status.OK
             assert_covariances(filtered)

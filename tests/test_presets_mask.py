@@ -168,7 +168,7 @@ def test_nothing_to_mask() -> None:
 
 def test_on_a_drive_with_wrong_matches_the_mask_leaves_few_of_them_and_most_of_the_right_ones() -> None:
     sequence, labels = simulate_with_labels(Simulation(duration=20.0, wrong_share=0.05, seed=3))
-    left = data.calibrated(sequence).excluded == Excluded.NO
+    left = data.calibrated(sequence, settings=data.Calibration()).excluded == Excluded.NO
     determined = sequence.observations.pixel[:, 0] - sequence.observations.pixel[:, 2] > 3.0
     assert labels.wrong.mean() > 0.04
     assert labels.wrong[left].mean() < 0.025

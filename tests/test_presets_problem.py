@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fgbaseline import data
 from fgbaseline.data import Excluded, Observations, Sequence
 from fgbaseline.data.documented import most_observed
-from fgbaseline.data.motion import Interval, back_project, dead_reckoned_path, increments
+from fgbaseline.data.motion import Shift, back_project, dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError, se3
 
@@ -95,7 +95,10 @@ def test_a_reduced_calibrated_problem_keeps_what_is_seen_most_after_masking() ->
     # Landmark 0 is seen as often as the others, but half of its track is not its own.
     pixel[4 * np.arange(5, 10), :] += 40.0
     s = with_pixels(s, pixel)
-    everything, three = data.calibrated(s), data.calibrated(s, 3)
+    everything, three = (
+        data.calibrated(s, settings=data.Calibration()),
+        data.calibrated(s, 3, settings=data.Calibration()),
+    )
     assert counted(everything, s) == [5, 10, 10, 10]
     assert three.features.tolist() == [1, 2, 3]
     assert counted(three, s) == [0, 10, 10, 10]
@@ -103,11 +106,11 @@ def test_a_reduced_calibrated_problem_keeps_what_is_seen_most_after_masking() ->
     assert three.excluded[of_0].tolist() == [Excluded.FEATURE_NOT_CHOSEN] * 5 + [Excluded.PREDICTION] * 5
 
 
-@pytest.mark.parametrize("interval", Interval)
-def test_the_calibrated_noise_is_a_velocity_noise_times_the_interval(interval: Interval) -> None:
+@pytest.mark.parametrize("shift", Shift)
+def test_the_calibrated_noise_is_a_velocity_noise_times_the_interval(shift: Shift) -> None:
     s = drive()
     noise = data.NoiseSettings(pixel=2.0, linear_velocity=0.4, angular_velocity=0.05)
-    problem = data.calibrated(s, settings=data.Calibration(noise=noise, interval=interval))
+    problem = data.calibrated(s, settings=data.Calibration(noise=noise, shift=shift))
     for dt, covariance in zip(s.dt, problem.increment_covariance, strict=True):
         np.testing.assert_allclose(covariance, np.diag(np.repeat([0.4 * dt, 0.05 * dt], 3) ** 2), rtol=1e-12)
     assert problem.pixel_variance == 4.0
@@ -118,16 +121,16 @@ def test_the_calibrated_noise_is_a_velocity_noise_times_the_interval(interval: I
 
 def test_intervals_take_the_sample_after_before_or_the_mean() -> None:
     s = drive()
-    after, mean, before = (increments(s, i) / s.dt[:, None] for i in (Interval.AFTER, Interval.MEAN, Interval.BEFORE))
+    after, mean, before = (increments(s, i) / s.dt[:, None] for i in (Shift.AFTER, Shift.MIDDLE, Shift.BEFORE))
     np.testing.assert_allclose(after[1:], before[:-1], rtol=1e-12)
     np.testing.assert_allclose(mean, 0.5 * (after + before), rtol=1e-12)
 
 
 def test_each_interval_is_right_for_a_recording_made_so() -> None:
-    for said in ("after", "before"):
+    for said, shift in (("after", Shift.AFTER), ("before", Shift.BEFORE)):
         s = simulate(Simulation(duration=5.0, sigma_linear=0.0, sigma_angular=0.0, velocity_of_interval=said))
         assert s.truth is not None
-        path = dead_reckoned_path(increments(s, Interval(said)))
+        path = dead_reckoned_path(increments(s, shift))
         np.testing.assert_allclose(path, s.truth.world_T_imu, rtol=0, atol=1e-9)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera, so3
 
+from ..axes import AXIS_CONVENTIONS, axes_matrix
 from ..sequence import Sequence
-from .axes import AXIS_CONVENTIONS, axes_matrix
 
 _IMU_R_CAM = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """camera z forward, x right, y down in a body with x forward, y left, z up"""

@@ -8,8 +8,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..axes import IDENTITY, axes_matrix
 from ..sequence import Sequence
-from .axes import IDENTITY, axes_matrix
 from .rig import HANDHELD, KITTI, Rig, rig_of
 
 PathName = Literal["town", "loop", "highway", "handheld", "along"]

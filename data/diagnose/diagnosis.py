@@ -1,0 +1,108 @@
+"""What is wrong with a recording, found from the recording alone."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.geometry import FloatArray
+
+from ..axes import IDENTITY, axes_matrix
+from ..motion import Shift, held_twist
+from ..observations import BoolArray
+from ..sequence import Sequence
+from .axes import Axes, angular_axes, linear_axes
+from .fit import Fit, fit_windows
+from .links import repeated
+from .odometry import Odometry, odometry
+from .timing import Timing, timing
+from .window import Sigmas
+
+MIN_INTERVALS = 20
+"""of which the cameras must tell the motion"""
+SNAP = 0.15
+"""intervals: a shift this near to a usual one (`Shift`) is taken for it"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Diagnosis:
+    """The state of a recording; `findings.findings_of` puts it into sentences."""
+
+    sequence: Sequence
+    cannot_tell: str = ""
+    """why nothing could be found out, in a sentence; empty if it could"""
+    odometry: Odometry | None = None
+    angular: Axes = field(default_factory=lambda: Axes(IDENTITY, (False,) * 3, 0.0, np.nan, np.nan))
+    linear: Axes = field(default_factory=lambda: Axes(IDENTITY, (False,) * 3, 0.0, np.nan, np.nan))
+    timing: Timing = field(default_factory=lambda: Timing(0.0, np.inf, identifiable=False))
+    shift: float = Shift.AFTER
+    """intervals, the shift that the calibrated problem uses"""
+    fit: Fit | None = None
+    repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    """(T-1,) intervals whose tracks are copies"""
+
+    @property
+    def gyro_bias(self) -> FloatArray:
+        """(3,) rad/s, what the gyroscope reads at rest, in recorded axes."""
+        return np.zeros(3) if self.fit is None else self.angular.matrix.T @ self.fit.shared[:3]
+
+    @property
+    def gyro_bias_deviation(self) -> FloatArray:
+        """(3,) rad/s, in recorded axes."""
+        return np.full(3, np.inf) if self.fit is None else np.abs(self.angular.matrix.T) @ self.fit.deviation[:3]
+
+    @property
+    def velocity_scale(self) -> tuple[float, float]:
+        """Recorded over seen linear velocity, and its standard error."""
+        if self.fit is None:
+            return 1.0, np.inf
+        return 1.0 + float(self.fit.shared[3]), float(self.fit.deviation[3])
+
+    @property
+    def misalignment(self) -> tuple[FloatArray, FloatArray]:
+        """(3,) rad, the rotation vector by which imu_T_cam is off, in its own axes, and its standard errors."""
+        if self.fit is None:
+            return np.zeros(3), np.full(3, np.inf)
+        return self.fit.shared[4:], self.fit.deviation[4:]
+
+    @property
+    def sigmas(self) -> Sigmas | None:
+        """Noise of pixels and velocities; None where it could not be found."""
+        return None if self.fit is None else self.fit.sigmas
+
+
+def diagnose(sequence: Sequence) -> Diagnosis:
+    """Finds axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth."""
+    if len(sequence.observations) == 0:
+        return Diagnosis(sequence, "the recording has no observations")
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _diagnose(sequence)
+
+
+def _diagnose(sequence: Sequence) -> Diagnosis:
+    copies = repeated(sequence)
+    seen_by_cameras = odometry(sequence)
+    known = seen_by_cameras.known
+    if known.sum() < MIN_INTERVALS:
+        reason = f"the cameras tell the motion of only {int(known.sum())} of {len(known)} intervals"
+        return Diagnosis(sequence, reason, seen_by_cameras, repeated=copies)
+    seen = seen_by_cameras.twist(sequence.dt)
+    recorded = held_twist(sequence, Shift.MIDDLE)
+    angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
+    linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name)
+    dt = float(np.median(sequence.dt))
+    when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)
+    shift = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
+    fit = fit_windows(sequence, seen_by_cameras, turned(held_twist(sequence, shift), linear.name, angular.name))
+    reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
+    return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
+
+
+def turned(twist: FloatArray, linear: str, angular: str) -> FloatArray:
+    """Twists (n, 6) in the axes of imu_T_cam of recorded ones, each velocity in its own convention."""
+    return np.concatenate([twist[:, :3] @ axes_matrix(linear).T, twist[:, 3:] @ axes_matrix(angular).T], axis=1)
+
+
+def _usual(shift: float) -> float:
+    nearest = min(Shift, key=lambda usual: abs(shift - usual))
+    return float(nearest) if abs(shift - nearest) < SNAP else shift

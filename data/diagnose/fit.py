@@ -1,0 +1,192 @@
+"""Noise, bias and calibration errors from bundle adjustments of many short windows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.triangulation import triangulate_tracks
+
+from ..observations import IntArray
+from ..sequence import Sequence
+from .links import three_rows
+from .odometry import Odometry
+from .window import SHARED, SHARED_PRIOR, Sigmas, WindowData, WindowFit, fit_window
+
+FRAMES = 25
+"""of a window: longer than most tracks"""
+MAX_WINDOWS = 24
+MIN_TRACK = 3
+MIN_OBSERVATIONS = 60
+ROUNDS = 5
+START = Sigmas(pixel=1.0, linear=0.2, angular=0.02)
+CHI_SQUARE_MEDIAN = 0.4549
+"""of one degree of freedom"""
+CHI_SQUARE_6_MEDIAN = 5.3481
+LOOSE = 30.0
+"""times the velocity noise, with which each half of the tracks is fitted: the cameras decide"""
+MIN_HALF = 8
+"""landmarks"""
+MIN_UNBROKEN = 5
+"""intervals"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fit:
+    """What the windows agree on."""
+
+    sigmas: Sigmas
+    shared: FloatArray
+    """(7,) see `window.SHARED`"""
+    deviation: FloatArray
+    """(7,) standard errors, from the spread between windows where that is larger than what each claims"""
+    windows: int
+    track_inflation: float
+    """by how much the motions that two halves of the tracks tell differ, over what `white_pixel` lets them; the errors
+    of a track last, so that averaging over it helps less than for white noise"""
+    white_pixel: float
+    """px, of the pixel residuals within a window; `sigmas.pixel` is this times the inflation"""
+
+
+def chains(odometry: Odometry, landmark: IntArray, frame: IntArray) -> IntArray:
+    """(n,) a number for each observation: equal for those that inlier links join, -1 where none does."""
+    n = len(landmark)
+    linked = np.zeros(n, dtype=np.bool_)
+    joined = np.zeros(n, dtype=np.bool_)
+    inlier = odometry.inlier
+    joined[odometry.links.after[inlier]] = True
+    linked[odometry.links.after[inlier]] = linked[odometry.links.before[inlier]] = True
+    order = np.lexsort((frame, landmark))
+    chain = np.empty(n, dtype=np.int64)
+    chain[order] = np.cumsum(~joined[order])
+    return np.where(linked, chain, -1)
+
+
+def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fit | None:
+    """The common answer of windows spread over the recording; None where no window has enough observations.
+
+    `twist` (T-1, 6) is the recorded velocity of each interval, turned to the axes of imu_T_cam. The sigmas are the
+    variance components at which residuals are as large as their degrees of freedom say; medians over axes and windows
+    keep a bad window from deciding.
+    """
+    windows = _windows(sequence, odometry, twist, _spread(sequence.n_frames))
+    if not windows:
+        return None
+    sigmas = START
+    shared = [np.zeros(SHARED)] * len(windows)
+    fits: list[WindowFit] = []
+    for _ in range(ROUNDS):
+        fits = [
+            fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, common, iterations=2)
+            for (data, poses, points), common in zip(windows, shared, strict=True)
+        ]
+        windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
+        shared = [fit.shared for fit in fits]
+        sigmas = _components(fits, sigmas)
+    shared_mean, deviation = _agreed(fits)
+    unbroken = _windows(sequence, odometry, twist, _unbroken(odometry))
+    inflation = _track_inflation(sequence, unbroken, shared_mean, sigmas)
+    effective = replace(sigmas, pixel=sigmas.pixel * inflation)
+    return Fit(effective, shared_mean, deviation, len(fits), inflation, sigmas.pixel)
+
+
+Span = tuple[int, int]
+"""first frame and number of frames of a window"""
+
+
+def _spread(n_frames: int) -> list[Span]:
+    """Windows spread evenly over the recording."""
+    size = min(FRAMES, n_frames)
+    count = max(1, min(MAX_WINDOWS, n_frames // size))
+    return [(int(start), size) for start in np.unique(np.linspace(0, n_frames - size, count).astype(int))]
+
+
+def _unbroken(odometry: Odometry) -> list[Span]:
+    """Windows without an interval over which the cameras see nothing, the longest stretches first."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], odometry.known, [False]]).astype(np.int8)))
+    spans: list[Span] = []
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for first in range(int(start), int(end) - MIN_UNBROKEN + 1, FRAMES):
+            spans.append((first, min(FRAMES, int(end) - first + 1)))
+    spans.sort(key=lambda span: -span[1])
+    return spans[:MAX_WINDOWS]
+
+
+def _windows(
+    sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]
+) -> list[tuple[WindowData, FloatArray, FloatArray]]:
+    """Data, initial poses and initial points of each window that has enough observations."""
+    o, dt = sequence.observations, sequence.dt
+    chain = chains(odometry, o.landmark, o.frame)
+    known = odometry.known[:, None, None]
+    step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
+    windows = []
+    for start, size in spans:
+        chosen = np.flatnonzero((chain >= 0) & (o.frame >= start) & (o.frame < start + size))
+        _, row, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
+        chosen = chosen[length[row] >= MIN_TRACK]
+        if len(chosen) < MIN_OBSERVATIONS:
+            continue
+        intervals = slice(start, start + size - 1)
+        poses = se3.compose(step[intervals])
+        _, row = np.unique(chain[chosen], return_inverse=True)
+        frame = o.frame[chosen] - start
+        world_T_cam = (poses @ sequence.imu_T_cam)[frame]
+        points = triangulate_tracks(
+            sequence.camera, world_T_cam, row.astype(np.int64), o.pixel[chosen], int(row.max()) + 1, 1.0, huber=2.5
+        ).position
+        data = WindowData(frame, row.astype(np.int64), three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        windows.append((data, poses, points))
+    return windows
+
+
+def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
+    residual = np.concatenate([fit.motion_residual for fit in fits])
+    redundancy = np.maximum(np.concatenate([fit.motion_redundancy for fit in fits]), 1e-3)
+    variance = np.median(residual**2 / redundancy, axis=0) / CHI_SQUARE_MEDIAN
+    pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
+    return Sigmas(
+        pixel=max(0.02, sigmas.pixel * float(np.sqrt(pixel))),
+        linear=max(1e-4, float(np.sqrt(variance[:3].mean()))),
+        angular=max(1e-5, float(np.sqrt(variance[3:].mean()))),
+    )
+
+
+def _track_inflation(
+    sequence: Sequence, windows: list[tuple[WindowData, FloatArray, FloatArray]], shared: FloatArray, sigmas: Sigmas
+) -> float:
+    """At least 1: see `Fit.track_inflation`. By the motion over a whole window from even and from odd landmarks."""
+    loose = Sigmas(sigmas.pixel, LOOSE * sigmas.linear, LOOSE * sigmas.angular)
+    ratios = []
+    for data, poses, points in windows:
+        if len(points) < 2 * MIN_HALF:
+            continue
+        halves = []
+        for parity in (0, 1):
+            chosen = data.row % 2 == parity
+            half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
+            subset = points[parity::2]
+            halves.append(fit_window(sequence.camera, sequence.imu_T_cam, half, poses, subset, loose, shared, 4))
+        difference = se3.log(se3.inverse(halves[0].poses[-1]) @ halves[1].poses[-1])
+        covariance = halves[0].last_covariance + halves[1].last_covariance
+        ratios.append(float(difference @ np.linalg.solve(covariance, difference)))
+    if len(ratios) < 3:
+        return 1.0
+    return float(np.sqrt(max(1.0, float(np.median(ratios)) / CHI_SQUARE_6_MEDIAN)))
+
+
+def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
+    """The information-weighted mean (7,) of the shared parameters, windows far off left out, and its deviation."""
+    information = np.array([fit.shared_information for fit in fits])
+    values = np.array([fit.shared for fit in fits])
+    centre = np.median(values, axis=0)
+    spread = 1.4826 * np.median(np.abs(values - centre), axis=0) + 1e-9
+    keep = (np.abs(values - centre) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
+    total = information[keep].sum(axis=0) + SHARED_PRIOR
+    mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))
+    claimed = np.sqrt(np.diag(np.linalg.inv(total)))
+    # The same mean's variance from how the windows differ: (sum I)^-1 sum I d d^T I (sum I)^-1
+    difference = np.einsum("wij,wj->wi", information[keep], values[keep] - mean)
+    inverse = np.linalg.inv(total)
+    seen = np.sqrt(np.diag(inverse @ (difference.T @ difference) @ inverse))
+    return mean, np.asarray(np.maximum(claimed, seen), dtype=np.float64)

@@ -1,0 +1,109 @@
+"""Pairs of observations of one landmark in neighbouring frames: all that visual odometry needs of a recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, StereoCamera, disparity
+
+from ..observations import BoolArray, IntArray
+from ..sequence import Sequence
+
+MIN_DISPARITY = 1.0
+"""px"""
+MAX_ROW_MISMATCH = 3.0
+"""px, |vL - vR|"""
+REPEATED_SHARE = 0.8
+"""of the links of an interval, from which on its tracks count as copied"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Links:
+    """n links, sorted by frame: a landmark seen in a frame and in the next one."""
+
+    before: IntArray
+    """(n,) index of the observation in frame k"""
+    after: IntArray
+    """(n,) index of the observation in frame k + 1"""
+    frame: IntArray
+    """(n,) k"""
+    point: FloatArray
+    """(n, 3) m, the landmark in the left camera's frame at k, from its own disparity"""
+    point_covariance: FloatArray
+    """(n, 3, 3) m^2 for a pixel deviation of 1 px in each of the four rows"""
+    pixel: FloatArray
+    """(n, 3) uL, uR and (vL + vR) / 2 at k + 1, px"""
+
+    def __len__(self) -> int:
+        return len(self.before)
+
+    def select(self, chosen: BoolArray | IntArray) -> "Links":
+        """The links where `chosen` is true, or those at increasing indices."""
+        return Links(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+
+def sound(sequence: Sequence) -> BoolArray:
+    """(n,) the observations whose disparity and rows allow a triangulation."""
+    pixel = sequence.observations.pixel
+    rows = np.abs(pixel[:, 1] - pixel[:, 3]) <= MAX_ROW_MISMATCH
+    return np.asarray(rows & (disparity(pixel) > MIN_DISPARITY), dtype=np.bool_)
+
+
+def consecutive(sequence: Sequence) -> tuple[IntArray, IntArray]:
+    """Indices (n,) of observations, and (n,) those of the same landmarks one frame later, sorted by frame."""
+    o = sequence.observations
+    order = o.by_track()
+    before, after = order[:-1], order[1:]
+    linked = (o.landmark[before] == o.landmark[after]) & (o.frame[before] + 1 == o.frame[after])
+    before, after = before[linked], after[linked]
+    by_frame = np.argsort(o.frame[before], kind="stable")
+    return before[by_frame], after[by_frame]
+
+
+def repeated(sequence: Sequence) -> BoolArray:
+    """(T-1,) intervals over which the tracks were copied and not tracked: nearly every pixel is the same to the bit.
+
+    Such a frame says nothing of the motion, and what its tracks follow afterwards are other points than before. A
+    tracker's sub-pixel positions are never the same twice by chance, also where the camera stands.
+    """
+    o, n = sequence.observations, sequence.n_frames - 1
+    before, after = consecutive(sequence)
+    same = (o.pixel[before] == o.pixel[after]).all(axis=1)
+    count = np.bincount(o.frame[before], minlength=n)
+    equal = np.bincount(o.frame[before[same]], minlength=n)
+    return np.asarray((count >= 3) & (equal > REPEATED_SHARE * count), dtype=np.bool_)
+
+
+def links_of(sequence: Sequence) -> Links:
+    """All links between sound observations in consecutive frames, but for those over repeated ones."""
+    o = sequence.observations
+    before, after = consecutive(sequence)
+    use = sound(sequence)
+    chosen = use[before] & use[after] & ~repeated(sequence)[o.frame[before]]
+    before, after = before[chosen], after[chosen]
+    point = sequence.camera.triangulate(o.pixel[before])
+    return Links(
+        before=before,
+        after=after,
+        frame=o.frame[before],
+        point=point,
+        point_covariance=np.asarray(np.linalg.inv(point_information(sequence.camera, point)), dtype=np.float64),
+        pixel=three_rows(o.pixel[after]),
+    )
+
+
+def three_rows(pixel: FloatArray) -> FloatArray:
+    """(..., 3) uL, uR and (vL + vR) / 2 of observations (..., 4)."""
+    return np.stack([pixel[..., 0], pixel[..., 2], 0.5 * (pixel[..., 1] + pixel[..., 3])], axis=-1)
+
+
+def three_row_jacobian(camera: StereoCamera, point: FloatArray) -> FloatArray:
+    """(..., 3, 3) derivative of `three_rows` of a projected point (..., 3)."""
+    return camera.jacobian(point)[..., [0, 2, 1], :]
+
+
+def point_information(camera: StereoCamera, point: FloatArray) -> FloatArray:
+    """(..., 3, 3) 1/m^2: what one stereo observation with 1 px in each of its four rows tells of a point (..., 3)."""
+    J = three_row_jacobian(camera, point)
+    weighted = np.swapaxes(J, -1, -2) * np.array([1.0, 1.0, 2.0])
+    return np.asarray(weighted @ J, dtype=np.float64)

@@ -1,0 +1,126 @@
+"""The recording as it should have been: what the diagnosis is sure of, put right."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.geometry import FloatArray, so3
+
+from ..motion import dead_reckoned_path, held_twist
+from ..observations import Observations
+from ..sequence import Sequence, Truth
+from ..track_mask import MaskSettings, TrackLinks, split_tracks
+from .diagnosis import Diagnosis, turned
+from .links import consecutive, sound
+
+SURE = 4.0
+"""standard errors, from which on a figure counts as found"""
+MIN_BIAS = 0.002
+"""rad/s"""
+MIN_MISALIGNMENT = np.deg2rad(0.25)
+GATE_RANGE = (3.0, 12.0)
+"""px"""
+GATE = 6.0
+"""times the median error of a link"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Repaired:
+    """A repaired recording, which of its observations can be trusted, and what was done."""
+
+    sequence: Sequence
+    excluded: NDArray[np.uint8]
+    """(n,) an `Excluded` for each of its observations"""
+    repairs: tuple[str, ...]
+
+
+def sure_bias(diagnosis: Diagnosis) -> FloatArray:
+    """(3,) rad/s in recorded axes; zero where the bias is too small or too uncertain to be taken off."""
+    bias, deviation = diagnosis.gyro_bias, diagnosis.gyro_bias_deviation
+    found = (np.abs(bias) > MIN_BIAS) & (np.abs(bias) > SURE * deviation)
+    return bias if found.any() else np.zeros(3)
+
+
+def sure_misalignment(diagnosis: Diagnosis) -> FloatArray:
+    """(3,) rad; zero in each component that is too small or too uncertain."""
+    angle, deviation = diagnosis.misalignment
+    return np.where((np.abs(angle) > MIN_MISALIGNMENT) & (np.abs(angle) > SURE * deviation), angle, 0.0)
+
+
+def repair(diagnosis: Diagnosis, mask: MaskSettings) -> Repaired:
+    """Velocities in the axes of imu_T_cam without their bias, the extrinsic turned, broken tracks split."""
+    sequence, done = diagnosis.sequence, []
+    linear, angular = diagnosis.linear, diagnosis.angular
+    bias, angle = sure_bias(diagnosis), sure_misalignment(diagnosis)
+    velocity = sequence.linear_velocity @ linear.matrix.T
+    rate = (sequence.angular_velocity - bias) @ angular.matrix.T
+    if angular.changed:
+        done.append(f"angular velocity turned from the axes it was recorded in ({angular.name}) to those of imu_T_cam")
+    if linear.changed:
+        done.append(f"linear velocity turned from the axes it was recorded in ({linear.name}) to those of imu_T_cam")
+    if bias.any():
+        done.append(f"gyroscope bias of ({', '.join(f'{b:.4f}' for b in bias)}) rad/s taken off")
+    imu_T_cam = sequence.imu_T_cam.copy()
+    if angle.any():
+        imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
+        done.append(f"imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities")
+    if diagnosis.shift != 0.0:
+        done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
+    path = _path(diagnosis)
+    observations, excluded, pieces = _observations(sequence, path, mask)
+    n_landmarks = sequence.n_landmarks + pieces
+    if pieces:
+        done.append(f"{pieces} tracks that jump to another point split off as landmarks of their own")
+    repaired = replace(
+        sequence,
+        linear_velocity=velocity,
+        angular_velocity=rate,
+        imu_T_cam=imu_T_cam,
+        observations=observations,
+        n_landmarks=n_landmarks,
+        truth=_with_landmarks(sequence.truth, n_landmarks),
+    )
+    return Repaired(repaired, excluded, tuple(done))
+
+
+def _path(diagnosis: Diagnosis) -> FloatArray:
+    """(T, 4, 4) a path that is right locally, which is all it is for: what the cameras see, and between two intervals
+    that they see what lies in their middle; elsewhere the velocities."""
+    sequence, odometry = diagnosis.sequence, diagnosis.odometry
+    twist = turned(held_twist(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
+    twist[:, 3:] -= diagnosis.angular.matrix @ sure_bias(diagnosis)
+    if odometry is not None:
+        seen, known = odometry.twist(sequence.dt), odometry.known
+        twist[known] = seen[known]
+        between = np.flatnonzero(~known[1:-1] & known[:-2] & known[2:]) + 1
+        twist[between] = 0.5 * (seen[between - 1] + seen[between + 1])
+    return dead_reckoned_path(twist * sequence.dt[:, None])
+
+
+def _observations(
+    sequence: Sequence, path: FloatArray, mask: MaskSettings
+) -> tuple[Observations, NDArray[np.uint8], int]:
+    """Observations with split tracks, what excludes them, and the number of new landmarks."""
+    o = sequence.observations
+    copied = np.zeros(len(o), dtype=np.bool_)
+    before, after = consecutive(sequence)
+    same = (o.pixel[before] == o.pixel[after]).all(axis=1)
+    copied[after[same]] = True
+    links = TrackLinks(sequence, path, mask.prediction_gate)
+    usable = sound(sequence)
+    judged = usable[before] & usable[after] & ~same
+    typical = float(np.median(links.error(before[judged], after[judged]))) if judged.any() else GATE_RANGE[1]
+    gate = float(np.clip(GATE * typical, *GATE_RANGE))
+    split = split_tracks(sequence, path, replace(mask, prediction_gate=gate), copied)
+    order = np.lexsort((split.landmark, o.frame))
+    moved = Observations(o.frame[order], split.landmark[order], o.pixel[order])
+    return moved, split.excluded[order], split.n_landmarks - sequence.n_landmarks
+
+
+def _with_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
+    """The truth, with landmarks of unknown position for the tracks that were split off."""
+    if truth is None or truth.landmarks is None:
+        return truth
+    missing = np.full((n_landmarks - len(truth.landmarks), 3), np.nan)
+    return replace(truth, landmarks=np.concatenate([truth.landmarks, missing]))
