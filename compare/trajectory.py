@@ -10,8 +10,9 @@ from fgbaseline.geometry import FgbaselineError, FloatArray, so3
 from .alignment import align_se3
 from .statistics import summarised
 
-STANDING = 1e-3
-"""m between frames: below it a path has no direction of its own, and keeps the one it had"""
+STANDING = 0.1
+"""of the path's brisk steps (their 90th percentile): below it noise decides where a step points, and the path keeps the
+direction it had"""
 
 
 def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
@@ -81,7 +82,8 @@ def travel_frame(positions: FloatArray, up: FloatArray) -> tuple[FloatArray, Flo
     step = np.gradient(positions, axis=0) if len(positions) > 1 else np.zeros_like(positions)
     horizontal = step - np.outer(step @ upward, upward)
     length = np.linalg.norm(horizontal, axis=1)
-    moving = np.flatnonzero(length > STANDING)
+    brisk = np.nanpercentile(length, 90) if np.isfinite(length).any() else 0.0
+    moving = np.flatnonzero(length > max(STANDING * float(brisk), np.finfo(np.float64).tiny))
     if len(moving) == 0:
         sideways = np.eye(3)[int(np.argmin(np.abs(upward)))]
         direction = np.cross(np.cross(upward, sideways), upward)

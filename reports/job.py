@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from fgbaseline.data import (
+    Calibration,
     Problem,
     Reading,
     Sequence,
@@ -41,6 +42,8 @@ class RunSettings:
     truth: Path | None = None
     truth_frame: BodyFrame | None = None
     seed: int = 0
+    as_recorded: bool = False
+    """take the recording as it is: no diagnosis, no repairs, assumed noise"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
@@ -53,6 +56,7 @@ class RunSettings:
             "truth": None if self.truth is None else str(self.truth),
             "truth_frame": self.truth_frame,
             "seed": self.seed,
+            "as_recorded": self.as_recorded,
         }
 
 
@@ -92,7 +96,7 @@ def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
         if settings.features is None:
             features = DEFAULT_FEATURES
         return documented(sequence, features, settings.landmarks)
-    return calibrated(sequence, features)
+    return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None)
 
 
 def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched) -> "Run":

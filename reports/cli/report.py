@@ -33,6 +33,8 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
         f"{sequence.name}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
         f"{sequence.n_landmarks} tracks"
     )
+    if settings.preset == "calibrated" and not settings.as_recorded:
+        told.say("diagnosing the recording")
     problem = job.pose_problem(sequence, settings)
     run = job.solve(problem, settings, told.estimator)
     for name, result in run.results.items():

@@ -56,6 +56,9 @@ class FeatureCount(click.ParamType[int | str]):
 @click.option(
     "--truth-frame", type=click.Choice(["camera", "imu"]), help="The body whose poses the ground truth gives."
 )
+@click.option(
+    "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the simulated drive.")
 def command(
     sequence: Path | None,
@@ -67,6 +70,7 @@ def command(
     landmarks: str,
     truth: Path | None,
     truth_frame: Literal["camera", "imu"] | None,
+    as_recorded: bool,
     seed: int,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
@@ -90,5 +94,6 @@ def command(
         truth=truth,
         truth_frame=truth_frame,
         seed=seed,
+        as_recorded=as_recorded,
     )
     return report(settings, out, force=force)
