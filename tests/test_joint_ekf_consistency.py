@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fgbaseline import data, ekf
+from fgbaseline import ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
@@ -56,7 +56,7 @@ def test_the_filter_knows_its_error_and_the_textbook_believes_too_much(path: Pat
 
 
 def test_every_way_agrees_on_what_is_nearly_linear() -> None:
-    # With a tenth of the noise the updates are small, and all ways of linearising say the same.
+    # With a fiftieth of the noise the updates are small, and all ways of linearising say the same.
     sequence = simulate(
         Simulation(
             path="handheld",
@@ -68,12 +68,9 @@ def test_every_way_agrees_on_what_is_nearly_linear() -> None:
             sigma_angular=0.0002,
         )
     )
-    noise = data.NoiseSettings(pixel=0.02, linear_velocity=0.002, angular_velocity=0.0002)
-    problem = replace(matched(sequence), kernel=None)
+    told = matched(sequence)  # of 0.1 m/s and 0.01 rad/s
     problem = replace(
-        problem,
-        pixel_variance=noise.pixel**2,
-        increment_covariance=problem.increment_covariance * (noise.linear_velocity / 0.1) ** 2,
+        told, kernel=None, pixel_variance=0.02**2, increment_covariance=told.increment_covariance * 0.02**2
     )
     answers = [ekf.joint_ekf(problem, settings=how) for how in WAYS.values()]
     for other in answers[1:]:
