@@ -1,8 +1,9 @@
 """The answers of all estimators to one problem, ours and those of other packages, none of which can stop the others."""
 
+import inspect
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import PurePath
@@ -26,7 +27,8 @@ def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: AR
 def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
     """Each named estimator's answer, in the order of the names; a failure is an answer and stops nothing.
 
-    What one run gives along with another (`isam2-online` with `isam2`) is not solved again.
+    What one run gives along with another (`isam2-online` with `isam2`) is not solved again, and an estimator that
+    has a parameter `given` (`batch` starts from the answer of `isam2`) is told the answers so far by name.
     """
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
@@ -37,13 +39,28 @@ def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) 
         start = time.perf_counter()
         try:
             with watch(name) as progress:
-                estimate = checked(find_estimator(name)(problem, progress), name, problem)
+                estimate = checked(_solved(find_estimator(name), problem, progress, given | answers), name, problem)
                 given |= {other: checked(e, other, problem) for other, e in estimate.by_products.items()}
         except Exception as error:  # whatever somebody's filter may raise
             estimate = Estimate.failed(name, told(error), problem.n_frames, len(problem.excluded))
             estimate = replace(estimate, seconds_total=time.perf_counter() - start)
         answers[name] = estimate
     return answers
+
+
+def _solved(
+    estimator: Callable[..., object], problem: Problem, progress: Progress | None, given: Mapping[str, Estimate]
+) -> object:
+    if "given" in _parameters(estimator):
+        return estimator(problem, progress, given=given)
+    return estimator(problem, progress)
+
+
+def _parameters(estimator: Callable[..., object]) -> Iterable[str]:
+    try:
+        return inspect.signature(estimator).parameters
+    except (TypeError, ValueError):  # one written in C does not say
+        return ()
 
 
 def told(error: Exception) -> str:

@@ -12,7 +12,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
 from .convention import reordered
-from .keys import LandmarkKeys, pose_key
+from .keys import pose_key
 
 HELD_SIGMA = 1e-6
 """m and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
@@ -24,7 +24,6 @@ class Factors:
     def __init__(self, problem: Problem) -> None:
         camera = problem.sequence.camera
         self.problem = problem
-        self.key = LandmarkKeys()
         self.calibration = gtsam.Cal3_S2Stereo(camera.fu, camera.fv, 0.0, camera.cu, camera.cv, camera.baseline)
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
         self.stereo_noise = stereo_noise(problem)
@@ -43,27 +42,27 @@ class Factors:
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
-    def stereo(self, frame: int, landmark: int, pixel: FloatArray) -> gtsam.GenericStereoFactor3D:
-        """One stereo observation (4,) of a landmark; no throw where the point is behind the camera."""
+    def stereo(self, frame: int, key: int, pixel: FloatArray) -> gtsam.GenericStereoFactor3D:
+        """One stereo observation (4,) of the landmark `key`; no throw where the point is behind the camera."""
         uL, vL, uR, vR = pixel.tolist()
         return gtsam.GenericStereoFactor3D(
             gtsam.StereoPoint2(uL, uR, 0.5 * (vL + vR)),
             self.stereo_noise,
             pose_key(frame),
-            self.key(landmark),
+            key,
             self.calibration,
             False,
             False,
             self.imu_P_cam,
         )
 
-    def landmark_prior(self, landmark: int) -> gtsam.PriorFactorPoint3:
-        """The problem's prior on one landmark."""
+    def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:
+        """The problem's prior on one landmark, which goes by `key`."""
         prior = self.problem.landmark_prior
         assert prior is not None
         row = int(np.searchsorted(self.problem.features, landmark))
         noise = gtsam.noiseModel.Gaussian.Covariance(prior.covariance)
-        return gtsam.PriorFactorPoint3(self.key(landmark), prior.mean[row], noise)
+        return gtsam.PriorFactorPoint3(key, prior.mean[row], noise)
 
 
 def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:

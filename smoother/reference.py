@@ -9,16 +9,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
-from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
+from .arrival import GivenUpError
 from .convention import reordered
-from .incremental import PRIOR, GivenUpError, IncrementalSmoother, ISAM2Settings
+from .covariances import covariances
+from .incremental import IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
 from .keys import pose_key
 from .relinearised import compact, relinearised
-from .values import points_of, poses_of
+from .values import landmarks_of, poses_of
 
 
 def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
@@ -55,15 +56,14 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         graph, values = _relinearise(smoother)
     except (GivenUpError, IndeterminateSystemError) as error:
         return Estimate.failed("isam2", str(error), T, len(problem.excluded))
-    index = np.sort(np.fromiter(smoother.in_graph, dtype=np.int64))
-    covariance = _marginals(smoother, graph, values)
+    poses, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _verdict(events)
-    used = problem.spread(_used(smoother))
+    used = problem.spread(smoother.used())
     online = Estimate(
         name="isam2-online",
-        world_T_imu=smoother.online,
-        covariance=smoother.online_covariance,
+        world_T_imu=smoother.arrivals.path,
+        covariance=smoother.arrivals.covariance,
         landmarks=smoother.online_landmarks(),
         used=used,
         status=status,
@@ -74,9 +74,9 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     )
     final = Estimate(
         name="isam2",
-        world_T_imu=poses_of(values, T),
-        covariance=covariance,
-        landmarks=Landmarks(index, points_of(values, index.tolist(), smoother.factors.key)),
+        world_T_imu=poses_of(values, range(T)),
+        covariance=poses,
+        landmarks=landmarks,
         used=used,
         status=status,
         reason=reason,
@@ -95,38 +95,33 @@ def _relinearise(smoother: IncrementalSmoother) -> tuple[gtsam.NonlinearFactorGr
     """The whole graph and its solution, relinearised, without the landmarks whose geometry came undone."""
     while True:
         graph, values = compact(smoother.isam.tree.getFactorsUnsafe()), smoother.isam.tree.calculateEstimate()
-        try:
-            values = relinearised(graph, values)
-        except RuntimeError as error:
-            text = str(error).strip().partition("\n")[0]
-            smoother.events.append(
-                Event(smoother.problem.n_frames - 1, "final relinearisation failed", f"{text}; the last update stands")
-            )
+        values, failure = relinearised(graph, values)
         if not smoother.drop_undone(values):
-            return graph, values
+            break
+    if failure:
+        last = smoother.problem.n_frames - 1
+        smoother.events.append(Event(last, "final relinearisation failed", f"{failure}; the step before stands"))
+    return graph, values
 
 
-def _marginals(smoother: IncrementalSmoother, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> FloatArray:
-    """(T, 6, 6) of the poses, order [v, w]; NaN where the system is indeterminate at its solution."""
+def _marginals(
+    smoother: IncrementalSmoother, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values
+) -> tuple[FloatArray, Landmarks]:
+    """Covariances (T, 6, 6) of the poses, order [v, w], NaN where there are none; the landmarks with theirs."""
     T = smoother.problem.n_frames
     try:
-        marginals = gtsam.Marginals(graph, values)
-        return reordered([marginals.marginalCovariance(pose_key(k)) for k in range(T)])
+        covariance = covariances(graph, values)
     except RuntimeError:
         smoother.events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
-        return np.full((T, 6, 6), np.nan)
-
-
-def _used(smoother: IncrementalSmoother) -> BoolArray:
-    used = np.zeros(len(smoother.observations), dtype=np.bool_)
-    used[[i for observed in smoother.in_graph.values() for i in observed if i != PRIOR]] = True
-    return used
+        return np.full((T, 6, 6), np.nan), landmarks_of(values, smoother.key)
+    poses = reordered([covariance[pose_key(k)] for k in range(T)])
+    return poses, landmarks_of(values, smoother.key, covariance)
 
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
     return [
         Event(frame, "landmark never determined", "its observations never fixed its position well enough", landmark)
-        for landmark, frame in smoother.waiting.last_seen()
+        for landmark, frame in smoother.arrivals.waiting.last_seen()
     ]
 
 

@@ -1,11 +1,14 @@
 """The final relinearisation: Gauss-Newton over the whole graph from where the increments led."""
 
+from typing import NamedTuple
+
 import gtsam
-import numpy as np
 
 MAX_STEPS = 10
 RELATIVE_DECREASE = 1e-7
 """of the cost, at which it stops"""
+LONGEST = 64.0
+"""times the step"""
 
 
 def compact(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
@@ -18,21 +21,51 @@ def compact(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
     return result
 
 
-def relinearised(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> gtsam.Values:
+class Relinearised(NamedTuple):
+    """Where the steps led, and why they ended before their time, if they did."""
+
+    values: gtsam.Values
+    failure: str = ""
+
+
+def relinearised(
+    graph: gtsam.NonlinearFactorGraph,
+    values: gtsam.Values,
+    max_steps: int = MAX_STEPS,
+    relative_decrease: float = RELATIVE_DECREASE,
+) -> Relinearised:
     """The values after Gauss-Newton steps, as long as each lowers the cost.
 
-    Every linearisation point of an incremental run is off by up to its threshold; this takes that away. Raises
-    RuntimeError where the system is indeterminate.
+    Every linearisation point of an incremental run is off by up to its threshold; this takes that away. Under a kernel
+    the steps are too short along weak directions, so each is doubled as long as that lowers the cost further. Where
+    the system is indeterminate the values at which it is are given, with GTSAM's words.
     """
-    optimizer = gtsam.GaussNewtonOptimizer(graph, values)
-    best, cost = values, graph.error(values)
-    for _ in range(MAX_STEPS):
-        optimizer.iterate()
-        new_cost = optimizer.error()
-        if not (np.isfinite(new_cost) and new_cost < cost):
+    cost = graph.error(values)
+    ordering = gtsam.Ordering.ColamdNonlinearFactorGraph(graph)
+    for _ in range(max_steps):
+        try:
+            step = graph.linearize(values).optimize(ordering)
+        except RuntimeError as error:
+            return Relinearised(values, str(error).strip().partition("\n")[0])
+        longer, longer_cost = _longest(graph, values, step, cost)
+        if not longer_cost < cost:
             break
-        decrease = (cost - new_cost) / cost
-        best, cost = optimizer.values(), new_cost
-        if decrease < RELATIVE_DECREASE:
+        decrease = (cost - longer_cost) / cost
+        values, cost = longer, longer_cost
+        if decrease < relative_decrease:
             break
-    return best
+    return Relinearised(values)
+
+
+def _longest(
+    graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, step: gtsam.VectorValues, cost: float
+) -> tuple[gtsam.Values, float]:
+    """The values and their cost after the step, or that many times it that doubling still pays."""
+    times, best = 1.0, values
+    while times <= LONGEST:
+        trial = values.retract(step.scale(times))
+        trial_cost = graph.error(trial)
+        if not trial_cost < cost:
+            break
+        best, cost, times = trial, trial_cost, 2.0 * times
+    return best, cost

@@ -1,6 +1,6 @@
 """Whatever an estimator does, the others go on, and its row says what happened."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -109,6 +109,21 @@ def test_poses_from_a_frame_on_may_be_missing(installed: dict[str, Any]) -> None
     divergence = compare_all(PROBLEM, answers, {}).results["short"].divergence
     assert divergence is not None
     assert divergence["position"].notna().sum() == 7
+
+
+def test_an_estimator_that_asks_for_it_is_given_the_answers_so_far(installed: dict[str, Any]) -> None:
+    told: list[list[str]] = []
+
+    def asking(problem: Problem, progress: Progress | None, given: Mapping[str, Estimate] | None = None) -> Estimate:
+        told.append(list(given or {}))
+        answer = ekf.dead_reckoning(problem)
+        return replace(answer, by_products={"other": answer})
+
+    installed["asking"] = asking
+    installed["asking too"] = asking
+    solve_all(PROBLEM, ["dead-reckoning", "asking", "asking too"])
+    assert told[0] == ["dead-reckoning"]
+    assert set(told[1]) == {"dead-reckoning", "asking", "other"}
 
 
 def test_what_one_run_gives_along_is_not_solved_again(installed: dict[str, Any]) -> None:

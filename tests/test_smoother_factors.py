@@ -14,7 +14,7 @@ from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.convention import reordered
 from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import pose_key
+from fgbaseline.smoother.keys import landmark_key, pose_key
 
 from .four_rows import State, cost
 from .synthetic import Scene, drive, plain_problem
@@ -31,10 +31,10 @@ def graph_of(problem: Problem, factors: Factors) -> gtsam.NonlinearFactorGraph:
         graph.push_back(factors.motion(k))
     o = problem.observations()
     for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
-        graph.push_back(factors.stereo(k, j, pixel))
+        graph.push_back(factors.stereo(k, landmark_key(j), pixel))
     if problem.landmark_prior is not None:
         for j in problem.features.tolist():
-            graph.push_back(factors.landmark_prior(j))
+            graph.push_back(factors.landmark_prior(j, landmark_key(j)))
     return graph
 
 
@@ -43,7 +43,7 @@ def values_of(state: State, problem: Problem, factors: Factors) -> gtsam.Values:
     for k, pose in enumerate(state.world_T_imu):
         values.insert(pose_key(k), gtsam.Pose3(pose))
     for j in problem.features.tolist():
-        values.insert(factors.key(j), state.landmarks[j])
+        values.insert(landmark_key(j), state.landmarks[j])
     return values
 
 
@@ -97,7 +97,10 @@ def test_the_kernel_is_huber_on_the_norm_of_the_three_rows() -> None:
     r = (o.pixel - s.camera.project(points)) / np.sqrt(problem.pixel_variance)
     norm = np.sqrt(r[:, 0] ** 2 + r[:, 2] ** 2 + 2.0 * (0.5 * (r[:, 1] + r[:, 3])) ** 2)
     expected = np.where(norm <= k, 0.5 * norm**2, k * norm - 0.5 * k**2)
-    errors = [factors.stereo(int(o.frame[i]), int(o.landmark[i]), o.pixel[i]).error(values) for i in range(len(o))]
+    errors = [
+        factors.stereo(int(o.frame[i]), landmark_key(int(o.landmark[i])), o.pixel[i]).error(values)
+        for i in range(len(o))
+    ]
     assert (norm > k).any()
     np.testing.assert_allclose(errors, expected, rtol=1e-9)
 
@@ -110,7 +113,7 @@ def test_the_stereo_factor_is_predicted_minus_measured_through_the_extrinsic(see
     i = int(random.integers(len(problem.observations())))
     o, s = problem.observations(), problem.sequence
     frame, landmark = int(o.frame[i]), int(o.landmark[i])
-    factor = factors.stereo(frame, landmark, o.pixel[i])
+    factor = factors.stereo(frame, landmark_key(landmark), o.pixel[i])
 
     def error(moved: State) -> FloatArray:
         cam_T_world = se3.inverse(moved.world_T_imu[frame] @ s.imu_T_cam)
@@ -180,7 +183,7 @@ def test_a_point_behind_the_camera_throws_nothing() -> None:
     state = near_truth(problem, np.random.default_rng(0), 0.0)
     behind = State(state.world_T_imu, state.landmarks + problem.sequence.imu_T_cam[:3, 2] * -100.0)
     values = values_of(behind, problem, factors)
-    factor = factors.stereo(0, 0, problem.observations().pixel[0])
+    factor = factors.stereo(0, landmark_key(0), problem.observations().pixel[0])
     assert np.isfinite(factor.error(values))
     np.testing.assert_array_equal(factor.linearize(values).jacobian()[0], 0.0)
 

@@ -10,6 +10,7 @@ from fgbaseline import data, ekf, smoother
 from fgbaseline.data import Estimate, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.factors import Factors
+from fgbaseline.smoother.keys import landmark_key
 
 from .four_rows import State, cost, information
 from .synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
@@ -31,7 +32,7 @@ def batch(problem: Problem) -> State:
     )
     values = optimizer.optimize()
     poses = np.array([values.atPose3(gtsam.symbol("x", k)).matrix() for k in range(problem.n_frames)])
-    return State(poses, np.array([values.atPoint3(factors.key(int(j))) for j in problem.features]))
+    return State(poses, np.array([values.atPoint3(landmark_key(int(j))) for j in problem.features]))
 
 
 def state_of(estimate: Estimate) -> State:
@@ -130,8 +131,8 @@ def truncated(problem: Problem, frames: int) -> Problem:
 ONLINE = {
     "plain": (PROBLEMS["plain"], 0.1, 0.01),
     "drive": (replace(matched(drive(features_per_frame=30.0)), kernel=None), 0.1, 0.01),
-    # Under a kernel the weights of a frame's observations are those of its predicted pose until it is relinearised.
-    "drive, kernel": (matched(drive(features_per_frame=30.0)), 2.0, 0.4),
+    "kernel": (PROBLEMS["kernel"], 0.3, 0.1),
+    "drive, kernel": (matched(drive(features_per_frame=30.0)), 0.3, 0.1),
 }
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother.factors import Factors
 from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
-from fgbaseline.smoother.keys import pose_key
+from fgbaseline.smoother.keys import landmark_key, pose_key
 
 from .synthetic import Scene, plain_problem
 
@@ -34,10 +34,10 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     values.insert(pose_key(k), gtsam.Pose3(TRUTH.world_T_imu[k]))
     o = PROBLEM.observations()
     for i in np.flatnonzero(o.frame == k):
-        graph.push_back(FACTORS.stereo(k, int(o.landmark[i]), o.pixel[i]))
+        graph.push_back(FACTORS.stereo(k, landmark_key(int(o.landmark[i])), o.pixel[i]))
     if k == 0:
         for j, point in enumerate(TRUTH.landmarks):
-            values.insert(FACTORS.key(j), point)
+            values.insert(landmark_key(j), point)
     return graph, values
 
 
@@ -45,15 +45,15 @@ def behind_the_camera(isam: RestorableISAM2, k: int) -> None:
     """An update with a new landmark behind the camera, whose Jacobian is zero."""
     assert TRUTH is not None
     graph, values = frame(k)
-    graph.push_back(FACTORS.stereo(k, 99, np.array([600.0, 180.0, 590.0, 180.0])))
-    values.insert(FACTORS.key(99), (TRUTH.world_T_imu[k] @ PROBLEM.sequence.imu_T_cam @ [0.0, 0.0, -20.0, 1.0])[:3])
+    graph.push_back(FACTORS.stereo(k, landmark_key(99), np.array([600.0, 180.0, 590.0, 180.0])))
+    values.insert(landmark_key(99), (TRUTH.world_T_imu[k] @ PROBLEM.sequence.imu_T_cam @ [0.0, 0.0, -20.0, 1.0])[:3])
     isam.update(graph, values)
 
 
 def unknown_variable(isam: RestorableISAM2, k: int) -> None:
     """An update with a factor on a variable that is not there."""
     graph, values = frame(k)
-    graph.push_back(FACTORS.stereo(k, 98, np.array([600.0, 180.0, 590.0, 180.0])))
+    graph.push_back(FACTORS.stereo(k, landmark_key(98), np.array([600.0, 180.0, 590.0, 180.0])))
     isam.update(graph, values)
 
 
@@ -84,7 +84,7 @@ def test_the_failure_names_the_variable_where_gtsam_does() -> None:
     isam.update(*frame(0))
     with pytest.raises(IndeterminateSystemError) as caught:
         behind_the_camera(isam, 1)
-    assert caught.value.key == FACTORS.key(99)
+    assert caught.value.key == landmark_key(99)
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,0 +1,59 @@
+"""A path that fits the images piece by piece, from dead reckoning alone.
+
+Points triangulated along a long dead-reckoned path lie so badly where it bends wrongly that a descent from there is
+caught behind cameras and far from the minimum. Over a second the bend is small. So the path is cut into short pieces,
+each is solved on its own and put back together, then longer ones along what came out, until what is left is small.
+"""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+
+from .factors import HELD_SIGMA, Factors
+from .keys import landmark_key, pose_key
+from .starts import triangulated
+from .values import poses_of
+
+LENGTHS = (10, 40, 160)
+"""frames of a piece"""
+MIN_OBSERVATIONS = 2
+MAX_STEPS, RELATIVE_DECREASE = 15, 1e-3
+
+
+def piecewise(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
+    """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
+    factors, T = Factors(problem), problem.n_frames
+    for length in LENGTHS:
+        pieces = [_solved(factors, world_T_imu, a, min(a + length, T - 1)) for a in range(0, T - 1, length)]
+        steps = np.concatenate([se3.relative(piece) for piece in pieces])
+        world_T_imu = se3.compose(steps, world_T_imu[0])
+    return world_T_imu
+
+
+def _solved(factors: Factors, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
+    """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
+    everything = factors.problem.observations()
+    o = everything.select((everything.frame >= first) & (everything.frame <= last))
+    often = np.bincount(o.landmark) >= MIN_OBSERVATIONS
+    landmarks = triangulated(factors.problem, o.select(often[o.landmark]), world_T_imu)
+    o = o.select(np.isin(o.landmark, landmarks.index))
+    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    held = gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+    graph.push_back(gtsam.PriorFactorPose3(pose_key(first), gtsam.Pose3(world_T_imu[first]), held))
+    for k in range(first, last):
+        graph.push_back(factors.motion(k))
+    for k in range(first, last + 1):
+        values.insert(pose_key(k), gtsam.Pose3(world_T_imu[k]))
+    for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), pixel))
+    for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
+        values.insert(landmark_key(j), position)
+    params = gtsam.LevenbergMarquardtParams()
+    params.setMaxIterations(MAX_STEPS)
+    params.setRelativeErrorTol(RELATIVE_DECREASE)
+    try:
+        return poses_of(gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize(), range(first, last + 1))
+    except RuntimeError:
+        return world_T_imu[first : last + 1]

@@ -1,0 +1,31 @@
+"""Landmarks whose geometry came undone: a solution put them where a camera that saw them cannot see a point."""
+
+import numpy as np
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.observations import BoolArray, Observations
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+
+MIN_DEPTH = 0.3
+"""m; a landmark nearer to the plane of a camera that saw it, or behind it, makes a system indeterminate: its Jacobian
+is unbounded, or zero"""
+MIN_DISPARITY = 0.05
+"""px; so does one so far away that no step along its ray changes what the camera sees"""
+UNDONE = "it came to lie behind a camera that saw it, at its plane or at infinity"
+
+
+def undone(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> list[int]:
+    """The landmarks that are no point in front of every camera that saw them; each observation is of one of them."""
+    seen = seen_well(problem, o, world_T_imu, landmarks)
+    return [int(j) for j in np.unique(o.landmark[~seen])]
+
+
+def seen_well(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> BoolArray:
+    """(n,) whether each observation's landmark is in front of its camera, and not at infinity."""
+    camera = problem.sequence.camera
+    cam_T_world = se3.inverse(world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
+    points = landmarks.position[np.searchsorted(landmarks.index, o.landmark)]
+    depth = se3.transform(cam_T_world, points)[:, 2]
+    well: BoolArray = (depth > MIN_DEPTH) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
+    return well

@@ -1,0 +1,36 @@
+"""The graph of a whole problem at once: every pose, and the landmarks of the observations that take part."""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from .factors import Factors
+from .keys import landmark_key, pose_key
+
+
+def whole_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
+    """First pose, increments, every observation that takes part, and the priors of their landmarks."""
+    factors, graph = Factors(problem), gtsam.NonlinearFactorGraph()
+    graph.push_back(factors.first_pose())
+    for k in range(problem.n_frames - 1):
+        graph.push_back(factors.motion(k))
+    o = problem.observations()
+    for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), pixel))
+    if problem.landmark_prior is not None:
+        for j in np.unique(o.landmark).tolist():
+            graph.push_back(factors.landmark_prior(j, landmark_key(j)))
+    return graph
+
+
+def values_at(world_T_imu: FloatArray, landmarks: Landmarks) -> gtsam.Values:
+    """A state of that graph."""
+    values = gtsam.Values()
+    for k, pose in enumerate(world_T_imu):
+        values.insert(pose_key(k), gtsam.Pose3(pose))
+    for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
+        values.insert(landmark_key(j), position)
+    return values
