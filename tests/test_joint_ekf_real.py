@@ -73,20 +73,22 @@ def test_on_noisy_velocities_it_halves_the_error_of_dead_reckoning(recordings: R
 
 
 @pytest.mark.slow
-def test_with_noise_added_to_its_velocities_a_drive_is_estimated_as_well_as_without(recordings: Recordings) -> None:
+def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_textbook(recordings: Recordings) -> None:
     squares = []
     for name in UTIAS:
         sequence = noisy(data.read(recordings(f"utias/{name}.mat")))
         problem = data.calibrated(sequence)
-        estimate = ekf.joint_ekf(problem)
-        assert estimate.status is not Status.FAILED
-        squares.append((ate(estimate, sequence) ** 2, ate(ekf.dead_reckoning(problem), sequence) ** 2))
-    ours, reckoned = np.sqrt(np.mean(squares, axis=0))
-    assert ours < 0.6 * reckoned
+        answers = ekf.joint_ekf(problem), ekf.joint_ekf(problem, settings=JointSettings.textbook())
+        assert answers[0].status is not Status.FAILED
+        squares.append([ate(e, sequence) ** 2 for e in (*answers, ekf.dead_reckoning(problem))])
+    ours, textbook, reckoned = np.sqrt(np.mean(squares, axis=0))
+    assert ours < 0.8 * textbook
+    assert ours < 0.8 * reckoned
 
 
 def test_landmarks_that_come_back_are_the_same_landmarks(recordings: Recordings) -> None:
     problem = data.calibrated(data.read(recordings("utias/dataset3.mat")))
+    problem = replace(problem, pixel_variance=40.0)  # about what the recording comes with
     o = problem.observations()
     span = np.array([np.ptp(o.frame[o.landmark == j]) + 1 for j in problem.features])
     assert np.any(span > o.counts(problem.sequence.n_landmarks)[problem.features])
