@@ -52,11 +52,24 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     shifts = np.arange(-MAX_SHIFT, MAX_SHIFT + GRID / 2, GRID)
     clipped = np.clip(x[inside], -6 * np.std(x[inside], axis=0), 6 * np.std(x[inside], axis=0))
     correlation = np.array([np.sum(weight * clipped * spline(k[inside] + shift)) for shift in shifts])
-    peak = int(np.argmax(correlation))
+    peak = int(np.argmax(correlation - 0.5 * _energy(spline, k[inside], weight, shifts)))
     slope = spline(k[inside] + shifts[peak], 1)
     residual = x[inside] - spline(k[inside] + shifts[peak])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
-    information = float(np.sum(slope**2 / sigma**2))
-    deviation = INFLATION / np.sqrt(information) if information > 0 else np.inf
+    # The slope squared of a noisy signal is too large; its curvature against the other signal is not.
+    curvature = -float(np.sum(clipped * spline(k[inside] + shifts[peak], 2) / sigma**2))
+    deviation = INFLATION * float(np.sqrt(np.sum(slope**2 / sigma**2))) / curvature if curvature > 0 else np.inf
     at_edge = peak in (0, len(shifts) - 1)
     return Timing(float(shifts[peak]) * dt, deviation * dt, bool(deviation < NOT_KNOWN and not at_edge))
+
+
+def _energy(spline: CubicSpline, k: FloatArray, weight: FloatArray, shifts: FloatArray) -> FloatArray:
+    """(m,) sum of squares about the mean of what the cameras see at k + shift: a window that takes in a stronger turn
+    at one end correlates more there, whatever the shift is.
+
+    Interpolated between whole shifts, where the noise in it is the same for all; between samples the spline has less.
+    """
+    whole = np.arange(-np.ceil(MAX_SHIFT), np.ceil(MAX_SHIFT) + 1.0)
+    seen = np.array([spline(k + shift) for shift in whole])
+    energy = np.sum(weight * (seen - seen.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))
+    return np.asarray(CubicSpline(whole, energy)(shifts), dtype=np.float64)

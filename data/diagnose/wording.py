@@ -1,0 +1,53 @@
+"""Findings, and how figures stand in sentences."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from fgbaseline.geometry import FloatArray
+
+from ..observations import IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong with a recording."""
+
+    code: str
+    """by which programs know it, such as `gyro_bias`"""
+    sentence: str
+    """for people, with figures"""
+    before: float
+    """a figure of the recording as it is, in `unit`"""
+    after: float
+    """the same once it is repaired and masked; equal to `before` where nothing can be put right"""
+    unit: str
+    certainty: str
+    """how sure it is: a standard error, a lead in likelihood, or 'counted'"""
+
+
+def listed(words: Iterable[str]) -> str:
+    """'a, b and c'."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def vector(values: FloatArray, digits: int) -> str:
+    """'(0.10, -0.20, 0.30)'."""
+    return f"({', '.join(f'{value:.{digits}f}' for value in values)})"
+
+
+def plural(n: int, one: str, many: str = "") -> str:
+    """'1 frame', '1,009 frames'."""
+    return f"{n:,} {one if n == 1 else many or one + 's'}"
+
+
+def spans(frames: IntArray, most: int = 4) -> str:
+    """Runs of increasing indices, the longest first so many: '121-127, 150 and 3 more'; those 2 apart are one run."""
+    if len(frames) == 0:
+        return "none"
+    cuts = [0, *(i + 1 for i in range(len(frames) - 1) if frames[i + 1] - frames[i] > 2), len(frames)]
+    runs = [(int(frames[a]), int(frames[b - 1])) for a, b in pairwise(cuts)]
+    shown = sorted(sorted(runs, key=lambda run: run[0] - run[1])[:most])
+    text = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in shown)
+    return text + (f" and {len(runs) - most} more" if len(runs) > most else "")

@@ -1,0 +1,22 @@
+"""`fgbaseline diagnose`: what is wrong with a recording."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")
+@click.argument("sequence", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for diagnosis.json and figures.")
+@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier diagnosis.")
+def command(sequence: Path, out: Path | None, as_json: bool, force: bool) -> int:
+    """Find what is wrong with SEQUENCE: axes, bias, delay, scale, extrinsic, tracks; and how large its noise is.
+
+    From the recording alone: ground truth in it is not looked at. `fgbaseline run` repairs what is found here.
+
+    Exits 0 when the recording is clean, 1 with findings, 2 when it cannot tell, and on bad input.
+    """
+    from ..diagnosing import tell
+
+    return tell(sequence, out, as_json=as_json, force=force)

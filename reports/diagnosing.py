@@ -1,0 +1,115 @@
+"""What a person sees of a diagnosis: a table of findings, what cannot be told, the noise, and a folder if wanted."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from fgbaseline.data import Diagnosis, diagnose, read
+from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
+from fgbaseline.geometry import InputError
+
+from .whole_folder import require_free, whole_folder
+
+MARK = "diagnosis.json"
+"""the file by which a diagnosis's folder is known"""
+CLEAN, FINDINGS, CANNOT_TELL = 0, 1, 2
+UNWRAPPED = 120
+"""columns of the table where no terminal says how many there are"""
+
+
+def tell(path: Path, out: Path | None, *, as_json: bool, force: bool) -> int:
+    """Diagnoses a recording and says what was found; gives the exit code."""
+    if force and out is None:
+        raise InputError("force: there is no folder to replace; add --out DIR")
+    if out is not None:
+        require_free(out, force=force, mark=MARK)
+    diagnosis = diagnose(read(path))
+    tracks = track_state(diagnosis)
+    findings = findings_of(diagnosis, tracks)
+    report = to_json(diagnosis, tracks, findings)
+    if out is not None:
+        with whole_folder(out, force=force, mark=MARK) as folder:
+            write(diagnosis, tracks, report, folder)
+    if as_json:
+        click.echo(text(report), nl=False)
+    else:
+        _print(diagnosis, findings)
+        if out is not None:
+            click.echo(f"\nThe evidence is in {out}")
+    if diagnosis.cannot_tell:
+        return CANNOT_TELL
+    return FINDINGS if findings else CLEAN
+
+
+def write(diagnosis: Diagnosis, tracks: Tracks, report: dict[str, Any], folder: Path) -> None:
+    """diagnosis.json and the figures, into an existing, empty folder."""
+    (folder / MARK).write_text(text(report), encoding="utf-8")
+
+
+def text(report: dict[str, Any]) -> str:
+    """The file, to the byte the same for the same diagnosis."""
+    return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
+    sequence = diagnosis.sequence
+    click.echo(
+        f"{sequence.name}: {sequence.n_frames:,} frames, {len(sequence.observations):,} observations of "
+        f"{len(np.unique(sequence.observations.landmark)):,} tracks"
+    )
+    if diagnosis.cannot_tell:
+        click.echo(f"Cannot tell what is wrong with its velocities: {diagnosis.cannot_tell}.")
+    if findings:
+        _table(findings)
+    elif not diagnosis.cannot_tell:
+        click.echo("Nothing wrong was found.")
+    unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
+    if unknown:
+        click.echo("\nNot identifiable in this recording:")
+        for sentence in unknown:
+            click.echo(f"- {sentence}")
+    if diagnosis.fit is not None:
+        click.echo(f"\n{noise(diagnosis)}")
+
+
+def noise(diagnosis: Diagnosis) -> str:
+    """The noise that was found, in a sentence."""
+    fit = diagnosis.fit
+    assert fit is not None
+    sigma = fit.sigmas
+    return (
+        f"Noise (one sigma): {sigma.linear:.3f} m/s and {sigma.angular:.4f} rad/s of a velocity held over an interval, "
+        f"{sigma.pixel:.2f} px of a pixel row ({fit.white_pixel:.2f} px from frame to frame, "
+        f"{fit.track_inflation:.1f} times that because the errors of a track last)."
+    )
+
+
+def _table(findings: tuple[Finding, ...]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0))
+    for title in ("finding", "what was found", "before", "after"):
+        table.add_column(title, justify="right" if title in ("before", "after") else "left", overflow="fold")
+    for f in findings:
+        sentence = f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"
+        table.add_row(f.code, sentence, *figures_of(f))
+    console = Console()
+    Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False).print(table)
+
+
+def figures_of(finding: Finding) -> tuple[str, str]:
+    """Before and after, the unit with the first."""
+    before, after = (_number(value, finding.unit) for value in (finding.before, finding.after))
+    return before, after
+
+
+def _number(value: float, unit: str) -> str:
+    if unit.startswith("share"):
+        return f"{value:.1%}"
+    if unit in ("m/s", "rad/s"):
+        return f"{value:.3g} {unit}"
+    return f"{value:,.4g}" if abs(value) < 1e4 else f"{value:,.0f}"
