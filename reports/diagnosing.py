@@ -46,6 +46,11 @@ def tell(path: Path, out: Path | None, *, as_json: bool, force: bool) -> int:
 
 def write(diagnosis: Diagnosis, tracks: Tracks, report: dict[str, Any], folder: Path) -> None:
     """diagnosis.json and the figures, into an existing, empty folder."""
+    from . import figures
+    from .figures.diagnosis import draw_diagnosis
+
+    (folder / "figures").mkdir()
+    figures.save(draw_diagnosis(diagnosis, tracks), folder / "figures")
     (folder / MARK).write_text(text(report), encoding="utf-8")
 
 

@@ -1,7 +1,7 @@
 """In which axes were the velocities recorded? Every right-handed convention against what the cameras see."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,6 +40,8 @@ class Axes:
     """median error against the cameras as recorded, m/s or rad/s"""
     after: float
     """and in this convention"""
+    scores: dict[str, float] = field(default_factory=dict)
+    """log-likelihood of each of the 24 conventions, at its best lag"""
 
     @property
     def matrix(self) -> FloatArray:
@@ -142,4 +144,4 @@ def _decided(
         difference = seen[known] - recorded[known] @ axes_matrix(convention).T
         return float(np.median(np.linalg.norm(difference, axis=1)))
 
-    return Axes(name, (bool(axes[0]), bool(axes[1]), bool(axes[2])), lead, error(IDENTITY), error(name))
+    return Axes(name, (bool(axes[0]), bool(axes[1]), bool(axes[2])), lead, error(IDENTITY), error(name), scores)

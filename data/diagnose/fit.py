@@ -27,6 +27,9 @@ LOOSE = 30.0
 """times the velocity noise, with which each half of the tracks is fitted: the cameras decide"""
 MIN_HALF = 8
 """landmarks"""
+MIN_REDUNDANCY = 0.05
+"""of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
+its residual is no evidence of noise"""
 MIN_UNBROKEN = 5
 """intervals"""
 
@@ -46,6 +49,9 @@ class Fit:
     of a track last, so that averaging over it helps less than for white noise"""
     white_pixel: float
     """px, of the pixel residuals within a window; `sigmas.pixel` is this times the inflation"""
+    motion: FloatArray
+    """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
+    unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
 
 
 def chains(odometry: Odometry, landmark: IntArray, frame: IntArray) -> IntArray:
@@ -87,7 +93,10 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     unbroken = _windows(sequence, odometry, twist, _unbroken(odometry))
     inflation = _track_inflation(sequence, unbroken, shared_mean, sigmas)
     effective = replace(sigmas, pixel=sigmas.pixel * inflation)
-    return Fit(effective, shared_mean, deviation, len(fits), inflation, sigmas.pixel)
+    residual = np.concatenate([fit.motion_residual for fit in fits]) / np.repeat([sigmas.linear, sigmas.angular], 3)
+    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
+    motion = np.where(redundancy > MIN_REDUNDANCY, residual / np.sqrt(np.maximum(redundancy, MIN_REDUNDANCY)), np.nan)
+    return Fit(effective, shared_mean, deviation, len(fits), inflation, sigmas.pixel, motion)
 
 
 Span = tuple[int, int]
@@ -142,8 +151,10 @@ def _windows(
 
 def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
     residual = np.concatenate([fit.motion_residual for fit in fits])
-    redundancy = np.maximum(np.concatenate([fit.motion_redundancy for fit in fits]), 1e-3)
-    variance = np.median(residual**2 / redundancy, axis=0) / CHI_SQUARE_MEDIAN
+    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
+    told = redundancy > MIN_REDUNDANCY
+    share = np.where(told, residual**2 / np.maximum(redundancy, MIN_REDUNDANCY), np.nan)
+    variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if told.any(axis=0).all() else np.zeros(6)
     pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
     return Sigmas(
         pixel=max(0.02, sigmas.pixel * float(np.sqrt(pixel))),

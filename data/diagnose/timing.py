@@ -1,6 +1,6 @@
 """When was a velocity valid? The shift between velocities and images, from the turns that both show."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,6 +11,10 @@ from ..observations import BoolArray
 
 MAX_SHIFT = 3.0
 """frames"""
+ENOUGH = 5.0
+"""log-likelihood by which the shift must lead those more than an interval away"""
+LONGEST_GAP = 2
+"""intervals without a motion that may be bridged"""
 GRID = 0.02
 """frames"""
 NOT_KNOWN = 0.2
@@ -19,7 +23,7 @@ INFLATION = 2.0
 """of the standard error: residuals of neighbouring frames are correlated"""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class Timing:
     """The shift of the velocities."""
 
@@ -28,6 +32,10 @@ class Timing:
     deviation: float
     """s, its standard error"""
     identifiable: bool
+    shifts: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(m,) intervals: those tried"""
+    agreement: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(m,) share of the variance of what the cameras see that the recorded rates explain at each"""
 
 
 def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) -> Timing:
@@ -40,11 +48,10 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     k = np.arange(len(seen), dtype=np.float64)
     if known.sum() < 20:
         return Timing(0.0, np.inf, identifiable=False)
-    spline = CubicSpline(k[known], seen[known] - seen[known].mean(axis=0), axis=0, extrapolate=False)
-    near = np.interp(k, k[known], k[known]) - k
-    inside = known & (np.abs(near) < 0.5)
-    margin = int(np.ceil(MAX_SHIFT)) + 1
-    inside[:margin] = inside[-margin:] = False
+    inside = known & _surrounded(known)
+    if inside.sum() < 20:
+        return Timing(0.0, np.inf, identifiable=False)
+    spline = CubicSpline(k[known], _moderate(seen, recorded, known), axis=0, extrapolate=False)
     x = recorded - recorded[inside].mean(axis=0)
     residual = x[inside] - spline(k[inside])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
@@ -52,15 +59,42 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     shifts = np.arange(-MAX_SHIFT, MAX_SHIFT + GRID / 2, GRID)
     clipped = np.clip(x[inside], -6 * np.std(x[inside], axis=0), 6 * np.std(x[inside], axis=0))
     correlation = np.array([np.sum(weight * clipped * spline(k[inside] + shift)) for shift in shifts])
-    peak = int(np.argmax(correlation - 0.5 * _energy(spline, k[inside], weight, shifts)))
+    energy = _energy(spline, k[inside], weight, shifts)
+    score = correlation - 0.5 * energy
+    peak = int(np.argmax(score))
     slope = spline(k[inside] + shifts[peak], 1)
     residual = x[inside] - spline(k[inside] + shifts[peak])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
-    # The slope squared of a noisy signal is too large; its curvature against the other signal is not.
+    # From each sample's pull on the shift, outliers included (White 1980). The slope squared of a noisy signal is too
+    # large as an information; its curvature against the other signal is not.
+    pull = (residual - np.median(residual, axis=0)) * slope / sigma**2
     curvature = -float(np.sum(clipped * spline(k[inside] + shifts[peak], 2) / sigma**2))
-    deviation = INFLATION * float(np.sqrt(np.sum(slope**2 / sigma**2))) / curvature if curvature > 0 else np.inf
+    deviation = INFLATION * float(np.sqrt(np.sum(pull**2))) / curvature if curvature > 0 else np.inf
     at_edge = peak in (0, len(shifts) - 1)
-    return Timing(float(shifts[peak]) * dt, deviation * dt, bool(deviation < NOT_KNOWN and not at_edge))
+    lead = float(score[peak] - score[np.abs(shifts - shifts[peak]) > 1.0].max())
+    identifiable = bool(deviation < NOT_KNOWN and lead > ENOUGH and not at_edge)
+    return Timing(float(shifts[peak]) * dt, deviation * dt, identifiable, shifts, 2.0 * score / energy)
+
+
+def _surrounded(known: BoolArray) -> BoolArray:
+    """(n,) intervals that have no long gap, and no end, within reach of any shift."""
+    margin = int(np.ceil(MAX_SHIFT)) + 1
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], known, [True]]).astype(np.int8)))
+    good = np.ones(len(known), dtype=np.bool_)
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - start > LONGEST_GAP or start == 0 or end == len(known):
+            good[max(0, start - margin) : end + margin] = False
+    good[:margin] = good[-margin:] = False
+    return good
+
+
+def _moderate(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> FloatArray:
+    """(m, c) what the cameras see at the known intervals, about its mean, no farther out than the velocities go."""
+    x = recorded[known] - np.median(recorded[known], axis=0)
+    y = seen[known] - np.median(seen[known], axis=0)
+    reach = np.abs(x).max(axis=0) + 3.0 * 1.4826 * np.median(np.abs(y - x), axis=0)
+    y = np.clip(y, -reach, reach)
+    return np.asarray(y - y.mean(axis=0), dtype=np.float64)
 
 
 def _energy(spline: CubicSpline, k: FloatArray, weight: FloatArray, shifts: FloatArray) -> FloatArray:

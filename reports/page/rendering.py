@@ -28,6 +28,7 @@ REASONS: Mapping[str, str] = {
     "short": "what is left of its track is too short to check",
     "geometry": "its point is not determined, or lies behind a camera",
     "moving": "its point moved",
+    "copied": "it is a copy of the frame before and was never tracked",
 }
 
 

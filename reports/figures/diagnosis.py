@@ -1,0 +1,205 @@
+"""The evidence of a diagnosis: what the cameras see beside what was recorded, and how the answers were chosen."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fgbaseline.data import Diagnosis
+from fgbaseline.data.axes import IDENTITY
+from fgbaseline.data.diagnose import Tracks
+from fgbaseline.data.diagnose.diagnosis import turned
+from fgbaseline.data.diagnose.repair import sure_bias
+from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.geometry import FloatArray
+
+from .drawing import lay_out
+from .style import head, in_style, note, sheet, swatch
+
+SEEN, RECORDED, REPAIRED, WRONG, COPIED = "#111111", "#D55E00", "#0072B2", "#c0392b", "#E69F00"
+"""the cameras, the recording and what the repair makes of it"""
+SMOOTH = 1.0
+"""s over which rates are averaged, so that the noise of one frame does not hide the rest"""
+BINS = np.linspace(-5.0, 5.0, 61)
+
+
+def draw_diagnosis(diagnosis: Diagnosis, tracks: Tracks) -> dict[str, Figure]:
+    """The figures of a diagnosis by name; those for which it has nothing to show are missing."""
+    figures: dict[str, Figure] = {}
+    with in_style():
+        if diagnosis.odometry is not None and diagnosis.fit is not None:
+            figures["angular_rates"] = angular_rates(diagnosis)
+            figures["conventions"] = conventions(diagnosis)
+            if len(diagnosis.timing.shifts):
+                figures["delay"] = delay(diagnosis)
+            figures["velocity_residuals"] = velocity_residuals(diagnosis)
+        figures["tracks"] = matches_over_time(diagnosis, tracks)
+        for figure in figures.values():
+            lay_out(figure)
+    return figures
+
+
+def angular_rates(diagnosis: Diagnosis) -> Figure:
+    """What the cameras see, what was recorded and what the repair makes of it, about each axis of imu_T_cam."""
+    assert diagnosis.odometry is not None
+    sequence, odometry = diagnosis.sequence, diagnosis.odometry
+    bias = sure_bias(diagnosis)
+    recorded = held_twist(sequence, Shift.AFTER)[:, 3:]
+    repaired = held_twist(sequence, diagnosis.shift)
+    repaired[:, 3:] -= bias
+    repaired = turned(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
+    seen = odometry.twist(sequence.dt)[:, 3:]
+    t = sequence.t[:-1] - sequence.t[0]
+    width = max(1, round(SMOOTH / float(np.median(sequence.dt))))
+    figure, axes = sheet(6.4, 3)
+    changed = diagnosis.angular.changed or bool(bias.any()) or diagnosis.shift != 0.0
+    handles: list[Any] = []
+    for i, axis in enumerate(axes):
+        known = odometry.known
+        values = smoothed(np.where(known, seen[:, i], np.nan), width)
+        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="seen by the cameras", zorder=2)
+        lines += axis.plot(t, smoothed(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
+        if changed:
+            lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
+        axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
+        before, after = (median_error(seen[known, i], r[known, i]) for r in (recorded, repaired))
+        note(axis, f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else ""))
+        handles = handles or lines
+    axes[-1].set_xlabel("time, s")
+    axes[-1].set_xlim(0.0, float(t[-1]))
+    figure.align_ylabels(axes)
+    head(figure, f"Angular velocity about the axes of imu_T_cam, averaged over {SMOOTH:g} s", handles)
+    return figure
+
+
+def conventions(diagnosis: Diagnosis) -> Figure:
+    """By how much each of the 24 conventions falls behind the best, in log-likelihood, for both velocities."""
+    figure = Figure(figsize=(8.0, 5.0))
+    panels = figure.subplots(1, 2)
+    for panel, which, axes in zip(panels, ("angular", "linear"), (diagnosis.angular, diagnosis.linear), strict=True):
+        ranked = sorted(axes.scores, key=lambda name: -axes.scores[name])
+        best = axes.scores[ranked[0]]
+        behind = [best - axes.scores[name] for name in ranked]
+        colours = [REPAIRED if n == axes.name else RECORDED if n == IDENTITY else "#b8c4d0" for n in ranked]
+        rows = np.arange(len(ranked))
+        panel.barh(rows, behind, color=colours, height=0.75)
+        panel.plot(
+            [0.0] * sum(b == 0 for b in behind), [i for i, b in enumerate(behind) if b == 0], ".", color="#333333"
+        )
+        panel.set_yticks(rows, ranked, fontsize=7.5)
+        for label, name in zip(panel.get_yticklabels(), ranked, strict=True):
+            if name in (axes.name, IDENTITY):
+                label.set_color(REPAIRED if name == axes.name else RECORDED)
+                label.set_fontweight("bold")
+        panel.invert_yaxis()
+        panel.grid(axis="y", visible=False)
+        unseen = [n for n, s in zip("xyz", axes.seen, strict=True) if not s]
+        panel.set_title(f"{which} velocity" + (f" ({', '.join(unseen)} not identifiable)" if unseen else ""))
+        panel.set_xlabel("behind the best, log-likelihood")
+    names = "found" if diagnosis.angular.changed or diagnosis.linear.changed else "found: as recorded"
+    handles = [swatch(REPAIRED, names), swatch(RECORDED, "as recorded"), swatch("#b8c4d0", "others")]
+    head(figure, "Which of the 24 axis conventions agrees with the cameras", handles)
+    return figure
+
+
+def delay(diagnosis: Diagnosis) -> Figure:
+    """How well the recorded rates agree with the cameras at each shift in time."""
+    timing = diagnosis.timing
+    dt = float(np.median(diagnosis.sequence.dt))
+    figure, (axes,) = sheet(3.6)
+    axes.plot(timing.shifts, 100.0 * timing.agreement, color=REPAIRED, linewidth=1.8)
+    best = timing.shift / dt
+    handles: list[Any] = []
+    if timing.identifiable:
+        spread = timing.deviation / dt
+        handles.append(axes.axvspan(best - 2 * spread, best + 2 * spread, color="#cfe3f2", label="two standard errors"))
+        handles.append(axes.axvline(best, color=REPAIRED, linewidth=1.0, label=f"found: {best:+.2f} intervals"))
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.22 * (high - low))
+    usual = ((Shift.AFTER, "interval after"), (Shift.MIDDLE, "instant of the frame"), (Shift.BEFORE, "interval before"))
+    for row, (shift, text) in enumerate(usual):
+        axes.axvline(shift, color="#888888", linewidth=0.9, linestyle=":")
+        axes.text(
+            shift,
+            0.99 - 0.06 * row,
+            f" {text}",
+            transform=axes.get_xaxis_transform(),
+            va="top",
+            fontsize=8,
+            color="#555555",
+        )
+    axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
+    axes.set_ylabel("agreement, % of the variance")
+    title = "When the recorded rates agree with what the cameras see"
+    head(figure, title if timing.identifiable else f"{title}: no shift stands out", handles)
+    return figure
+
+
+def velocity_residuals(diagnosis: Diagnosis) -> Figure:
+    """Residuals of the velocities in the windows' fits, over the noise that was found, beside a normal distribution."""
+    assert diagnosis.fit is not None
+    fit = diagnosis.fit
+    figure = Figure(figsize=(8.0, 4.6))
+    panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
+    bell = np.exp(-0.5 * BINS**2) / np.sqrt(2.0 * np.pi)
+    handles: list[Any] = []
+    for i, panel in enumerate(panels):
+        values = fit.motion[np.isfinite(fit.motion[:, i]), i]
+        panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color="#b8c4d0")
+        handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="what the noise found predicts")
+        beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
+        panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {beyond:.1%} beyond 3 sigma")
+    for panel in panels[3:]:
+        panel.set_xlabel("residual, sigmas")
+    for panel in panels[::3]:
+        panel.set_ylabel("density")
+    sigma = fit.sigmas
+    title = f"Residuals of the velocities over the noise found: {sigma.linear:.3f} m/s, {sigma.angular:.4f} rad/s"
+    head(figure, title, [swatch("#b8c4d0", f"{len(fit.motion):,} intervals"), *handles])
+    return figure
+
+
+def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
+    """The features of each frame, and the share of its matches that contradict the motion."""
+    sequence = diagnosis.sequence
+    t = sequence.t - sequence.t[0]
+    figure, (upper, lower) = sheet(5.0, 2)
+    handles: list[Any] = list(upper.plot(t, tracks.usable, color="#555555", linewidth=1.0, label="usable features"))
+    upper.set_ylabel("features per frame")
+    upper.set_ylim(bottom=0)
+    lower.bar(t[:-1], 100.0 * np.nan_to_num(tracks.wrong_share), sequence.dt, align="edge", color=WRONG)
+    handles.append(swatch(WRONG, "matches that contradict the motion of their frame"))
+    copied = np.flatnonzero(diagnosis.repeated) + 1
+    if len(copied):
+        _mark(upper, t[copied], COPIED, 0.0)
+        handles.append(swatch(COPIED, f"{len(copied)} copied frames"))
+    few = np.flatnonzero(tracks.few)
+    if len(few):
+        _mark(upper, t[few], WRONG, 0.94)
+    lower.set_ylabel("wrong matches, %")
+    lower.set_ylim(bottom=0)
+    lower.set_xlabel("time, s")
+    lower.set_xlim(0.0, float(t[-1]))
+    figure.align_ylabels([upper, lower])
+    head(figure, "Tracks: how many, how many wrong, and when they were copied", handles)
+    return figure
+
+
+def smoothed(values: FloatArray, width: int) -> FloatArray:
+    """(n,) the mean over a window of so many; NaN takes no part, and stays where it fills the window."""
+    kernel = np.ones(width)
+    known = np.isfinite(values)
+    total = np.convolve(np.where(known, values, 0.0), kernel, "same")
+    count = np.convolve(known.astype(np.float64), kernel, "same")
+    return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+
+
+def median_error(seen: FloatArray, recorded: FloatArray) -> float:
+    """Of one axis."""
+    return float(np.median(np.abs(seen - recorded)))
+
+
+def _mark(axes: Axes, t: FloatArray, colour: str, height: float) -> None:
+    """Ticks along the lower or upper edge of a panel."""
+    axes.vlines(t, height, height + 0.06, transform=axes.get_xaxis_transform(), color=colour, linewidth=1.0, zorder=3)

@@ -1,0 +1,183 @@
+"""The parts of the diagnosis: derivatives, redundancy, regression, timing, split tracks, held velocities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+from fgbaseline.data import Excluded, Observations
+from fgbaseline.data.diagnose.links import three_rows
+from fgbaseline.data.diagnose.regression import regress
+from fgbaseline.data.diagnose.timing import timing
+from fgbaseline.data.diagnose.window import (
+    HUBER,
+    SHARED,
+    SHARED_PRIOR,
+    Sigmas,
+    WindowData,
+    WindowFit,
+    _motion_terms,
+    _pixel_terms,
+    fit_window,
+)
+from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.track_mask import MaskSettings, exclusions, split_tracks
+from fgbaseline.geometry import FloatArray, se3
+
+from .synthetic import Scene
+
+SIGMAS = Sigmas(0.5, 0.1, 0.01)
+
+
+def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArray, FloatArray]:
+    """A scene, its data, and poses and points a little off the truth."""
+    scene = Scene(frames=frames, seed=seed)
+    sequence = scene.sequence()
+    o, truth = sequence.observations, sequence.truth
+    assert truth is not None
+    assert truth.landmarks is not None
+    data = WindowData(o.frame, o.landmark, three_rows(o.pixel), held_twist(sequence), sequence.dt)
+    random = np.random.default_rng(seed)
+    off = 0.01 * random.normal(size=(frames, 6))
+    off[0] = 0.0
+    return scene, data, truth.world_T_imu @ se3.exp(off), truth.landmarks + 0.05 * random.normal(size=(12, 3))
+
+
+def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
+    scene, data, poses, points = window()
+    sequence = scene.sequence()
+    fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, SIGMAS, np.zeros(SHARED), iterations)
+    return fit, data
+
+
+def moved(poses: FloatArray, k: int, axis: int, step: float) -> FloatArray:
+    delta = np.zeros(6)
+    delta[axis] = step
+    poses = poses.copy()
+    poses[k] = poses[k] @ se3.exp(delta)
+    return poses
+
+
+def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -> None:
+    scene, data, poses, points = window()
+    sequence, h = scene.sequence(), 1e-6
+    shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015])
+    cam_T_imu = se3.inverse(sequence.imu_T_cam)
+    _, before, after, by_shared = _motion_terms(data, poses, SIGMAS, shared)
+    _, by_pose, by_point, _ = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, 0.5)
+
+    def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
+        return _motion_terms(data, p, SIGMAS, s)[0]
+
+    def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
+        return _pixel_terms(sequence.camera, cam_T_imu, data, p, x, 0.5)[0]
+
+    k = 3
+    for axis in range(6):
+        ahead, behind = moved(poses, k, axis, h), moved(poses, k, axis, -h)
+        difference = -(motion(ahead) - motion(behind)) / (2 * h)
+        assert np.allclose(difference[k - 1], after[k - 1, :, axis], atol=2e-3 * np.abs(after[k - 1]).max())
+        assert np.allclose(difference[k], before[k, :, axis], atol=2e-3 * np.abs(before[k]).max())
+        seen = data.frame == k
+        difference = -(pixel(ahead, points) - pixel(behind, points))[seen] / (2 * h)
+        assert np.allclose(difference, by_pose[seen, :, axis], rtol=1e-4, atol=1e-3)
+    for i in range(SHARED):
+        step = h * np.eye(SHARED)[i]
+        difference = -(motion(poses, shared + step) - motion(poses, shared - step)) / (2 * h)
+        assert np.allclose(difference, by_shared[:, :, i], atol=2e-2 * np.abs(by_shared).max())
+    for i in range(3):
+        step = h * np.eye(3)[i]
+        difference = -(pixel(poses, points + step) - pixel(poses, points - step)) / (2 * h)
+        assert np.allclose(difference, by_point[:, :, i], rtol=1e-4, atol=1e-3)
+
+
+def test_a_window_ends_where_scipy_ends() -> None:
+    fit, data = fitted()
+    sequence = window()[0].sequence()
+    cam_T_imu, W, m = se3.inverse(sequence.imu_T_cam), len(fit.poses), len(fit.points)
+    root = np.sqrt(np.diag(SHARED_PRIOR))
+
+    def residual(x: FloatArray) -> FloatArray:
+        poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
+        points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
+        shared = fit.shared + x[-SHARED:]
+        r = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, SIGMAS.pixel)[0]
+        norm = np.linalg.norm(r, axis=1)
+        beyond = np.maximum(norm, HUBER)  # the squared norm becomes Huber's cost
+        r = r * np.sqrt(2.0 * HUBER * beyond - HUBER**2)[:, None] / beyond[:, None]
+        return np.concatenate([r.ravel(), _motion_terms(data, poses, SIGMAS, shared)[0].ravel(), root * shared])
+
+    start = np.zeros(6 * (W - 1) + 3 * m + SHARED)
+    best = least_squares(residual, start, x_scale="jac")
+    cost = 0.5 * float(np.sum(residual(start) ** 2))
+    assert best.cost <= cost * (1 + 1e-9)
+    assert cost - best.cost < 1e-3
+
+
+def test_redundancies_add_up_to_the_degrees_of_freedom() -> None:
+    fit, data = fitted()
+    assert ((fit.motion_redundancy > 0.0) & (fit.motion_redundancy < 1.0)).all()
+    rows = 3 * len(data.frame) + 6 * len(data.dt)
+    unknowns = 6 * len(data.dt) + 3 * len(fit.points) + SHARED
+    assert fit.degrees_of_freedom + fit.motion_redundancy.sum() == pytest.approx(rows - unknowns)
+
+
+@given(st.integers(0, 1000))
+def test_a_regression_ignores_a_fifth_of_outliers(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    theta = random.normal(size=2)
+    X = random.normal(size=(400, 3, 2))
+    y = X @ theta + 0.1 * random.normal(size=(400, 3))
+    y[:80] += random.choice([-5.0, 5.0], size=(80, 3))
+    fit = regress(y, X, np.array([10.0, 10.0]))
+    assert np.abs(fit.theta - theta).max() < 6.0 * np.sqrt(np.diag(fit.covariance)).max()
+    assert (np.abs(fit.sigma / 0.1 - 1.0) < 0.6).all()
+
+
+@given(st.floats(-2.0, 2.0), st.integers(0, 100))
+def test_the_delay_of_a_shifted_signal_is_found(shift: float, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    k = np.arange(300.0)
+    signal = CubicSpline(np.arange(-30.0, 340.0, 5.0), random.normal(size=(74, 3)))
+    seen = signal(k) + 0.02 * random.normal(size=(300, 3))
+    recorded = signal(k + shift) + 0.02 * random.normal(size=(300, 3))
+    found = timing(seen, recorded, np.ones(300, dtype=np.bool_), 0.1)
+    assert found.identifiable
+    assert abs(found.shift / 0.1 - shift) < 0.1
+
+
+def test_noise_has_no_delay() -> None:
+    random = np.random.default_rng(0)
+    seen, recorded = random.normal(size=(2, 200, 3))
+    assert not timing(seen, recorded, np.ones(200, dtype=np.bool_), 0.1).identifiable
+
+
+def test_held_velocities_at_the_usual_shifts() -> None:
+    sequence = Scene(frames=8).sequence()
+    u = np.concatenate([sequence.linear_velocity, sequence.angular_velocity], axis=1)
+    assert np.array_equal(held_twist(sequence, Shift.AFTER), u[:-1])
+    assert np.array_equal(held_twist(sequence, Shift.BEFORE), u[1:])
+    assert np.allclose(held_twist(sequence, Shift.MIDDLE), 0.5 * (u[:-1] + u[1:]))
+
+
+def test_a_track_that_jumps_is_cut_and_both_pieces_take_part() -> None:
+    scene = Scene(frames=12, sigma_pixel=0.1).sequence()
+    assert scene.truth is not None
+    o = scene.observations
+    pixel: FloatArray = o.pixel.copy()
+    late = (o.landmark == 3) & (o.frame >= 7)
+    other = (o.landmark == 5) & (o.frame >= 7)
+    pixel[late] = pixel[other]
+    jumped = replace(scene, observations=Observations(o.frame.copy(), o.landmark.copy(), pixel))
+    nobody = np.zeros(len(o), dtype=np.bool_)
+    split = split_tracks(jumped, scene.truth.world_T_imu, MaskSettings(), nobody)
+    assert split.n_landmarks == scene.n_landmarks + 1
+    assert (split.excluded == Excluded.NO).all()
+    assert (split.landmark[late] == scene.n_landmarks).all()
+    assert np.array_equal(split.landmark[~late], o.landmark[~late])
+    longest_only = exclusions(jumped, scene.truth.world_T_imu, MaskSettings())
+    assert (longest_only[late] == Excluded.PREDICTION).all()
