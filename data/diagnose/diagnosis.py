@@ -75,8 +75,11 @@ def diagnose(sequence: Sequence) -> Diagnosis:
     """Finds axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth."""
     if len(sequence.observations) == 0:
         return Diagnosis(sequence, "the recording has no observations")
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnose(sequence)
+    try:
+        with threadpool_limits(limits=1, user_api="blas"):
+            return _diagnose(sequence)
+    except (np.linalg.LinAlgError, ValueError, FloatingPointError) as error:
+        return Diagnosis(sequence, f"its computation failed ({type(error).__name__}: {error})")
 
 
 def _diagnose(sequence: Sequence) -> Diagnosis:
