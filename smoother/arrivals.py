@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray
 
 from .arrival import Arrival
 from .factors import Factors
-from .pose_guess import corrected, predicted
+from .pose_guess import corrected
 from .waiting import EntryRule, WaitingLandmarks
 
 
@@ -23,8 +23,7 @@ class Arrivals:
         self.factors = Factors(problem)
         self.waiting = WaitingLandmarks(problem, self.observations, rule)
         self.path = np.full((problem.n_frames, 4, 4), np.nan)
-        """world_T_imu as known online; whoever solves fills it, with the next two"""
-        self.covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        """world_T_imu as known online; whoever solves fills it, and `position`"""
         self.position: dict[int, FloatArray] = {}
         """of each landmark that ever was in the graph, at the frame that saw it last"""
 
@@ -45,12 +44,11 @@ class Arrivals:
     def _guess(self, k: int, seen: dict[int, int]) -> FloatArray:
         if k == 0:
             return self.problem.initial_pose
-        step = self.factors.steps[k - 1]
-        pose, covariance = predicted(self.problem, step, k - 1, self.path[k - 1], self.covariance[k - 1])
+        pose: FloatArray = self.path[k - 1] @ self.factors.steps[k - 1]
         if not seen:
             return pose
         points = np.array([self.position[j] for j in seen])
-        return corrected(self.problem, pose, covariance, points, self.observations.pixel[list(seen.values())])
+        return corrected(self.problem, k, pose, points, self.observations.pixel[list(seen.values())])
 
     def landmarks_seen(self, observed: range) -> IntArray:
         """The landmarks of a frame's observations."""

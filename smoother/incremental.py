@@ -54,6 +54,7 @@ class IncrementalSmoother:
         self.isam = RestorableISAM2(settings.params())
         self.problem = problem
         self.arrivals = Arrivals(problem, settings.entry)
+        self.online_covariance = np.full((problem.n_frames, 6, 6), np.nan)
         self.key: dict[int, int] = {}
         """of each landmark in the graph"""
         self._slots: dict[int, dict[int, int]] = {}
@@ -81,7 +82,7 @@ class IncrementalSmoother:
         self.events += events
         tree = self.isam.tree
         self.arrivals.path[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
-        self.arrivals.covariance[k] = reordered(tree.marginalCovariance(pose_key(k)))
+        self.online_covariance[k] = reordered(tree.marginalCovariance(pose_key(k)))
         for j in self.arrivals.landmarks_seen(observed).tolist():
             if j in self.key:
                 self.arrivals.position[j] = tree.calculateEstimatePoint3(self.key[j])

@@ -50,7 +50,7 @@ class RestorableISAM2:
             self.tree = gtsam.ISAM2(self._copy)
             for past in self._since_copy:
                 _apply(self.tree, past)
-            raise IndeterminateSystemError(_named_variable(str(error)), str(error)) from error
+            raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
         self._since_copy.append(step)
         return result
 
@@ -59,6 +59,7 @@ def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
     return tree.update(step.factors, step.values, list(step.removed))
 
 
-def _named_variable(text: str) -> int | None:
+def named_variable(text: str) -> int | None:
+    """The key of the variable that a message of GTSAM names."""
     match = re.search(r"variable\s+(\d+)", text)
     return int(match.group(1)) if match else None

@@ -16,24 +16,15 @@ SMALL_STEP = 0.1
 """standard deviations: a correction after which the weights no longer matter"""
 
 
-def predicted(
-    problem: Problem, step: FloatArray, frame: int, world_T_imu: FloatArray, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """The pose of the next frame and its covariance [v, w] from those of `frame`; `step` is exp of the increment."""
-    back = se3.adjoint(se3.inverse(step))
-    return world_T_imu @ step, back @ covariance @ back.T + problem.increment_covariance[frame]
+def corrected(problem: Problem, frame: int, pose: FloatArray, points: FloatArray, pixel: FloatArray) -> FloatArray:
+    """The pose (4, 4) of a frame that its prediction and n sights (n, 4) of points (n, 3) agree on.
 
-
-def corrected(
-    problem: Problem, pose: FloatArray, covariance: FloatArray, points: FloatArray, pixel: FloatArray
-) -> FloatArray:
-    """The pose (4, 4) that a prediction and n sights (n, 4) of points (n, 3) agree on, the points held.
-
-    Gauss-Newton on the problem's cost, kernel included. Only a start: the points are taken to be exact.
+    Gauss-Newton on the problem's cost, kernel included, with the frame before and the points held: what is uncertain
+    of the two together does not move one against the other. Only a start.
     """
     imu_T_cam, camera = problem.sequence.imu_T_cam, problem.sequence.camera
     cam_T_imu = se3.inverse(imu_T_cam)
-    information = np.linalg.inv(covariance + 1e-14 * np.eye(6))
+    information = np.linalg.inv(problem.increment_covariance[frame - 1])
     guess, correction = pose, np.zeros(6)
     for _ in range(MAX_STEPS):
         p_imu = se3.transform(se3.inverse(guess), points)

@@ -63,7 +63,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     online = Estimate(
         name="isam2-online",
         world_T_imu=smoother.arrivals.path,
-        covariance=smoother.arrivals.covariance,
+        covariance=smoother.online_covariance,
         landmarks=smoother.online_landmarks(),
         used=used,
         status=status,
