@@ -7,9 +7,10 @@ import numpy as np
 
 from fgbaseline.data import Estimate, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.geometry import FloatArray, disparity, se3
+from fgbaseline.geometry import disparity
 
-from .reprojection import reprojection
+from .cost import cost, motion_squares, pixel_squares
+from .reprojection import ROWS, reprojection
 
 
 class Verdict(IntEnum):
@@ -43,10 +44,16 @@ class TrustLimits:
     weak_below: int = 6
     given_up_frames: tuple[float, float] = (0.0, 0.05)
     """share of frames whose observations had to be given up"""
+    batch_cost: tuple[float, float] = (0.005, 0.05)
+    """share by which its cost is above that of the batch solution"""
+    batch_position: tuple[float, float] = (0.05, 1.0)
+    """m, RMSE of its positions from those of the batch solution"""
 
 
-def trust(problem: Problem, reference: Estimate, limits: TrustLimits | None = None) -> Trust:
-    """The verdict on an estimate, from whitened residuals, the share of observations used and weak frames.
+def trust(
+    problem: Problem, reference: Estimate, batch: Estimate | None = None, limits: TrustLimits | None = None
+) -> Trust:
+    """The verdict on an estimate, from whitened residuals, the share of observations used, weak frames and `batch`.
 
     Under the problem's own noise model a whitened squared residual of three rows is 3 on average, less the share that
     the estimated landmarks absorb, and one of an increment at most 6. Kernel-weighted, so that the residuals are those
@@ -73,7 +80,7 @@ def trust(problem: Problem, reference: Estimate, limits: TrustLimits | None = No
     ]
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
-    findings.append((Verdict.TRUSTED, "not compared with a batch solution"))
+    findings.append(_beside_batch(problem, reference, batch, limit))
     findings.sort(key=lambda finding: -finding[0])
     return Trust(max(verdict for verdict, _ in findings), tuple(text for _, text in findings))
 
@@ -90,9 +97,7 @@ def pixel_ratio(problem: Problem, estimate: Estimate) -> float:
     Expected are 3 (n - m) / n for n observations of m landmarks without a prior, and 3 with one.
     """
     table = reprojection(problem.sequence, estimate)
-    r = table.loc[table["used"], ["uL", "uR", "vL", "vR"]].to_numpy()
-    rows = np.stack([r[:, 0], r[:, 1], (r[:, 2] + r[:, 3]) / np.sqrt(2.0)], axis=1)
-    squared = np.sum(rows**2, axis=1) / problem.pixel_variance
+    squared = pixel_squares(problem, table.loc[table["used"], list(ROWS)].to_numpy())
     if problem.kernel is not None:
         norm = np.sqrt(np.maximum(squared, problem.kernel.threshold**2))
         squared = squared * problem.kernel.threshold / norm
@@ -103,15 +108,30 @@ def pixel_ratio(problem: Problem, estimate: Estimate) -> float:
 
 def motion_ratio(problem: Problem, estimate: Estimate) -> float:
     """Mean over the increments of the whitened squared residual of the estimated motion, over 6."""
-    residual = motion_residuals(problem, estimate)
-    whitened = np.linalg.solve(problem.increment_covariance, residual[:, :, None])[:, :, 0]
-    squared = np.einsum("ti,ti->t", residual, whitened)
-    return float(np.mean(squared) / 6.0)
+    return float(np.mean(motion_squares(problem, estimate)) / 6.0)
 
 
-def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:
-    """(T-1, 6) log(exp(increment)^-1 T_k^-1 T_(k+1)): by how much the estimated motion differs from the measured."""
-    return se3.log(se3.inverse(se3.exp(problem.increment)) @ se3.relative(estimate.world_T_imu))
+def _beside_batch(
+    problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits
+) -> tuple[Verdict, str]:
+    """Has the reference found the minimum? Costs are compared over the observations that both used."""
+    if batch is None or batch.status is Status.FAILED:
+        why = "" if batch is None else f": that failed, {batch.reason}"
+        return Verdict.TRUSTED, f"not compared with a batch solution{why}"
+    if any(event.kind == "one start only" for event in batch.events):
+        return (
+            Verdict.DOUBTFUL,
+            "a batch solution was found from one start only: nothing says that it is the lowest",
+        )
+    if batch is reference:
+        return Verdict.TRUSTED, "it is the batch solution itself"
+    both = reference.used & batch.used
+    excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
+    apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
+    rmse = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    verdict = max(_above(excess, limit.batch_cost), _above(rmse, limit.batch_position))
+    said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"
+    return verdict, f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
 
 
 def _above(value: float, limits: tuple[float, float]) -> Verdict:

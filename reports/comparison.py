@@ -68,7 +68,7 @@ def compare_all(problem: Problem, estimates: Mapping[str, Estimate], settings: M
     if reference is None:
         trusted = compare.Trust(compare.Verdict.UNTRUSTED, (NO_REFERENCE,))
     else:
-        trusted = compare.trust(problem, estimates[reference])
+        trusted = compare.trust(problem, estimates[reference], estimates.get("batch"))
     origin = None if reference is None else estimates[reference]
     results = {name: _compared(problem, estimate, origin) for name, estimate in estimates.items()}
     return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings)

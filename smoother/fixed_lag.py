@@ -21,7 +21,7 @@ from .window import Window
 class FixedLagSettings:
     """How long the window is, and how it is solved."""
 
-    lag: float = 3.0
+    lag: float = 5.0
     """s"""
     isam2: ISAM2Settings = field(default_factory=ISAM2Settings)
 

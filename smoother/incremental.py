@@ -29,11 +29,11 @@ PRIOR = -1
 class ISAM2Settings:
     """How the graph is solved; none of these moves its optimum."""
 
-    relinearize_position: float = 0.01
+    relinearize_position: float = 0.02
     """m, of a pose"""
-    relinearize_rotation: float = 0.001
+    relinearize_rotation: float = 0.002
     """rad, of a pose"""
-    relinearize_landmark: float = 0.001
+    relinearize_landmark: float = 0.002
     """as a share of its distance"""
     entry: EntryRule = field(default_factory=EntryRule)
 

@@ -8,12 +8,14 @@ import pytest
 
 from fgbaseline import compare, data, ekf, smoother
 from fgbaseline.compare import Verdict
+from fgbaseline.compare.cost import cost
 from fgbaseline.compare.trust import TrustLimits, motion_ratio, offered, pixel_ratio
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.geometry import disparity
+from fgbaseline.smoother.whole_graph import values_at, whole_graph
 
-from .synthetic import drive, matched, plain_problem
+from .synthetic import Scene, drive, matched, plain_problem
 
 
 @cache
@@ -101,7 +103,7 @@ def test_frames_given_up_are_doubtful_and_many_untrusted() -> None:
 
 def test_the_reasons_are_sorted_by_how_bad_they_are_and_the_first_one_decides() -> None:
     limits = TrustLimits(weak_frames=(-1.0, 2.0), used_share=(2.0, 2.0))
-    verdict = compare.trust(clean(), reference(), limits)
+    verdict = compare.trust(clean(), reference(), limits=limits)
     assert verdict.verdict is Verdict.UNTRUSTED
     assert "observations with a disparity" in verdict.reasons[0]
     assert "fewer than 6" in verdict.reasons[1]
@@ -121,3 +123,59 @@ def test_a_path_with_missing_poses_is_no_evidence_and_not_trusted() -> None:
     poses = reference().world_T_imu.copy()
     poses[40:] = np.nan
     assert compare.trust(clean(), replace(reference(), world_T_imu=poses)).verdict is Verdict.UNTRUSTED
+
+
+@cache
+def solved_as_a_batch() -> Estimate:
+    return smoother.batch(clean(), given={"isam2": reference()})
+
+
+def test_a_batch_solution_that_agrees_is_said_to() -> None:
+    verdict = compare.trust(clean(), reference(), solved_as_a_batch())
+    assert verdict.verdict is Verdict.TRUSTED, verdict.reasons
+    assert any("a batch solution agrees" in reason for reason in verdict.reasons)
+    assert any("not compared with a batch" in reason for reason in compare.trust(clean(), reference()).reasons)
+
+
+@pytest.mark.parametrize(
+    ("sideways", "expected"), [(0.01, Verdict.TRUSTED), (0.3, Verdict.DOUBTFUL), (3.0, Verdict.UNTRUSTED)]
+)
+def test_a_reference_away_from_the_batch_solution_is_not_trusted(sideways: float, expected: Verdict) -> None:
+    batch = solved_as_a_batch()
+    moved = batch.world_T_imu.copy()
+    moved[:, 1, 3] += sideways
+    points = replace(batch.landmarks, position=batch.landmarks.position + np.array([0.0, sideways, 0.0]))
+    # All of it together: the cost stays, but for the first pose, which is held.
+    shifted = replace(batch, name="isam2", world_T_imu=moved, landmarks=points)
+    verdict = compare.trust(clean(), shifted, batch)
+    assert verdict.verdict is expected, verdict.reasons
+    if expected is not Verdict.TRUSTED:
+        assert "a batch solution disagrees" in verdict.reasons[0]
+
+
+def test_a_cost_above_that_of_the_batch_solution_is_not_trusted() -> None:
+    batch = solved_as_a_batch()
+    random = np.random.default_rng(0)
+    points = replace(
+        batch.landmarks, position=batch.landmarks.position * random.normal(1.0, 0.02, (len(batch.landmarks), 1))
+    )
+    verdict = compare.trust(clean(), replace(batch, name="isam2", landmarks=points), batch)
+    assert verdict.verdict is Verdict.UNTRUSTED
+
+
+def test_a_batch_solution_from_one_start_is_doubtful_also_as_the_reference_itself() -> None:
+    failed = Estimate.failed("isam2", "indeterminate", clean().n_frames, len(clean().excluded))
+    alone = smoother.batch(clean(), given={"isam2": failed})
+    assert compare.trust(clean(), alone, alone).verdict is Verdict.DOUBTFUL
+    batch = solved_as_a_batch()
+    assert "it is the batch solution itself" in compare.trust(clean(), batch, batch).reasons
+
+
+@pytest.mark.parametrize("kernel", [None, data.HuberKernel(1.0)])
+def test_the_cost_is_that_of_the_four_rows_and_of_the_graph(kernel: data.HuberKernel | None) -> None:
+    problem = plain_problem(Scene().sequence(), kernel)
+    estimate = smoother.isam2(problem)
+    # But for the prior of the first pose, which it leaves out.
+    graph, values = whole_graph(problem), values_at(estimate.world_T_imu, estimate.landmarks)
+    expected = graph.error(values) - graph.at(0).error(values)
+    assert cost(problem, estimate, problem.mask) == pytest.approx(expected, rel=1e-9)

@@ -19,7 +19,8 @@ from fgbaseline.smoother.restorable_lag import RestorableLag
 from .synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 from .test_smoother_isam2 import PROBLEMS, SCENE, flipped, truncated
 
-LONG = FixedLagSettings(lag=1e3)
+TIGHT = ISAM2Settings(0.001, 0.0001, 0.0001)
+LONG = FixedLagSettings(lag=1e3, isam2=TIGHT)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
@@ -130,7 +131,7 @@ def test_frames_that_see_nothing_are_dead_reckoned() -> None:
 
 
 def window(lag: float = 0.45) -> RestorableLag:
-    return RestorableLag(lag, ISAM2Settings())
+    return RestorableLag(lag, TIGHT)
 
 
 PROBLEM = plain_problem(Scene(frames=12, n_points=6).sequence(), HuberKernel())
