@@ -9,6 +9,7 @@ from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
 from .registry import estimator_names, find_estimator
 from .sequence import Sequence, Truth
+from .trajectory import Trajectory
 
 __all__ = [
     "Calibration",
@@ -26,6 +27,7 @@ __all__ = [
     "Reading",
     "Sequence",
     "Status",
+    "Trajectory",
     "Truth",
     "attach_truth",
     "calibrated",

@@ -1,0 +1,120 @@
+"""A path through time, from anywhere: stamps and the poses of one body in one world."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, so3
+
+from .observations import BoolArray, IntArray
+
+ROTATION_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trajectory:
+    """T >= 1 poses of a body, sorted by time. Its arrays are copies of what it was given, and cannot be written to.
+
+    Raises InputError, naming the pose (and the line it came from, where that is known), for stamps that do not rise or
+    repeat, for poses that are not finite and for rotations that are none (beyond ROTATION_TOLERANCE).
+    """
+
+    t: FloatArray
+    """(T,) s, strictly rising; the number of the frame where `stamped` is False"""
+    world_T_body: FloatArray
+    """(T, 4, 4)"""
+    name: str = "trajectory"
+    """what tables and figures call it"""
+    source: str = ""
+    """the file it came from; what errors speak of"""
+    line: IntArray | None = None
+    """(T,) the line or row of `source` that each pose stands in, for errors"""
+    stamped: bool = True
+    """False where the source has no time: then nothing can be said per second"""
+
+    def __post_init__(self) -> None:
+        for field in ("t", "world_T_body"):
+            array = np.array(getattr(self, field), dtype=np.float64)
+            array.flags.writeable = False
+            object.__setattr__(self, field, array)
+        check_trajectory(self)
+
+    @staticmethod
+    def of_frames(t: FloatArray, world_T_body: FloatArray, name: str, source: str = "") -> "Trajectory":
+        """The frames of t (n,) that have a pose: those of `world_T_body` (n, 4, 4) that are all NaN are left out.
+
+        That is how estimates that failed on the way, and truths with gaps, mark frames without one.
+        """
+        known = ~np.isnan(np.asarray(world_T_body)).all(axis=(1, 2))
+        return Trajectory(np.asarray(t)[known], np.asarray(world_T_body)[known], name, source)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def position(self) -> FloatArray:
+        """(T, 3) m in the world."""
+        return self.world_T_body[:, :3, 3]
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(T, 3, 3) `world_R_body`."""
+        return self.world_T_body[:, :3, :3]
+
+    def at(self, index: IntArray) -> "Trajectory":
+        """The poses of these rising indices (n,)."""
+        line = None if self.line is None else self.line[index]
+        return replace(self, t=self.t[index], world_T_body=self.world_T_body[index], line=line)
+
+    def with_poses(self, world_T_body: FloatArray) -> "Trajectory":
+        """The same stamps with other poses (T, 4, 4)."""
+        return replace(self, world_T_body=world_T_body)
+
+    def later(self, seconds: float) -> "Trajectory":
+        """The same poses, every stamp `seconds` later."""
+        return replace(self, t=self.t + seconds)
+
+
+def check_trajectory(path: Trajectory) -> None:
+    """Raises InputError, naming pose and line, where a trajectory is not one that can be compared."""
+    t, poses = path.t, path.world_T_body
+    who = path.source or path.name
+    if t.ndim != 1 or poses.shape != (len(t), 4, 4):
+        raise InputError(f"{who}: expected stamps (T,) and poses (T, 4, 4), got {t.shape} and {poses.shape}")
+    if len(t) == 0:
+        raise InputError(f"{who}: a trajectory needs at least one pose, this one has none")
+    _require(np.isfinite(t), path, lambda i: f"its time stamp is {float(t[i])!r}; remove it or give it a time")
+    rising = np.concatenate([[True], np.diff(t) > 0])
+    _require(
+        rising,
+        path,
+        lambda i: (
+            f"its time stamp {float(t[i])!r} "
+            + ("repeats that of" if t[i] == t[i - 1] else f"is before {float(t[i - 1])!r} of")
+            + f" {_place(path, i - 1)}; sort the poses by time and remove repeated ones"
+        ),
+    )
+    finite: BoolArray = np.isfinite(poses).all(axis=(1, 2))
+    _require(finite, path, lambda _: "it is not finite; leave out what is not known")
+    with np.errstate(over="ignore", invalid="ignore"):
+        last_row = np.abs(poses[:, 3] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=1)
+        defect = np.maximum(so3.rotation_defect(poses[:, :3, :3]), last_row)
+    _require(
+        defect <= ROTATION_TOLERANCE,
+        path,
+        lambda i: (
+            f"its upper left 3x3 is no rotation, or its last row not 0 0 0 1 (off by {defect[i]:.3g}, allowed "
+            f"{ROTATION_TOLERANCE:g}); write rigid motions"
+        ),
+    )
+
+
+def _require(good: BoolArray, path: Trajectory, complaint: Callable[[int], str]) -> None:
+    if not good.all():
+        i = int(np.argmin(good))
+        raise InputError(f"{path.source or path.name}: {_place(path, i)}: {complaint(i)}")
+
+
+def _place(path: Trajectory, i: int) -> str:
+    return f"pose {i}" if path.line is None else f"line {path.line[i]}"
