@@ -3,8 +3,9 @@
 from .calibrated import Calibration, NoiseSettings, calibrated
 from .diagnose import Diagnosis, diagnose
 from .documented import documented
-from .estimate import Estimate, Event, Landmarks, Progress, Status
+from .estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
 from .formats import attach_truth, read, read_kitti, read_tum, write_npz, write_tum
+from .held_out import HeldOut, hold_out
 from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
 from .registry import estimator_names, find_estimator
@@ -17,7 +18,9 @@ __all__ = [
     "Estimate",
     "Event",
     "Excluded",
+    "HeldOut",
     "HuberKernel",
+    "Innovations",
     "LandmarkPrior",
     "Landmarks",
     "NoiseSettings",
@@ -35,6 +38,7 @@ __all__ = [
     "documented",
     "estimator_names",
     "find_estimator",
+    "hold_out",
     "read",
     "read_kitti",
     "read_tum",

@@ -61,6 +61,25 @@ class Landmarks:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Innovations:
+    """How large a filter's innovations were beside what it expected, frame by frame.
+
+    Of everything that a frame offered to the pose update, before the kernel or any gate: what is rejected counts too.
+    """
+
+    nis: FloatArray
+    """(T,) normalised innovation squared nu^T S^-1 nu over the three rows (uL, uR, (vL + vR) / 2) of all of a frame's
+    observations of landmarks already known, S the filter's own covariance of nu; NaN where there is none"""
+    degrees: IntArray
+    """(T,) rows that this is over: 3 for each observation"""
+
+    @staticmethod
+    def none(n_frames: int) -> "Innovations":
+        """Arrays to be filled in, no frame having any yet."""
+        return Innovations(np.full(n_frames, np.nan), np.zeros(n_frames, dtype=np.int64))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Estimate:
     """The answer of one estimator to one problem: T frames, n observations in its sequence."""
 
@@ -80,6 +99,8 @@ class Estimate:
     seconds_total: float = 0.0
     """time for all of it, set-up and covariances included, s"""
     events: tuple[Event, ...] = ()
+    innovations: Innovations | None = None
+    """of a filter that records them"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further answers that the same run gave at no cost, by the name they are registered under"""
 

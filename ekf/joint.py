@@ -59,6 +59,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         seconds=seconds,
         seconds_total=time.perf_counter() - start,
         events=tuple(joint.events),
+        innovations=joint.innovations,
     )
 
 

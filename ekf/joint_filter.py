@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.estimate import Event
+from fgbaseline.data.estimate import Event, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
+from .innovation_norm import squared_norm
 from .joint_settings import JointSettings, Linearisation
 from .joint_state import ABSENT, POSE, JointState
 from .joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
@@ -56,6 +57,7 @@ class JointFilter:
         self.position = np.full((m, 3), np.nan)
         self.covariance = np.full((m, 3, 3), np.nan)
         self.events: list[Event] = []
+        self.innovations = Innovations.none(problem.n_frames)
 
     def add_frame(self, k: int, seen: slice) -> None:
         """Frame k with its observations (a slice of the problem's)."""
@@ -91,6 +93,8 @@ class JointFilter:
             return True
         state = self.state
         innovation = Innovation.of(seen.H, seen.residual, state.P)
+        self.innovations.nis[k] = squared_norm(innovation.HPHt, innovation.residual, self.row_variance)
+        self.innovations.degrees[k] = innovation.residual.size
         verdict = screened(innovation.squared_norm(self.row_variance), self.problem.kernel, self.settings)
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.taken)

@@ -5,11 +5,12 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem, Reading
 from fgbaseline.geometry import FloatArray, se3
 
+from .innovation_norm import squared_norm_of_known
 from .landmark_update import LandmarkBlocks
 from .mapping import map_along
 from .pose_update import (
@@ -56,6 +57,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     covariances = np.full((T, 6, 6), np.nan)
     seconds = np.zeros(T)
     events: list[Event] = []
+    innovations = Innovations.none(T)
     pose, covariance = problem.initial_pose, problem.initial_covariance
     failure = ""
     for k, seen in enumerate(o.by_frame(T)):
@@ -68,6 +70,8 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
             known = blocks.known[row]
             if known.any():
                 innovation = pose_innovation(camera, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
+                innovations.nis[k] = squared_norm_of_known(innovation, covariance, problem.pixel_variance)
+                innovations.degrees[k] = 3 * len(innovation.residual)
                 weight[known] = robust_weight(innovation, covariance, problem.pixel_variance, problem.kernel)
                 try:
                     posterior = pose_posterior(covariance, innovation, weight[known])
@@ -103,6 +107,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
         seconds=seconds,
         seconds_total=time.perf_counter() - start,
         events=tuple(events),
+        innovations=innovations,
     )
 
 
