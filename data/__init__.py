@@ -4,7 +4,20 @@ from .calibrated import Calibration, NoiseSettings, calibrated
 from .diagnose import Diagnosis, diagnose
 from .documented import documented
 from .estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
-from .formats import attach_truth, read, read_kitti, read_tum, write_npz, write_tum
+from .exchange import read_problem, write_problem
+from .formats import (
+    attach_truth,
+    read,
+    read_kitti,
+    read_times,
+    read_trajectory,
+    read_tum,
+    write_euroc,
+    write_kitti,
+    write_npz,
+    write_trajectory_npz,
+    write_tum,
+)
 from .held_out import HeldOut, hold_out
 from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
@@ -41,7 +54,14 @@ __all__ = [
     "hold_out",
     "read",
     "read_kitti",
+    "read_problem",
+    "read_times",
+    "read_trajectory",
     "read_tum",
+    "write_euroc",
+    "write_kitti",
     "write_npz",
+    "write_problem",
+    "write_trajectory_npz",
     "write_tum",
 ]

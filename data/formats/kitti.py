@@ -4,12 +4,16 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from .beside import written_beside
 from .named_file import FilePath, reading, regular_file
 from .number_table import NumberTable, read_numbers
+from .stamped_poses import require_rising, writable
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
 """how far from a rotation the nine numbers may be: files with four digits are within it"""
+EXACT = 1e-14
+"""up to which they are left as they are"""
 
 
 def read_kitti(path: FilePath) -> FloatArray:
@@ -34,8 +38,37 @@ def kitti_poses(table: NumberTable) -> FloatArray:
             f"line {table.line[i]}: the first three columns are no rotation (off by {defect[i]:.3g}, allowed "
             f"{ROTATION_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
         )
-    poses[:, :3, :3] = nearest_rotations(poses[:, :3, :3])
+    rough = defect > EXACT
+    poses[rough, :3, :3] = nearest_rotations(poses[rough, :3, :3])
     return poses
+
+
+def read_times(path: FilePath) -> FloatArray:
+    """The stamps (n,), s, strictly rising, of a KITTI `times.txt`: line k is when frame k was taken.
+
+    Raises InputError naming file and line.
+    """
+    with reading(path), np.errstate(all="ignore"):
+        table = read_numbers(regular_file(path), {1: "a time stamp in seconds"})
+        t = table.values[:, 0].copy()
+        require_rising(t, table.line)
+        return t
+
+
+def write_kitti(path: FilePath, world_T_body: FloatArray) -> None:
+    """Writes poses (n, 4, 4) as a KITTI file, all or nothing; `read_kitti` gives them back, positions bit by bit.
+
+    Raises InputError when a pose is missing or no rigid motion (line k is frame k: nothing can be left out), or the
+    file cannot be written.
+    """
+    poses = np.asarray(world_T_body, dtype=np.float64)
+    _, kept = writable(np.arange(float(len(poses))), poses)
+    if len(kept) < len(poses):
+        k = int(np.argmax(np.isnan(poses).all(axis=(1, 2))))
+        raise InputError(f"pose {k} is missing, but line k of a KITTI file is frame k; write a TUM file")
+    lines = [" ".join(map(repr, row)) for row in poses[:, :3].reshape(-1, NUMBERS).tolist()]
+    with written_beside(path) as file:
+        file.write("\n".join([*lines, ""]).encode("ascii"))
 
 
 def nearest_rotations(matrices: FloatArray) -> FloatArray:

@@ -4,7 +4,6 @@ import zipfile
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.lib import format as npy
 
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -13,11 +12,7 @@ from ..sequence import Sequence
 from .beside import written_beside
 from .feature_block import CHUNK, UNOBSERVED
 from .named_file import FilePath
-
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-"""the earliest stamp a zip can carry: the time of writing is none of the recording's business"""
-_UNIX = 3
-_MODE = 0o600 << 16
+from .npz_member import write_member
 
 
 def write_npz(sequence: Sequence, path: FilePath) -> None:
@@ -30,10 +25,10 @@ def write_npz(sequence: Sequence, path: FilePath) -> None:
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
     with written_beside(path) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in _arrays(sequence).items():
-            _write_member(archive, key, array.shape, iter([array]))
+            write_member(archive, key, array.shape, [array])
         if sequence.n_landmarks:
             shape = (4, sequence.n_landmarks, sequence.n_frames)
-            _write_member(archive, "features", shape, _feature_chunks(sequence))
+            write_member(archive, "features", shape, _feature_chunks(sequence))
 
 
 def _arrays(s: Sequence) -> dict[str, FloatArray]:
@@ -52,17 +47,6 @@ def _arrays(s: Sequence) -> dict[str, FloatArray]:
         if s.truth.landmarks is not None:
             arrays["landmarks"] = s.truth.landmarks.T
     return arrays
-
-
-def _write_member(archive: zipfile.ZipFile, key: str, shape: tuple[int, ...], chunks: Iterator[FloatArray]) -> None:
-    """One array of little-endian doubles in C order, given as consecutive pieces."""
-    info = zipfile.ZipInfo(f"{key}.npy", _EPOCH)
-    info.compress_type = zipfile.ZIP_DEFLATED
-    info.create_system, info.external_attr = _UNIX, _MODE
-    with archive.open(info, "w", force_zip64=True) as member:
-        npy.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": shape})
-        for chunk in chunks:
-            member.write(np.ascontiguousarray(chunk, dtype="<f8").tobytes())
 
 
 def _feature_chunks(s: Sequence) -> Iterator[FloatArray]:

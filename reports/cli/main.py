@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-COMMANDS = {"run": "run", "diagnose": "diagnose", "simulate": "simulate"}
+COMMANDS = {"run": "run", "diagnose": "diagnose", "export": "export", "simulate": "simulate"}
 """command -> module of this package that holds it under the name `command`"""
 BAD_INPUT, INTERRUPTED = 2, 130
 

@@ -1,0 +1,16 @@
+"""What stands in an exported problem, by file; docs/export.md says it to people."""
+
+from typing import Final
+
+SCHEMA: Final = "fgbaseline/problem/1"
+"""raised when a key or column is renamed, removed or changes its meaning"""
+ARRAYS = "problem.npz"
+SCALARS = "problem.json"
+FRAMES, INCREMENTS, OBSERVATIONS, LANDMARKS = "frames.csv", "increments.csv", "observations.csv", "landmarks.csv"
+
+TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+FRAME_COLUMNS = ("frame", "t", *TWIST)
+COVARIANCE_COLUMNS = tuple(f"c{i}{j}" for i in range(6) for j in range(6))
+INCREMENT_COLUMNS = ("frame", "dt", *TWIST, *COVARIANCE_COLUMNS)
+OBSERVATION_COLUMNS = ("frame", "landmark", "uL", "vL", "uR", "vR", "excluded")
+LANDMARK_COLUMNS = ("id", "observations", "prior_x", "prior_y", "prior_z")

@@ -1,0 +1,129 @@
+"""A problem written as npz, CSV and JSON: the same numbers in each, in full."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formats.beside import written_beside
+from ..formats.npz_member import write_member
+from ..problem import Excluded, Problem
+from . import layout
+
+
+def write_problem(problem: Problem, folder: Path) -> None:
+    """Writes a problem into an existing, empty folder; `read_problem` gives it back bit by bit, but for its truth.
+
+    The ground truth stays behind: what is exported is what an estimator may look at. Raises InputError when a file
+    cannot be written.
+    """
+    with written_beside(folder / layout.ARRAYS) as file, zipfile.ZipFile(file, "w") as archive:
+        for key, array in arrays(problem).items():
+            form = "<i8" if array.dtype.kind in "iu" else "<f8"
+            write_member(archive, key, array.shape, [array], form)
+    text = json.dumps(scalars(problem), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    with written_beside(folder / layout.SCALARS) as file:
+        file.write(text.encode("utf-8"))
+    _tables(problem, folder)
+
+
+def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
+    """Everything numerical: integers as int64, all else as float64, what there is not as NaN."""
+    sequence = problem.sequence
+    camera, o, prior = sequence.camera, sequence.observations, problem.landmark_prior
+    numbers: dict[str, NDArray[Any]] = {
+        "t": sequence.t,
+        "linear_velocity": sequence.linear_velocity,
+        "angular_velocity": sequence.angular_velocity,
+        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
+        "b": np.array(camera.baseline),
+        "imu_T_cam": sequence.imu_T_cam,
+        "up": sequence.up,
+        "increment": problem.increment,
+        "increment_covariance": problem.increment_covariance,
+        "initial_pose": problem.initial_pose,
+        "initial_covariance": problem.initial_covariance,
+        "pixel_variance": np.array(problem.pixel_variance),
+        "mapping_pixel_variance": np.array(_or_nan(problem.mapping_pixel_variance)),
+        "huber_threshold": np.array(np.nan if problem.kernel is None else problem.kernel.threshold),
+        "frame": o.frame,
+        "landmark": o.landmark,
+        "pixel": o.pixel,
+        "excluded": problem.excluded,
+        "n_landmarks": np.array(sequence.n_landmarks),
+        "features": problem.features,
+    }
+    if prior is not None:
+        numbers |= {"landmark_prior_mean": prior.mean, "landmark_prior_covariance": prior.covariance}
+    return numbers
+
+
+def scalars(problem: Problem) -> dict[str, Any]:
+    """What is not an array, and for readers of the CSV files the few small ones too."""
+    sequence, prior = problem.sequence, problem.landmark_prior
+    camera = sequence.camera
+    return {
+        "schema": layout.SCHEMA,
+        "sequence": {
+            "name": sequence.name,
+            "form": sequence.form,
+            "source": sequence.source,
+            "frames": sequence.n_frames,
+            "landmarks": sequence.n_landmarks,
+            "observations": len(sequence.observations),
+            "remarks": list(sequence.remarks),
+        },
+        "preset": problem.preset,
+        "diagnosed": problem.diagnosed,
+        "reading": problem.reading.value,
+        "remarks": list(problem.remarks),
+        "camera": {"fu": camera.fu, "fv": camera.fv, "cu": camera.cu, "cv": camera.cv, "baseline": camera.baseline},
+        "imu_T_cam": sequence.imu_T_cam.tolist(),
+        "up": sequence.up.tolist(),
+        "initial_pose": problem.initial_pose.tolist(),
+        "initial_covariance": problem.initial_covariance.tolist(),
+        "pixel_variance": problem.pixel_variance,
+        "mapping_pixel_variance": problem.mapping_pixel_variance,
+        "huber_threshold": None if problem.kernel is None else problem.kernel.threshold,
+        "landmark_prior_covariance": None if prior is None else prior.covariance.tolist(),
+        "excluded": {reason.name.lower(): reason.value for reason in Excluded},
+    }
+
+
+def _tables(problem: Problem, folder: Path) -> None:
+    sequence, o, prior = problem.sequence, problem.sequence.observations, problem.landmark_prior
+    steps = len(problem.increment)
+    velocities = [*sequence.linear_velocity.T, *sequence.angular_velocity.T]
+    covariance = np.asarray(problem.increment_covariance).reshape(steps, 36)
+    taking_part = problem.observations().counts(sequence.n_landmarks)[problem.features]
+    mean = np.full((len(problem.features), 3), np.nan) if prior is None else prior.mean
+    for name, titles, columns in (
+        (layout.FRAMES, layout.FRAME_COLUMNS, [np.arange(sequence.n_frames), sequence.t, *velocities]),
+        (
+            layout.INCREMENTS,
+            layout.INCREMENT_COLUMNS,
+            [np.arange(steps), sequence.dt, *problem.increment.T, *covariance.T],
+        ),
+        (layout.OBSERVATIONS, layout.OBSERVATION_COLUMNS, [o.frame, o.landmark, *o.pixel.T, problem.excluded]),
+        (layout.LANDMARKS, layout.LANDMARK_COLUMNS, [problem.features, taking_part, *mean.T]),
+    ):
+        _table(folder / name, titles, columns)
+
+
+def _table(path: Path, titles: tuple[str, ...], columns: list[NDArray[Any]]) -> None:
+    """A CSV of columns (n,): numbers in full, an empty cell where there is none."""
+    cells = [map(_cell, column.tolist()) for column in columns]
+    lines = [",".join(titles), *(",".join(row) for row in zip(*cells, strict=True)), ""]
+    with written_beside(path) as file:
+        file.write("\n".join(lines).encode("ascii"))
+
+
+def _cell(value: float) -> str:
+    return "" if value != value else repr(value)
+
+
+def _or_nan(value: float | None) -> float:
+    return np.nan if value is None else value

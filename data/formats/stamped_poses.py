@@ -1,0 +1,64 @@
+"""What every trajectory file has in common: stamps that rise, and poses that are rigid motions."""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, so3
+
+from ..observations import IntArray
+
+UNIT_TOLERANCE = 1e-3
+"""how far from 1 the length of a quaternion may be: files with four decimals are within it; it is made exact here"""
+ROTATION_TOLERANCE = 1e-6
+"""how far from a rotation a matrix may be that is written"""
+
+
+def require_rising(t: FloatArray, line: IntArray) -> None:
+    """Raises InputError naming the first of the lines (n,) whose stamp of t (n,), s, is not after the one before."""
+    late = np.flatnonzero(~(np.diff(t) > 0))
+    if len(late):
+        i = late[0] + 1
+        raise InputError(
+            f"line {line[i]}: the time stamp {float(t[i])!r} is not after {float(t[i - 1])!r} "
+            f"(line {line[i - 1]}); sort the lines and remove repeated ones"
+        )
+
+
+def poses_of_quaternions(position: FloatArray, xyzw: FloatArray, line: IntArray, expected: str) -> FloatArray:
+    """Poses (n, 4, 4) of positions (n, 3), m, and quaternions (n, 4), x y z w, on the lines (n,).
+
+    Raises InputError naming the line where a quaternion is not of length 1 (within UNIT_TOLERANCE); `expected` says
+    what a line should hold.
+    """
+    length = np.linalg.norm(xyzw, axis=1)
+    wrong = np.flatnonzero(~(np.abs(length - 1.0) <= UNIT_TOLERANCE))
+    if len(wrong):
+        i = wrong[0]
+        raise InputError(
+            f"line {line[i]}: the quaternion {xyzw[i].tolist()} has length {length[i]:.6g}; expected {expected}"
+        )
+    poses = np.tile(np.eye(4), (len(position), 1, 1))
+    poses[:, :3, 3] = position
+    poses[:, :3, :3] = so3.rotation_from_quaternion(xyzw)
+    return poses
+
+
+def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The stamps (n,), s, and poses (n, 4, 4) that a file can hold: those that are not all NaN.
+
+    Raises InputError when a stamp does not rise or a pose is no rigid motion.
+    """
+    poses = np.asarray(world_T_body, dtype=np.float64)
+    stamps = np.asarray(t, dtype=np.float64)
+    if stamps.ndim != 1 or poses.shape != (len(stamps), 4, 4):
+        raise InputError(f"a trajectory needs stamps (n,) and poses (n, 4, 4), not {stamps.shape} and {poses.shape}")
+    known = ~np.isnan(poses).all(axis=(1, 2))
+    stamps, poses = stamps[known], poses[known]
+    if not np.isfinite(stamps).all() or np.any(np.diff(stamps) <= 0):
+        raise InputError("the time stamps of a trajectory must be finite and rise")
+    finite = np.isfinite(poses).all(axis=(1, 2))
+    defect = np.full(len(stamps), np.inf)
+    defect[finite] = so3.rotation_defect(poses[finite, :3, :3])
+    if len(stamps) and defect.max() > ROTATION_TOLERANCE:
+        i = int(defect.argmax())
+        raise InputError(f"pose {i} (at {float(stamps[i])!r} s) is no rigid motion (rotation off by {defect[i]:.3g})")
+    return stamps, poses

@@ -1,0 +1,38 @@
+"""What a person gets of an exported problem: a folder, and a line on each of its files."""
+
+from pathlib import Path
+
+import click
+
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.data.exchange import layout, write_problem
+
+from . import job
+from .whole_folder import require_free, whole_folder
+
+
+def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
+    """Poses the problem of a recording, writes it into the folder and says what it holds; gives the exit code."""
+    require_free(out, force=force, mark=layout.SCALARS)
+    problem = job.pose_problem(job.read_sequence(settings), settings)
+    with whole_folder(out, force=force, mark=layout.SCALARS) as folder:
+        write_problem(problem, folder)
+    for sentence in told(problem):
+        click.echo(sentence)
+    click.echo(f"\nThe problem is in {out}; docs/export.md describes its files")
+    return 0
+
+
+def told(problem: Problem) -> list[str]:
+    """The problem in sentences."""
+    sequence = problem.sequence
+    sigma = problem.pixel_variance**0.5
+    kernel = "no kernel" if problem.kernel is None else f"Huber's kernel at {problem.kernel.threshold:g} sigma"
+    left_out = int((problem.excluded != Excluded.NO).sum())
+    return [
+        f"{sequence.name}, {problem.preset}: {problem.n_frames} frames, {int(problem.mask.sum())} observations of "
+        f"{len(problem.features)} landmarks take part, {left_out} are left out",
+        f"{sigma:.3g} px, {kernel}, "
+        + ("no prior on landmarks" if problem.landmark_prior is None else "a prior on every landmark"),
+        *problem.remarks,
+    ]
