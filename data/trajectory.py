@@ -95,7 +95,7 @@ def check_trajectory(path: Trajectory) -> None:
             + f" {_place(path, i - 1)}; sort the poses by time and remove repeated ones"
         ),
     )
-    finite: BoolArray = np.isfinite(poses).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(poses).all(axis=(1, 2)), dtype=np.bool_)
     _require(finite, path, lambda _: "it is not finite; leave out what is not known")
     with np.errstate(over="ignore", invalid="ignore"):
         last_row = np.abs(poses[:, 3] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=1)

@@ -108,9 +108,16 @@ def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
 
 
 def rotation_angle(rotation: ArrayLike) -> FloatArray:
-    """Angles (...,) in radians, 0 to pi, of rotation matrices (..., 3, 3)."""
-    result: FloatArray = np.linalg.norm(log_so3(rotation), axis=-1)
-    return result
+    """Angles (...,) in radians, 0 to pi, of rotation matrices (..., 3, 3).
+
+    From sine (antisymmetric part) and cosine (trace) together, which is accurate to rounding at every angle.
+    """
+    R = np.asarray(rotation, dtype=np.float64)
+    twice_sine = np.sqrt(
+        (R[..., 2, 1] - R[..., 1, 2]) ** 2 + (R[..., 0, 2] - R[..., 2, 0]) ** 2 + (R[..., 1, 0] - R[..., 0, 1]) ** 2
+    )
+    twice_cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0
+    return np.asarray(np.arctan2(twice_sine, twice_cosine))
 
 
 def rotation_defect(matrix: ArrayLike) -> FloatArray:

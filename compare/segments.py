@@ -1,0 +1,115 @@
+"""KITTI's segment errors: how wrong the motion over 100, 200, ... 800 m is, per metre (Geiger et al., 2012)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.geometry import FloatArray, InputError
+
+from .association import Matched
+from .pose_difference import Difference, motion_difference
+from .travel import distance_travelled
+
+OFFICIAL_LENGTHS = tuple(range(100, 900, 100))
+OFFICIAL_STEP = 10
+"""every how many poses a segment begins: at KITTI's 10 Hz once a second"""
+ROUND = np.array([1.0, 2.0, 2.5, 5.0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SegmentErrors:
+    """The errors of segments, and which lengths they have."""
+
+    table: pd.DataFrame
+    """one row per segment: `start`, `end` (indices of poses), `length` (m, nominal), `translation_percent` (of it),
+    `rotation_deg_per_m`, `speed` (m/s; NaN without stamps)"""
+    lengths: tuple[float, ...]
+    """m, those that were asked for"""
+    step: int
+    official: bool
+    """whether lengths and step are KITTI's own, so that the figures compare with published ones"""
+
+    @property
+    def by_length(self) -> pd.DataFrame:
+        """Mean of each error, and number of segments `n`, for each length that any segment has."""
+        errors = ["translation_percent", "rotation_deg_per_m"]
+        means = self.table.groupby("length")[errors].mean()
+        return means.assign(n=self.table.groupby("length").size())
+
+    @property
+    def translation_percent(self) -> float:
+        """Mean over all segments, as the KITTI table ranks by, %."""
+        return float(self.table["translation_percent"].mean())
+
+    @property
+    def rotation_deg_per_m(self) -> float:
+        """Mean over all segments, deg/m."""
+        return float(self.table["rotation_deg_per_m"].mean())
+
+    @property
+    def caption(self) -> str:
+        """Which segments these are, for under a table."""
+        whose = "KITTI's lengths" if self.official else "lengths fitted to the path, not KITTI's"
+        shortest, longest = min(self.lengths), max(self.lengths)
+        every = "pose" if self.step == 1 else f"{self.step} poses"
+        return f"{len(self.table)} segments of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"
+
+
+def segment_errors(
+    matched: Matched, lengths: tuple[float, ...] | None = None, step: int | None = None
+) -> SegmentErrors:
+    """As KITTI's devkit has it: from every `step`-th pose to the first that is more than a length further along the
+    reference's path, the error of the motion over that length.
+
+    By default the official lengths and step; where the path is no longer than the shortest of them, eight lengths
+    fitted to it, from every pose. Raises InputError where no segment of the lengths asked for fits, or the reference
+    stands still.
+    """
+    reference, estimate = matched.reference, matched.estimate
+    travelled = distance_travelled(reference.position)
+    fits = travelled[-1] > OFFICIAL_LENGTHS[0]
+    if lengths is None:
+        lengths = tuple(map(float, OFFICIAL_LENGTHS)) if fits else fitted_lengths(float(travelled[-1]))
+        step = step or (OFFICIAL_STEP if fits else 1)
+    step = step or OFFICIAL_STEP
+    official = step == OFFICIAL_STEP and tuple(lengths) == OFFICIAL_LENGTHS
+    pairs, length = _segments(travelled, np.asarray(lengths, dtype=np.float64), step)
+    if len(pairs) == 0:
+        raise InputError(
+            f"{reference.source or reference.name}: no segment of {min(lengths):g} m or more fits into its path of "
+            f"{travelled[-1]:.3g} m; give shorter lengths"
+        )
+    poses, truth = estimate.world_T_body, reference.world_T_body
+    seconds = reference.t[pairs[:, 1]] - reference.t[pairs[:, 0]]
+    table = pd.DataFrame(
+        {
+            "start": pairs[:, 0],
+            "end": pairs[:, 1],
+            "length": length,
+            "translation_percent": 100.0 * motion_difference(poses, truth, pairs, Difference.TRANSLATION) / length,
+            "rotation_deg_per_m": motion_difference(poses, truth, pairs, Difference.ROTATION_DEG) / length,
+            "speed": length / seconds if reference.stamped else np.full(len(pairs), np.nan),
+        }
+    )
+    return SegmentErrors(table, tuple(lengths), step, official)
+
+
+def fitted_lengths(path: float) -> tuple[float, ...]:
+    """Eight lengths, 1 to 8 times 1, 2, 2.5 or 5 times a power of ten, at most nine tenths of the path (m)."""
+    if not path > 0:
+        raise InputError("the reference stands still: it has no segments")
+    wanted = 0.9 * path / 8.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    unit = float(ROUND[wanted / power * (1 + 1e-12) >= ROUND][-1] * power)
+    return tuple(unit * k for k in range(1, 9))
+
+
+def _segments(travelled: FloatArray, lengths: FloatArray, step: int) -> tuple[IntArray, FloatArray]:
+    """(m, 2) first and last pose of each segment, by start, then length, and (m,) its length."""
+    start = np.repeat(np.arange(0, len(travelled), step), len(lengths))
+    length = np.tile(lengths, len(start) // len(lengths))
+    end = np.searchsorted(travelled, travelled[start] + length, side="right")
+    whole = end < len(travelled)
+    return np.stack([start[whole], end[whole]], axis=1), length[whole]
