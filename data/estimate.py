@@ -80,6 +80,16 @@ class Innovations:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class GyroBias:
+    """What a gyroscope reads at rest as an estimator knew it at each frame, in the axes of the IMU."""
+
+    mean: FloatArray
+    """(T, 3) rad/s, to be taken off the angular velocities of the problem's sequence"""
+    covariance: FloatArray
+    """(T, 3, 3)"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Estimate:
     """The answer of one estimator to one problem: T frames, n observations in its sequence."""
 
@@ -101,6 +111,8 @@ class Estimate:
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
     """of a filter that records them"""
+    gyro_bias: GyroBias | None = None
+    """where it was estimated along with the poses"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further answers that the same run gave at no cost, by the name they are registered under"""
 

@@ -5,17 +5,20 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, GyroBias, Landmarks, Progress, Status
 from fgbaseline.data.problem import Problem
 
 from .joint_filter import JointFilter
 from .joint_settings import JointSettings
-from .joint_state import POSE
+from .joint_state import BIAS, POSE
 from .screening import Rejection
+
+BIAS_BLOCK = slice(POSE, POSE + BIAS)
 
 
 def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
-    """One state: the pose and every landmark, with all cross-covariances.
+    """One state: the pose, the gyroscope's bias where the settings ask for it, and every landmark, with all
+    cross-covariances.
 
     A landmark enters with its first observation (or at the problem's prior) and leaves with its last one in the
     recording: poses and active landmarks are exactly those of the filter that keeps them all; those that left keep
@@ -33,6 +36,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     joint = JointFilter(problem, settings)
     poses = np.full((T, 4, 4), np.nan)
     covariances = np.full((T, 6, 6), np.nan)
+    bias = GyroBias(np.full((T, BIAS), np.nan), np.full((T, BIAS, BIAS), np.nan))
     seconds = np.zeros(T)
     failure = ""
     for k, seen in enumerate(problem.observations().by_frame(T)):
@@ -43,9 +47,13 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
             failure = f"the pose is not finite after the update of frame {k}"
             break
         poses[k], covariances[k] = joint.state.pose, covariance
+        if settings.gyro_bias is not None:
+            bias.mean[k], bias.covariance[k] = joint.state.bias, joint.state.P[BIAS_BLOCK, BIAS_BLOCK]
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
+    if settings.gyro_bias is not None:
+        joint.events += _told(bias)
     status, reason = _verdict(failure, joint.events, T)
     known = np.isfinite(joint.position).all(axis=1)
     return Estimate(
@@ -60,7 +68,19 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         seconds_total=time.perf_counter() - start,
         events=tuple(joint.events),
         innovations=joint.innovations,
+        gyro_bias=None if settings.gyro_bias is None else bias,
     )
+
+
+def _told(bias: GyroBias) -> list[Event]:
+    """What was found of the bias, at the last frame that has an answer."""
+    answered = np.flatnonzero(np.isfinite(bias.mean).all(axis=1))
+    if len(answered) == 0:
+        return []
+    k = int(answered[-1])
+    found = zip(bias.mean[k], np.sqrt(np.diagonal(bias.covariance[k])), strict=True)
+    text = ", ".join(f"{mean:+.4f} ± {deviation:.4f}" for mean, deviation in found)
+    return [Event(k, "gyroscope bias", f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
 
 
 def _verdict(failure: str, events: list[Event], n_frames: int) -> tuple[Status, str]:

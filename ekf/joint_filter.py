@@ -50,9 +50,10 @@ class JointFilter:
         self.measured = measured_rows(o.pixel)
         self.last_frame = np.full(m, -1, dtype=np.int64)
         self.last_frame[self.row] = o.frame  # sorted by frame: the last one stays
-        self.steps = se3.exp(problem.increment)
-        self.transitions = se3.adjoint(se3.inverse(self.steps))
-        self.state = JointState(problem.initial_pose, problem.initial_covariance, m)
+        self.dt = problem.sequence.dt
+        prior = settings.gyro_bias
+        bias_covariance = None if prior is None else prior.covariance()
+        self.state = JointState(problem.initial_pose, problem.initial_covariance, m, bias_covariance)
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.position = np.full((m, 3), np.nan)
         self.covariance = np.full((m, 3, 3), np.nan)
@@ -79,10 +80,15 @@ class JointFilter:
         self._leave(k, row[self.last_frame[row] == k])
 
     def _predict(self, k: int) -> None:
-        state, step, transition = self.state, self.steps[k - 1], self.transitions[k - 1]
-        if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
-            transition = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose)
-        state.predict(step, transition, self.problem.increment_covariance[k - 1])
+        state, dt, prior = self.state, float(self.dt[k - 1]), self.settings.gyro_bias
+        twist, Q = self.problem.increment[k - 1].copy(), self.problem.increment_covariance[k - 1]
+        twist[3:] -= dt * state.bias
+        step = se3.exp(twist)
+        first_estimate = self.settings.linearisation is Linearisation.FIRST_ESTIMATE
+        F = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose if first_estimate else se3.inverse(step))
+        if prior is not None:
+            F, Q = prior.along(twist, dt, F, Q)
+        state.predict(step, F, Q)
 
     def _update(self, k: int, index: IntArray) -> bool:
         """Observations `index` (n,) of active landmarks; False where the frame as a whole is not believed."""
@@ -117,7 +123,7 @@ class JointFilter:
         seen = now = sight(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
         if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
             seen = sight(self.camera, self.cam_T_imu, state.predicted_pose, homogeneous(charts, state.first[slot]))
-        H = StackedJacobian(slot, seen.by_pose, seen.by_point @ charts[:, :, :3])
+        H = StackedJacobian(slot, seen.by_pose, seen.by_point @ charts[:, :, :3], state.body)
         return _Seen(index, H, self.measured[index] - now.predicted, np.minimum(now.cosine, seen.cosine))
 
     def _in_front(self, k: int, seen: _Seen) -> _Seen:
@@ -131,14 +137,15 @@ class JointFilter:
         """Moves the state by delta (size,), and P along with it where the settings say so.
 
         N = [Ad(T^-1); nu], nu the landmarks' `rigid_motion`. With - before and + after the move, B takes N- to N+:
-        [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]].
+        [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]]. A bias is not changed by a rigid motion: its rows of N are 0.
         """
         state = self.state
         before = state.pose
         invariant = self.settings.linearisation is Linearisation.INVARIANT
         nu = rigid_motion(state.charts, state.xi) if invariant else None
         state.pose = before @ se3.exp(delta[:POSE])
-        state.xi[:] += delta[POSE:].reshape(-1, 3)
+        state.bias[: state.body - POSE] += delta[POSE : state.body]
+        state.xi[:] += delta[state.body :].reshape(-1, 3)
         if nu is not None:
             by_pose = (rigid_motion(state.charts, state.xi) - nu) @ se3.adjoint(before)
             state.transport(se3.adjoint(se3.exp(-delta[:POSE])), by_pose)

@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from fgbaseline.geometry import FgbaselineError
 
+from .gyro_bias import GyroBiasPrior
 from .landmark_chart import Coordinates
 
 
@@ -37,6 +38,8 @@ class JointSettings:
     """chi-square probability: an observation whose innovation is beyond it takes no part; None: all do"""
     disagreeing_share: float | None = 0.5
     """a frame takes no part where more than this share of its observations is beyond 5.5 sigma; None: it always does"""
+    gyro_bias: GyroBiasPrior | None = None
+    """estimate a gyroscope bias along with the pose; None: the angular velocities have none"""
 
     def __post_init__(self) -> None:
         if self.gate is not None and not 0.0 < self.gate < 1.0:

@@ -1,8 +1,9 @@
 """The state of the joint filter: the pose and every active landmark, with all their covariances.
 
-The error state is [delta (6), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, then the
-coordinates of each active landmark in its chart. Its covariance lives in one square array that grows by doubling;
-a landmark that leaves is overwritten by the last one, so that the active part is always the upper left square.
+The error state is [delta (6), d (3), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the error
+of the gyroscope's bias (only where it is estimated), then the coordinates of each active landmark in its chart. Its
+covariance lives in one square array that grows by doubling; a landmark that leaves is overwritten by the last one, so
+that the active part is always the upper left square.
 """
 
 import numpy as np
@@ -12,22 +13,35 @@ from fgbaseline.geometry import FloatArray
 
 from .landmark_chart import WorldPoints, world_points
 
-POSE = 6
+POSE, BIAS = 6, 3
 ABSENT = -1
 
 
 class JointState:
-    """Pose, active landmarks, and one covariance over all of them."""
+    """Pose, gyroscope bias, active landmarks, and one covariance over all of them."""
 
-    def __init__(self, pose: FloatArray, covariance: FloatArray, n_features: int, capacity: int = 64) -> None:
+    def __init__(
+        self,
+        pose: FloatArray,
+        covariance: FloatArray,
+        n_features: int,
+        bias_covariance: FloatArray | None = None,
+        capacity: int = 64,
+    ) -> None:
         self.pose = pose
+        self.bias = np.zeros(BIAS)
+        """(3,) rad/s; zero where it is not estimated"""
+        self.body = POSE if bias_covariance is None else POSE + BIAS
+        """where the landmarks begin in the error state"""
         self.predicted_pose = pose
         """(4, 4) the pose before the frame's update"""
         self.count = 0
         self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
         """(m,) slot of each of the problem's features; ABSENT where it is not active"""
-        self._P = np.zeros((POSE + 3 * capacity, POSE + 3 * capacity))
+        self._P = np.zeros((self.body + 3 * capacity, self.body + 3 * capacity))
         self._P[:POSE, :POSE] = covariance
+        if bias_covariance is not None:
+            self._P[POSE : self.body, POSE : self.body] = bias_covariance
         self._row = np.zeros(capacity, dtype=np.int64)
         self._xi, self._first = np.zeros((capacity, 3)), np.zeros((capacity, 3))
         self._charts = np.zeros((capacity, 4, 4))
@@ -44,7 +58,7 @@ class JointState:
     @property
     def size(self) -> int:
         """The dimension of the error state."""
-        return POSE + 3 * self.count
+        return self.body + 3 * self.count
 
     @property
     def P(self) -> FloatArray:  # noqa: N802
@@ -72,18 +86,25 @@ class JointState:
         return self._charts[: self.count]
 
     def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
-        """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them."""
-        P = self.P
-        moved = transition @ P[:POSE]
-        P[:POSE, POSE:] = moved[:, POSE:]
-        P[POSE:, :POSE] = moved[:, POSE:].T
-        own = moved[:, :POSE] @ transition.T + noise
-        P[:POSE, :POSE] = 0.5 * (own + own.T)
+        """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them.
+
+        `transition` and `noise` are (body, body): of the pose, and of the bias where it is estimated.
+        """
+        P, body = self.P, self.body
+        moved = transition @ P[:body]
+        P[:body, body:] = moved[:, body:]
+        P[body:, :body] = moved[:, body:].T
+        own = moved[:, :body] @ transition.T + noise
+        P[:body, :body] = 0.5 * (own + own.T)
         self.pose = self.predicted_pose = self.pose @ step
 
     def transport(self, turn: FloatArray, by_pose: FloatArray) -> None:
-        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (count, 3, 6)."""
-        P, G = self.P, by_pose.reshape(3 * self.count, POSE)
+        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (count, 3, 6).
+
+        The bias stays as it is: its rows of `by_pose` would be zero.
+        """
+        P, G = self.P, np.zeros((self.size - POSE, POSE))
+        G[self.body - POSE :] = by_pose.reshape(3 * self.count, POSE)
         own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
         half = G @ (cross + 0.5 * own @ G.T)
         P[POSE:, POSE:] += half + half.T
@@ -139,7 +160,6 @@ class JointState:
         index = self._indices(slot).reshape(-1, 3)
         return world_points(self._charts[slot], self._xi[slot], self._P[index[:, :, None], index[:, None, :]])
 
-    @staticmethod
-    def _indices(slot: IntArray) -> IntArray:
+    def _indices(self, slot: IntArray) -> IntArray:
         """(3n,) rows of P of the landmarks in slots (n,)."""
-        return (POSE + 3 * slot[:, None] + np.arange(3)).reshape(-1)
+        return (self.body + 3 * slot[:, None] + np.arange(3)).reshape(-1)

@@ -31,17 +31,19 @@ class StackedJacobian:
     """(n, 3, 6)"""
     by_landmark: FloatArray
     """(n, 3, 3)"""
+    body: int = POSE
+    """where the landmarks begin; what is between the pose and them, an observation does not depend on"""
 
     def times(self, matrix: FloatArray) -> FloatArray:
         """H A (3n, c) of a matrix A (size, c)."""
         n, c = len(self.slot), matrix.shape[1]
-        product = self.by_landmark @ matrix[POSE:].reshape(-1, 3, c)[self.slot]
+        product = self.by_landmark @ matrix[self.body :].reshape(-1, 3, c)[self.slot]
         product += (self.by_pose.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
         return product.reshape(3 * n, c)
 
     def select(self, chosen: BoolArray) -> "StackedJacobian":
         """Only the chosen observations."""
-        return StackedJacobian(self.slot[chosen], self.by_pose[chosen], self.by_landmark[chosen])
+        return StackedJacobian(self.slot[chosen], self.by_pose[chosen], self.by_landmark[chosen], self.body)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 
 from .so3 import FloatArray, angle_coefficients, exp_so3, hat3, log_so3
 
+_TERMS = 24
+"""of the series of the right Jacobian: pi^25 / 26! is 1e-14"""
+
 
 def hat(twist: ArrayLike) -> FloatArray:
     """4x4 matrices (..., 4, 4) of twists (..., 6): [[hat3(w), v], [0, 0]] (equation 9)."""
@@ -95,6 +98,18 @@ def adjoint(pose: ArrayLike) -> FloatArray:
     matrix[..., :3, :3] = matrix[..., 3:, 3:] = R
     matrix[..., :3, 3:] = hat3(p) @ R
     return matrix
+
+
+def right_jacobian(twist: ArrayLike) -> FloatArray:
+    """J (..., 6, 6) of twists (..., 6) with exp(xi + d) = exp(xi) exp(J d) for small d.
+
+    The series sum of (-curly_hat(xi))^n / (n + 1)!, which is exact to rounding for rotations of at most pi.
+    """
+    ad = curly_hat(twist)
+    jacobian = np.broadcast_to(np.eye(6), ad.shape)
+    for n in range(_TERMS, 0, -1):
+        jacobian = np.eye(6) - ad @ jacobian / (n + 1)
+    return np.array(jacobian)
 
 
 def transform(pose: ArrayLike, points: ArrayLike) -> FloatArray:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 
 from fgbaseline.data.problem import HuberKernel, Problem
-from fgbaseline.ekf import Coordinates, Linearisation
+from fgbaseline.ekf import Coordinates, GyroBiasPrior, Linearisation
 from fgbaseline.geometry import FloatArray, StereoCamera
 
 from .dense_filter import hat3, odot, u_curly_hat, u_hat
@@ -37,6 +37,11 @@ def adjoint(T: FloatArray) -> FloatArray:
     """T exp(u_hat(x)) T^-1 = exp(u_hat(adjoint(T) x))."""
     R, p = T[:3, :3], T[:3, 3]
     return np.block([[R, hat3(p) @ R], [np.zeros((3, 3)), R]])
+
+
+def right_jacobian(u: FloatArray) -> FloatArray:
+    """(6, 6) the integral of exp(-s u_curly_hat(u)) over s from 0 to 1: a corner of an exponential (Van Loan, 1978)."""
+    return expm(np.block([[-u_curly_hat(u), np.eye(6)], [np.zeros((6, 12))]]))[:6, 6:]
 
 
 @dataclass
@@ -75,6 +80,8 @@ class Moment:
     """by the sequence's index: point (3,) m and covariance (3, 3) m^2"""
     joint: FloatArray
     """the whole P"""
+    bias: FloatArray
+    """(3,) rad/s of the gyroscope; zero where it is not in the state, else at 6 to 9 of it"""
 
 
 @dataclass
@@ -84,6 +91,7 @@ class DenseJointFilter:
     problem: Problem
     coordinates: Coordinates = Coordinates.INVERSE_DEPTH
     linearisation: Linearisation = Linearisation.TEXTBOOK
+    gyro_bias: GyroBiasPrior | None = None
     pose: FloatArray = field(init=False)
     P: FloatArray = field(init=False)
     landmarks: dict[int, Landmark] = field(init=False, default_factory=dict)
@@ -91,6 +99,9 @@ class DenseJointFilter:
     def __post_init__(self) -> None:
         self.pose = self.problem.initial_pose
         self.P = self.problem.initial_covariance.copy()
+        self.bias = np.zeros(3)
+        if self.gyro_bias is not None:
+            self.P = block_diag(self.P, self.gyro_bias.deviation**2 * np.eye(3))
         self.as_predicted = self.pose
         self.o_T_I = np.linalg.inv(self.problem.sequence.imu_T_cam)
 
@@ -105,16 +116,20 @@ class DenseJointFilter:
             at = o.frame == k
             self.update(o.landmark[at], o.pixel[at])
             seen = {j: self.world_point(landmark) for j, landmark in self.landmarks.items()}
-            moments.append(Moment(self.pose, self.P[:6, :6].copy(), seen, self.P.copy()))
+            moments.append(Moment(self.pose, self.P[:6, :6].copy(), seen, self.P.copy(), self.bias))
         return moments
 
     def predict(self, k: int) -> None:
-        """Equation 9, for the pose's block of an otherwise constant state."""
-        u = self.problem.increment[k]
+        """Equation 9, for the pose's block of an otherwise constant state; a bias wanders."""
+        dt = self.problem.sequence.t[k + 1] - self.problem.sequence.t[k]
+        u = self.problem.increment[k] - dt * np.append(np.zeros(3), self.bias)
         F = np.eye(len(self.P))
         F[:6, :6] = expm(-u_curly_hat(u))
         Q = np.zeros_like(self.P)
         Q[:6, :6] = self.problem.increment_covariance[k]
+        if self.gyro_bias is not None:
+            F[:6, 6:9] = -dt * right_jacobian(u)[:, 3:]
+            Q[6:9, 6:9] = self.gyro_bias.walk**2 * dt * np.eye(3)
         predicted = self.pose @ expm(u_hat(u))
         if self.linearisation is Linearisation.FIRST_ESTIMATE:
             F[:6, :6] = adjoint(np.linalg.inv(predicted) @ self.as_predicted)
@@ -184,6 +199,8 @@ class DenseJointFilter:
         before = self.unobservable()
         pose = self.pose
         self.pose = pose @ expm(u_hat(delta[:6]))
+        if self.gyro_bias is not None:
+            self.bias = self.bias + delta[6:9]
         for landmark in self.landmarks.values():
             landmark.xi = landmark.xi + delta[landmark.start : landmark.start + 3]
         if self.linearisation is Linearisation.INVARIANT:

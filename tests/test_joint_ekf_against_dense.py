@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from fgbaseline import ekf
 from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Problem, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.ekf import Coordinates, GyroBiasPrior, JointSettings, Linearisation
 from fgbaseline.geometry import FloatArray
 
 from .dense_joint_filter import DenseJointFilter, Moment
@@ -66,6 +66,12 @@ def uncertain_start(problem: Problem) -> Problem:
     return replace(problem, initial_covariance=np.diag(np.repeat([1e-2, 1e-4], 3)))
 
 
+def turning(problem: Problem) -> Problem:
+    """The problem with a gyroscope that reads up to 0.04 rad/s at rest."""
+    bias = problem.sequence.dt[:, None] * [0.02, -0.04, 0.03]
+    return replace(problem, increment=problem.increment + np.hstack([np.zeros_like(bias), bias]))
+
+
 PROBLEMS = {
     "town, kernel": matched(drive("town", 4.0, 10.0)),
     "town, tight kernel": replace(matched(drive("town", 4.0, 10.0)), kernel=HuberKernel(1.0)),
@@ -99,6 +105,20 @@ def same_as_dense(problem: Problem, estimate: Estimate, moments: list[Moment]) -
         point, spread = moments[o.frame[o.landmark == j].max()].landmarks[int(j)]
         np.testing.assert_allclose(position, point, rtol=TOLERANCE, atol=TOLERANCE)
         same_covariance(covariance, spread)
+
+
+@pytest.mark.parametrize("linearisation", Linearisation)
+@pytest.mark.parametrize("name", ["town, kernel", "loop, uncertain start", "returning", "town, prior"])
+def test_with_a_gyroscope_bias_in_the_state_it_is_still_that_filter(name: str, linearisation: Linearisation) -> None:
+    problem, prior = turning(PROBLEMS[name]), GyroBiasPrior(0.05, 0.003)
+    estimate = ekf.joint_ekf(problem, settings=JointSettings(linearisation=linearisation, gyro_bias=prior))
+    moments = DenseJointFilter(problem, linearisation=linearisation, gyro_bias=prior).run()
+    same_as_dense(problem, estimate, moments)
+    assert estimate.gyro_bias is not None
+    assert np.abs(estimate.gyro_bias.mean[-1]).max() > 0.003
+    for k, moment in enumerate(moments):
+        np.testing.assert_allclose(estimate.gyro_bias.mean[k], moment.bias, rtol=0, atol=TOLERANCE)
+        same_covariance(estimate.gyro_bias.covariance[k], moment.joint[6:9, 6:9])
 
 
 @pytest.mark.parametrize("linearisation", Linearisation)
