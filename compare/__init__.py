@@ -3,7 +3,11 @@
 from .absolute import absolute_errors
 from .alignment import Align, Alignment, align, align_se3
 from .association import Association, Matched, associate
+from .block_bootstrap import error_statistics
 from .consistency import nees
+from .difference_shares import DifferenceShares, difference_shares
+from .drift import drift
+from .growth import Passing, first_beyond, growing_divergence, growth_by_part
 from .interpolation import interpolated
 from .pairs import Unit, pose_pairs
 from .pose_difference import Difference, absolute_difference, motion_difference
@@ -17,6 +21,7 @@ from .reprojection import (
 )
 from .segments import SegmentErrors, segment_errors
 from .statistics import summarised
+from .time_offset import TimeOffset, time_offset
 from .trajectory import divergence, divergence_summary, pose_errors, truth_errors
 from .trust import Trust, Verdict, trust
 
@@ -25,8 +30,11 @@ __all__ = [
     "Alignment",
     "Association",
     "Difference",
+    "DifferenceShares",
     "Matched",
+    "Passing",
     "SegmentErrors",
+    "TimeOffset",
     "Trust",
     "Unit",
     "Verdict",
@@ -37,8 +45,14 @@ __all__ = [
     "associate",
     "commonly_used",
     "component_summary",
+    "difference_shares",
     "divergence",
     "divergence_summary",
+    "drift",
+    "error_statistics",
+    "first_beyond",
+    "growing_divergence",
+    "growth_by_part",
     "interpolated",
     "matched_pairs",
     "motion_difference",
@@ -51,6 +65,7 @@ __all__ = [
     "reprojection_summary",
     "segment_errors",
     "summarised",
+    "time_offset",
     "trust",
     "truth_errors",
 ]

@@ -40,16 +40,18 @@ def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.D
 
     `position` |p - p_ref| in m; `along`, `across` (to the left) and `up` its components in the reference's frame,
     that is along the reference's direction of travel seen from above, square to it, and along `up`; `rotation_deg`
-    the angle of R_ref^T R; `travelled` the length of the reference's path so far, m. NaN where either pose is.
+    the angle of R_ref^T R and `heading_deg` its part about `up`, to the left positive; `travelled` the length of the
+    reference's path so far, m. NaN where either pose is.
     """
     if poses.shape != reference.shape:
         raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
     difference = poses[:, :3, 3] - reference[:, :3, 3]
     forward, left, upward = travel_frame(reference[:, :3, 3], np.asarray(up, dtype=np.float64))
     finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(reference).all(axis=(1, 2))
-    angle = np.full(len(poses), np.nan)
-    relative = np.swapaxes(reference[finite, :3, :3], 1, 2) @ poses[finite, :3, :3]
-    angle[finite] = np.rad2deg(so3.rotation_angle(relative))
+    angle, heading = np.full((2, len(poses)), np.nan)
+    turned = poses[finite, :3, :3] @ np.swapaxes(reference[finite, :3, :3], 1, 2)
+    angle[finite] = np.rad2deg(so3.rotation_angle(turned))
+    heading[finite] = np.rad2deg(so3.turn_about(upward, turned))
     return pd.DataFrame(
         {
             "position": np.linalg.norm(difference, axis=1),
@@ -57,6 +59,7 @@ def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.D
             "across": np.einsum("ti,ti->t", difference, left),
             "up": difference @ upward,
             "rotation_deg": angle,
+            "heading_deg": heading,
             "travelled": distance_travelled(reference[:, :3, 3]),
         },
         index=pd.RangeIndex(len(poses), name="frame"),

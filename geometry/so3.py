@@ -120,6 +120,20 @@ def rotation_angle(rotation: ArrayLike) -> FloatArray:
     return np.asarray(np.arctan2(twice_sine, twice_cosine))
 
 
+def turn_about(axis: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Angles (...,) in radians, -pi to pi, by which rotation matrices (..., 3, 3) turn about a unit axis (3,).
+
+    That of the rotation about the axis which is nearest to them: their twist. Zero where they turn by pi about an axis
+    square to it, and there is none.
+    """
+    a, R = np.asarray(axis, dtype=np.float64), np.asarray(rotation, dtype=np.float64)
+    antisymmetric = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+    )
+    cosine = np.trace(R, axis1=-2, axis2=-1) - np.einsum("i,...ij,j->...", a, R, a)
+    return np.asarray(np.arctan2(antisymmetric @ a, cosine))
+
+
 def rotation_defect(matrix: ArrayLike) -> FloatArray:
     """How far matrices (..., 3, 3) are from proper rotations: the largest entry of |R^T R - I| and |det R - 1|."""
     R = np.asarray(matrix, dtype=np.float64)

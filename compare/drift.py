@@ -1,0 +1,80 @@
+"""How much error each metre and each second adds."""
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.geometry import InputError
+
+from .association import Matched
+from .block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
+from .pairs import TOLERANCE, nearest_delta_pairs
+from .pose_difference import Difference, motion_difference
+from .relative import require_stamps
+from .travel import distance_travelled
+
+SHARE = 0.1
+"""of the path and of its duration: over so much the drift is measured by default"""
+
+
+def drift(
+    matched: Matched,
+    metres: float | None = None,
+    seconds: float | None = None,
+    *,
+    confidence: float = CONFIDENCE,
+    repetitions: int = REPETITIONS,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Mean error of the motion over `metres` of the reference's path, per metre, and over `seconds`, per second.
+
+    One row per rate, indexed by `quantity`: `value` with `low` and `high` of a block bootstrap, `unit`, and `over` and
+    `n` that say over what and from how many (overlapping) stretches, all pairs within a tenth of the length wanted.
+    Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without stamps), each
+    divided by what the stretch really measures; `end translation` (%) and `end rotation` (deg/m): the error of the
+    whole motion from first to last pose over the length of the path. Raises InputError where the reference does not
+    move or no stretch is as long as asked for.
+    """
+    reference = matched.reference
+    travelled = distance_travelled(reference.position)
+    path = float(travelled[-1])
+    if len(reference) < 2 or path == 0.0:
+        raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per metre")
+    metres = SHARE * path if metres is None else metres
+    pairs = _stretches(travelled, metres, "m")
+    over = travelled[pairs[:, 1]] - travelled[pairs[:, 0]]
+    rates = [
+        ("translation", "%", 100.0, Difference.TRANSLATION, pairs, over, f"{metres:.4g} m"),
+        ("rotation", "deg/m", 1.0, Difference.ROTATION_DEG, pairs, over, f"{metres:.4g} m"),
+    ]
+    if seconds is not None:
+        require_stamps(matched)
+    if reference.stamped and matched.estimate.stamped:
+        t = reference.t - reference.t[0]
+        seconds = SHARE * float(t[-1]) if seconds is None else seconds
+        pairs = _stretches(t, seconds, "s")
+        over = t[pairs[:, 1]] - t[pairs[:, 0]]
+        rates += [
+            ("translation per second", "m/s", 1.0, Difference.TRANSLATION, pairs, over, f"{seconds:.4g} s"),
+            ("rotation per second", "deg/s", 1.0, Difference.ROTATION_DEG, pairs, over, f"{seconds:.4g} s"),
+        ]
+    whole, path_length = np.array([[0, len(reference) - 1]]), np.array([path])
+    rates += [
+        ("end translation", "%", 100.0, Difference.TRANSLATION, whole, path_length, f"{path:.4g} m"),
+        ("end rotation", "deg/m", 1.0, Difference.ROTATION_DEG, whole, path_length, f"{path:.4g} m"),
+    ]
+    poses, truth = matched.estimate.world_T_body, reference.world_T_body
+    rows = []
+    for quantity, unit, factor, what, stretch, length, said in rates:
+        errors = factor * motion_difference(poses, truth, stretch, what) / length
+        mean = error_statistics(errors, confidence=confidence, repetitions=repetitions, seed=seed).loc["mean"]
+        rows.append((quantity, *mean, unit, said, len(stretch)))
+    columns = ["quantity", "value", "low", "high", "unit", "over", "n"]
+    return pd.DataFrame(rows, columns=columns).set_index("quantity")
+
+
+def _stretches(along: np.ndarray, wanted: float, unit: str) -> IntArray:
+    pairs = nearest_delta_pairs(along, wanted, TOLERANCE) if wanted > 0 else np.empty((0, 2), np.int64)
+    if len(pairs) == 0:
+        raise InputError(f"drift: no two poses are {wanted:g} {unit} apart, of {along[-1]:.4g} {unit} in all")
+    return pairs

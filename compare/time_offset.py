@@ -1,0 +1,81 @@
+"""By how much the clock of an estimate is off that of the reference."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fgbaseline.data import Trajectory
+from fgbaseline.geometry import FloatArray, InputError
+
+from .alignment import Align, align
+from .interpolation import interpolated
+
+STEPS = 400
+MOST_POSES = 2000
+AS_GOOD = 1.05
+"""times the smallest RMSE: offsets within it are as good"""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOffset:
+    """The seconds to add to an estimate's stamps so that it fits the reference best, and how sure that is."""
+
+    seconds: float
+    rmse: float
+    """m, of aligned positions, with it"""
+    rmse_without: float
+    """m, over the same poses, without it"""
+    low: float
+    """s; between low and high the RMSE is at most 5 % above the smallest"""
+    high: float
+    determined: bool
+    """False where that range reaches an end of the search: search wider, or the path (straight, steady) is mute"""
+
+
+def time_offset(
+    reference: Trajectory, estimate: Trajectory, within: float, kind: Align | str = Align.SE3
+) -> TimeOffset:
+    """Searches -`within` to `within` (s) for the offset at which positions differ least (RMSE), aligned as `kind` says.
+
+    The trajectory with the denser stamps is interpolated at those of the other (at most MOST_POSES of them, evenly
+    chosen) that overlap at every offset searched, so that all offsets are judged by the same poses. Raises InputError
+    where fewer than three do, or there are no stamps.
+    """
+    for path in (reference, estimate):
+        if not path.stamped:
+            raise InputError(f"{path.source or path.name}: it has no time stamps, so no offset in time can be found")
+    reference_is_coarse = np.median(np.diff(reference.t)) > np.median(np.diff(estimate.t))
+    coarse, dense = (reference, estimate) if reference_is_coarse else (estimate, reference)
+    both = np.flatnonzero((coarse.t - within >= dense.t[0]) & (coarse.t + within <= dense.t[-1]))
+    if len(both) < 3 or not within > 0:
+        raise InputError(
+            f"an offset within {within:g} s cannot be searched for: {len(both)} poses of {coarse.name} overlap with "
+            f"{dense.name} at each of them, 3 are needed; give a width that is smaller than their overlap"
+        )
+    coarse = coarse.at(both[:: -(-len(both) // MOST_POSES)])
+
+    def misfit(seconds: float) -> float:
+        moved = interpolated(dense, coarse.t + (-seconds if reference_is_coarse else seconds))
+        e, r = (moved, coarse) if reference_is_coarse else (coarse, moved)
+        motion = align(e.world_T_body, r.world_T_body, kind)
+        return _rmse(motion.apply(e.world_T_body)[:, :3, 3] - r.position)
+
+    step = max(float(np.median(np.diff(dense.t))), 2.0 * within / STEPS)
+    n = int(np.ceil(within / step))
+    grid = np.linspace(-within, within, 2 * n + 1)
+    misfits = np.array([misfit(seconds) for seconds in grid])
+    k = int(np.argmin(misfits))
+    bounds = (float(grid[max(k - 1, 0)]), float(grid[min(k + 1, 2 * n)]))
+    best = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-7 * max(1.0, within)})
+    seconds, lowest = (float(best.x), float(best.fun)) if best.fun < misfits[k] else (float(grid[k]), float(misfits[k]))
+    rounding = 1e-9 * float(np.ptp(coarse.position, axis=0).max())
+    good = np.append(grid[misfits <= AS_GOOD * lowest + rounding], seconds)
+    low, high = float(good.min()), float(good.max())
+    edge = 0.5 * float(grid[1] - grid[0])
+    determined = low > -within + edge and high < within - edge
+    return TimeOffset(seconds, lowest, float(misfits[n]), low, high, determined)
+
+
+def _rmse(apart: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
