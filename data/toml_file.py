@@ -25,6 +25,8 @@ from fgbaseline.geometry import InputError
 from .formats.named_file import FilePath, reading, regular_file, shown
 from .toml_lines import Place, lines_of
 
+SHOWN = 60
+"""characters of a value that a sentence repeats"""
 Content = TypeVar("Content", bound=BaseModel)
 
 
@@ -61,7 +63,8 @@ def read_toml(path: FilePath, model: type[Content]) -> TomlFile[Content]:
         errors = error.errors(include_url=False)
         unknown = [each for each in errors if each["type"] == "extra_forbidden"]  # what explains a missing key
         told = [_told(each, values, model) for each in unknown or errors]
-        line, sentence = min((_line(lines, place), sentence) for place, sentence in told)
+        inmost = [(p, said) for p, said in told if not any(other[: len(p)] == p != other for other, _ in told)]
+        line, sentence = min((_line(lines, place), sentence) for place, sentence in inmost)
         raise _wrong(path, line, sentence) from None
     return TomlFile(content, path, lines)
 
@@ -108,12 +111,17 @@ def _told(error: ErrorDetails, values: Any, model: type[BaseModel]) -> tuple[Pla
     last = next((part for part in reversed(place) if isinstance(part, str)), None)
     if isinstance(error["input"], dict) or last is None:
         return place, said if last is None else f"[{_dotted(place)}]: {said}"
-    return place, f"{last} = {json.dumps(error['input'], ensure_ascii=False, default=str)}{around}: {said}"
+    return place, f"{last} = {_shortened(json.dumps(error['input'], ensure_ascii=False, default=str))}{around}: {said}"
 
 
 def _rule(error: ErrorDetails) -> str:
     """What pydantic allows, as the end of a sentence."""
-    return "it" + error["msg"].removeprefix("Input").partition(", unable")[0] + "; change it"
+    _, should, allowed = error["msg"].partition(", unable")[0].partition(" should ")
+    return f"it should {allowed}; change it" if should else f"{error['msg']}; change it"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
 
 
 def _place(loc: tuple[int | str, ...], values: Any) -> Place:

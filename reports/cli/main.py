@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-COMMANDS = {"run": "run", "diagnose": "diagnose", "export": "export", "simulate": "simulate"}
+COMMANDS = {"run": "run", "diagnose": "diagnose", "export": "export", "check": "check", "simulate": "simulate"}
 """command -> module of this package that holds it under the name `command`"""
 BAD_INPUT, INTERRUPTED = 2, 130
 

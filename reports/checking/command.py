@@ -1,0 +1,81 @@
+"""`fgbaseline check`, from what the user named to the exit code."""
+
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data.formats.named_file import writing
+from fgbaseline.geometry import InputError
+
+from .as_json import as_json
+from .baseline import refusal, require_replaceable, write_baseline
+from .evaluation import evaluate
+from .junit import junit
+from .limits_file import read_limits
+from .line import Checked
+from .markdown import markdown
+from .measured import read_folder, read_measured
+from .terminal import print_check
+
+JOB_SUMMARY = "GITHUB_STEP_SUMMARY"
+"""the environment variable by which GitHub names the file that its page of a job shows"""
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Files that the user wants beside the table on the terminal."""
+
+    junit: Path | None = None
+    markdown: Path | None = None
+    json: Path | None = None
+
+
+def check(
+    folder: Path,
+    limits_file: Path,
+    baseline_file: Path | None,
+    outputs: Outputs,
+    *,
+    update: bool = False,
+    accept_worse: bool = False,
+) -> int:
+    """Holds a folder against its limits, tells of it everywhere it is wanted, and gives the exit code."""
+    if update and baseline_file is None:
+        raise InputError("update-baseline: name the file to write with --baseline FILE")
+    if accept_worse and not update:
+        raise InputError("accept-worse: it says what --update-baseline may write; add that")
+    limits, measured = read_limits(limits_file), read_folder(folder)
+    if update and baseline_file is not None:
+        baseline = require_replaceable(baseline_file)
+    else:
+        baseline = None if baseline_file is None else read_measured(baseline_file)
+    checked = evaluate(limits, measured, baseline, updating=update)
+    _write(checked, outputs)
+    print_check(checked)
+    if not update or baseline_file is None:
+        return checked.exit_code
+    if checked.exit_code and not accept_worse:
+        click.echo(f"fgbaseline: {refusal(checked, baseline_file)}", err=True)
+        return checked.exit_code
+    click.echo(write_baseline(checked, baseline_file))
+    return evaluate(limits, measured, read_measured(baseline_file)).exit_code
+
+
+def _write(checked: Checked, outputs: Outputs) -> None:
+    """All files or none, and GitHub's summary of the job."""
+    texts = (
+        (outputs.junit, junit(checked)),
+        (outputs.markdown, markdown(checked).encode()),
+        (outputs.json, as_json(checked).encode()),
+    )
+    with ExitStack() as stack:
+        for path, text in texts:
+            if path is not None:
+                stack.enter_context(written_beside(path)).write(text)
+    if summary := os.environ.get(JOB_SUMMARY):
+        with writing(summary), Path(summary).open("a", encoding="utf-8") as file:
+            file.write(markdown(checked) + "\n")

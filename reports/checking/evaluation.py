@@ -1,0 +1,139 @@
+"""Every limit against every estimator that it matches."""
+
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from typing import Any
+
+from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
+from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.toml_file import TomlFile
+
+from .baseline import REFERENCE, before, is_timing
+from .limits_file import Limit, Limits, Needed
+from .line import Checked, Line
+from .measured import DIGITS, Measured, MeasuredRun, failure, has_metric, metrics_of, nearest, value_of
+
+NEW = "new in the baseline"
+
+
+def evaluate(
+    limits: TomlFile[Limits], measured: Measured, baseline: Measured | None, *, updating: bool = False
+) -> Checked:
+    """All limits against what was measured, and against a baseline.
+
+    `updating` takes what the baseline lacks as new instead of as something that cannot be told. Raises InputError,
+    naming the line, for a limit that matches nothing and for one that asks for a baseline where there can be none.
+    """
+    lines: list[Line] = []
+    for index, limit in enumerate(limits.content.limit):
+        _require_baseline(limits, index, limit, given=baseline is not None or updating)
+        for name, estimator, values in matched(limits, index, measured):
+            lines += _lines(limits, index, (name, measured.runs[name]), (estimator, values), baseline, updating)
+    needed = limits.content.reference
+    told = [_reference(name, run, several=len(measured.runs) > 1) for name, run in measured.runs.items()]
+    return Checked(
+        lines=tuple(lines),
+        references=tuple(sentence for sentence in told if sentence),
+        undecided=needed is not Needed.NONE and any(below(run, needed) for run in measured.runs.values()),
+        measured=measured,
+        limits=shown(limits.path),
+        baseline=None if baseline is None else shown(baseline.path),
+    )
+
+
+def matched(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tuple[str, str, Mapping[str, Any]]]:
+    """Run, estimator and its values, for all that a limit speaks of. Raises InputError where a part matches nothing."""
+    limit = limits.content.limit[index]
+    runs = {name: run for name, run in measured.runs.items() if fnmatchcase(name, limit.runs)}
+    if not runs:
+        said = f'runs = "{limit.runs}" matches no run in {shown(measured.path)}; there are {", ".join(measured.runs)}'
+        raise limits.wrong(("limit", index, "runs"), said)
+    there = sorted({name for run in runs.values() for name in run.estimators})
+    for pattern in limit.patterns:
+        if not any(fnmatchcase(name, pattern) for name in there):
+            said = f'estimators = "{pattern}" matches no estimator; there are {", ".join(there)}'
+            raise limits.wrong(("limit", index, "estimators"), said)
+    chosen: list[tuple[str, str, Mapping[str, Any]]] = [
+        (name, estimator, values)
+        for name, run in runs.items()
+        for estimator, values in run.estimators.items()
+        if any(fnmatchcase(estimator, pattern) for pattern in limit.patterns)
+    ]
+    if not any(failure(values) or has_metric(values, limit.metric) for *_, values in chosen):
+        known = sorted({metric for *_, values in chosen for metric in metrics_of(values)})
+        said = f'metric = "{limit.metric}" is no number of any estimator in question; there are '
+        raise limits.wrong(("limit", index, "metric"), said + nearest(limit.metric, known))
+    return chosen
+
+
+def below(run: MeasuredRun, needed: Needed) -> bool:
+    """Whether a run's reference is less trusted than needed; where nobody can say, it is the user's own."""
+    trust = "trusted" if run.reference is None else run.reference.trust
+    return trust == "untrusted" or (trust == "doubtful" and needed is Needed.TRUSTED)
+
+
+def _lines(
+    limits: TomlFile[Limits],
+    index: int,
+    named_run: tuple[str, MeasuredRun],
+    named_values: tuple[str, Mapping[str, Any]],
+    baseline: Measured | None,
+    updating: bool,
+) -> Iterator[Line]:
+    """One line for the bounds that are written down, and one for those that the baseline sets."""
+    limit = limits.content.limit[index]
+    (name, run), (estimator, values) = named_run, named_values
+    value, missing = value_of(values, limit.metric)
+    old, unknown = before(baseline, name, run, estimator, limit.metric)
+    doubt = _doubt(limit.metric, run, limits.content.reference)
+
+    def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
+        outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating)
+        at = limits.line(("limit", index))
+        return Line(name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason)
+
+    if limit.bounds is not None:
+        yield line(value, limit.bounds, "")
+    if limit.baseline is not None:
+        by = limit.baseline
+        bounds = None if old is None else around(old, by.better, relative=by.relative, absolute=by.absolute)
+        yield line(None if value is None else rounded(value, DIGITS), bounds, by.told)
+
+
+def _outcome(
+    value: float | None, missing: str, bounds: Bounds | None, unknown: str, doubt: str, updating: bool
+) -> tuple[Outcome, str]:
+    if value is None:
+        return Outcome.FALLS_SHORT, missing
+    if doubt:
+        return Outcome.CANNOT_TELL, doubt
+    if bounds is None:
+        return Outcome.HOLDS if updating else Outcome.CANNOT_TELL, unknown
+    return bounds.judge(value), ""
+
+
+def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
+    """Why the reference keeps a metric from being judged; empty where it does not."""
+    if metric.partition(".")[0] != REFERENCE or run.reference is None or not below(run, needed):
+        return ""
+    return f"the reference is {run.reference.trust}"
+
+
+def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, given: bool) -> None:
+    if limit.baseline is None:
+        return
+    place = ("limit", index, "baseline")
+    if is_timing(limit.metric):
+        raise limits.wrong(place, f"a baseline holds no timings such as {limit.metric}; bound it with at_most")
+    if not given:
+        raise limits.wrong(place, "this limit asks for a baseline; name one with --baseline FILE")
+
+
+def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:
+    """What is to be said of a reference that is not trusted."""
+    reference = run.reference
+    if reference is None or reference.trust == "trusted":
+        return ""
+    where = f" of {name}" if several else ""
+    why = f": {reference.reasons[0]}" if reference.reasons else ""
+    return f"The reference{where}{f', {reference.name},' if reference.name else ''} is {reference.trust}{why}."

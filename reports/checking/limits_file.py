@@ -1,0 +1,98 @@
+"""The limits file: what has to hold, in TOML."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from fgbaseline.compare.limits import Better, Bounds
+from fgbaseline.data.toml_file import TomlFile, read_toml
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Needed(StrEnum):
+    """How far the reference has to be trusted before anything is said to hold."""
+
+    TRUSTED = "trusted"
+    DOUBTFUL = "doubtful"
+    """a doubtful one will do, and is told"""
+    NONE = "none"
+    """limits on what does not rest on the reference are judged whatever it is; the others need a doubtful one"""
+
+
+class Tolerance(_Part):
+    """By how much a figure may be worse than its baseline: the larger of the two."""
+
+    better: Better
+    relative: NotNegative = 0.0
+    """share of the baseline"""
+    absolute: NotNegative = 0.0
+    """in the figure's unit"""
+
+    @property
+    def told(self) -> str:
+        """What is allowed, such as '5 % or 0.01'."""
+        parts = [f"{100 * self.relative:.4g} %"] if self.relative else []
+        parts += [f"{self.absolute:.4g}"] if self.absolute else []
+        return " or ".join(parts) or "nothing"
+
+
+def _no_blank(text: str) -> str:
+    if not text.strip():
+        raise ValueError("it is empty; write a path or a pattern")
+    return text
+
+
+Pattern = Annotated[str, AfterValidator(_no_blank)]
+
+
+class Limit(_Part):
+    """One promise: about a metric of every estimator, in every run, that the patterns match."""
+
+    metric: Pattern
+    """its path below `estimators.NAME` in summary.json, such as ate.rmse"""
+    estimators: Pattern | Annotated[tuple[Pattern, ...], Field(min_length=1)] = "*"
+    runs: Pattern = "*"
+    """of a folder that holds several"""
+    at_most: Finite | None = None
+    at_least: Finite | None = None
+    baseline: Tolerance | None = None
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """The patterns of estimators, however they were written."""
+        return (self.estimators,) if isinstance(self.estimators, str) else self.estimators
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """Those that are written down; None where only the baseline counts."""
+        if self.at_most is None and self.at_least is None:
+            return None
+        return Bounds(**{side: value for side in ("at_most", "at_least") if (value := getattr(self, side)) is not None})
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "Limit":
+        if self.bounds is None and self.baseline is None:
+            raise ValueError(f"nothing is asked of {self.metric}; add at_most, at_least or baseline")
+        if self.bounds is not None and self.bounds.at_least > self.bounds.at_most:
+            raise ValueError(f"at_least = {self.at_least:g} is above at_most = {self.at_most:g}; nothing lies between")
+        return self
+
+
+class Limits(_Part):
+    """The file."""
+
+    reference: Needed = Needed.DOUBTFUL
+    limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
+
+
+def read_limits(path: Path) -> TomlFile[Limits]:
+    """The limits in a file. Raises InputError naming file, line, key and what is allowed."""
+    return read_toml(path, Limits)

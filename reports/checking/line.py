@@ -1,0 +1,73 @@
+"""One line of a check, and all of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fgbaseline.compare.limits import Bounds, Outcome, rounded
+
+from .measured import DIGITS, Measured
+
+HOLDS, FALLS_SHORT, CANNOT_TELL = 0, 1, 2
+"""exit codes"""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A metric of an estimator against one limit."""
+
+    run: str
+    """the name of the sequence; empty where trajectories alone were compared"""
+    estimator: str
+    metric: str
+    limit_line: int
+    """of the limits file"""
+    outcome: Outcome
+    value: float | None
+    bounds: Bounds | None
+    """None where there is no baseline to take them from"""
+    tolerance: str
+    """what is allowed beside the baseline, such as '5 %'; empty for bounds that are written down"""
+    before: float | None
+    """in the baseline"""
+    reason: str
+    """why there is no value, or why nothing can be told"""
+
+    @property
+    def margin(self) -> float | None:
+        """How far inside its bounds the value is; negative outside."""
+        return None if self.value is None or self.bounds is None else self.bounds.margin(self.value)
+
+    @property
+    def change(self) -> float | None:
+        """The value, rounded as the baseline is, minus that of the baseline."""
+        if self.value is None or self.before is None:
+            return None
+        return rounded(rounded(self.value, DIGITS) - self.before, DIGITS)
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A folder held against its limits."""
+
+    lines: tuple[Line, ...]
+    """in the order of the limits file, then of run and estimator"""
+    references: tuple[str, ...]
+    """what is to be said of references that are not trusted, a sentence for each run"""
+    undecided: bool
+    """a reference is less trusted than the limits ask for"""
+    measured: Measured
+    limits: str
+    """the limits file"""
+    baseline: str | None
+
+    @property
+    def exit_code(self) -> int:
+        """0 all hold, 1 some fall short, 2 none does but some cannot be told."""
+        if self.count[Outcome.FALLS_SHORT]:
+            return FALLS_SHORT
+        return CANNOT_TELL if self.undecided or self.count[Outcome.CANNOT_TELL] else HOLDS
+
+    @property
+    def count(self) -> Mapping[Outcome, int]:
+        """How many lines came out how."""
+        return {outcome: sum(line.outcome is outcome for line in self.lines) for outcome in Outcome}
