@@ -10,6 +10,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from fgbaseline.data import Excluded, Observations
+from fgbaseline.data.axes import axes_matrix
+from fgbaseline.data.diagnose.axes import linear_axes
 from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
 from fgbaseline.data.diagnose.timing import timing
@@ -136,6 +138,27 @@ def test_a_regression_ignores_a_fifth_of_outliers(seed: int) -> None:
     fit = regress(y, X, np.array([10.0, 10.0]))
     assert np.abs(fit.theta - theta).max() < 6.0 * np.sqrt(np.diag(fit.covariance)).max()
     assert (np.abs(fit.sigma / 0.1 - 1.0) < 0.6).all()
+
+
+def test_a_regression_pays_no_price_for_a_calibration_error_that_is_none() -> None:
+    random = np.random.default_rng(0)
+    x = random.normal(size=(2000, 1, 1))
+    fit = regress(x[:, :, 0] + 0.01 * random.normal(size=(2000, 1)), x, np.array([0.05]))
+    assert fit.theta[0] == pytest.approx(0.15)
+    assert fit.sigma[0] == pytest.approx(0.85, rel=0.1)
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.5])
+def test_a_noisy_forward_speed_is_seen_and_a_delayed_one_too(noise: float) -> None:
+    random = np.random.default_rng(1)
+    k = np.arange(800)
+    seen = np.column_stack([8.0 + 4.0 * np.sin(k / 20), 0.03 * np.cos(k / 7), 0.02 * np.sin(k / 5)])
+    rate = 0.2 * np.column_stack([0.05 * np.sin(k / 6), 0.05 * np.sin(k / 4), np.sin(k / 30)])
+    recorded = np.roll(seen, 2, axis=0) @ axes_matrix("-y,x,z") + noise * random.normal(size=(800, 3))
+    seen = seen + 0.03 * random.normal(size=(800, 3))
+    axes = linear_axes(seen, recorded, rate, np.ones(800, dtype=np.bool_), "x,y,z")
+    assert axes.seen == (True, False, False)
+    assert axes.name.split(",")[0] == "-y"
 
 
 @given(st.floats(-2.0, 2.0), st.integers(0, 100))

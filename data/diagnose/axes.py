@@ -17,10 +17,14 @@ ENOUGH = 25.0
 """log-likelihood by which a convention must lead for the data to have decided"""
 MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.15, 0.05
 """rad, m and share: how wrong an honest calibration may be; what it explains is no evidence for another convention"""
+CHI_SQUARE_MEDIAN = 0.4549
+"""of one degree of freedom"""
 MAX_BIAS = 1.0
 """rad/s"""
 GAIN_RANGE, GAIN_DEVIATION = 0.35, 0.12
 """an axis is seen where its recorded component follows the cameras' with a gain this near to 1, known this well"""
+EXCITED = 2.0
+"""times what calibration errors of one deviation leak into a component, from which on it is a motion of its own"""
 
 Design = Callable[[FloatArray, BoolArray], FloatArray]
 """the regressors (n, 3, p) of calibration errors, of turned recorded velocities (n, 3) at chosen intervals"""
@@ -60,7 +64,7 @@ def angular_axes(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Ax
     def design(x: FloatArray, _: BoolArray) -> FloatArray:
         return np.concatenate([-so3.hat3(x), np.tile(np.eye(3), (len(x), 1, 1))], axis=2)
 
-    scores = _scores(seen, recorded, known, design, np.repeat([MISALIGNMENT, MAX_BIAS], 3))
+    scores, _ = _scores(seen, recorded, known, design, np.repeat([MISALIGNMENT, MAX_BIAS], 3))
     best = max(scores, key=lambda name: scores[name])
     axes = tuple(_lead(scores, best, axis) > ENOUGH for axis in range(3))
     return _decided(scores, best, axes, (IDENTITY,), seen, recorded, known)
@@ -70,45 +74,67 @@ def linear_axes(seen: FloatArray, recorded: FloatArray, rate: FloatArray, known:
     """The convention of the linear velocity, m/s; `rate` (T-1, 3) is the angular velocity that the cameras see.
 
     A car shows only which axis is forward: its small components are explained as well by a slightly wrong extrinsic.
-    An axis therefore counts as seen only where its component follows the cameras' with a gain near one. What is left
-    open stays as recorded, or else follows the `angular` convention.
+    An axis therefore counts as seen only where its component is larger than that, and follows the cameras' with a gain
+    near one. What is left open stays as recorded, or else follows the `angular` convention.
     """
 
     def design(x: FloatArray, chosen: BoolArray) -> FloatArray:
         return np.concatenate([-so3.hat3(x), so3.hat3(rate[chosen]), x[:, :, None]], axis=2)
 
-    scores = _scores(seen, recorded, known, design, np.array([MISALIGNMENT] * 3 + [LEVER_ARM] * 3 + [SCALE]))
+    prior = np.array([MISALIGNMENT] * 3 + [LEVER_ARM] * 3 + [SCALE])
+    scores, lags = _scores(seen, recorded, known, design, prior)
     best = max(scores, key=lambda name: scores[name])
-    turned = recorded[known] @ axes_matrix(best).T
-    follows = _follows(seen[known], turned, rate[known])
-    axes = tuple(follows[axis] and _lead(scores, best, axis) > ENOUGH for axis in range(3))
+    shifted, chosen = _lagged(recorded, known, lags[best])
+    turned = shifted[chosen] @ axes_matrix(best).T
+    excited = _excited(seen[chosen], turned, rate[chosen])
+    follows = _follows(seen[chosen], turned, rate[chosen])
+    axes = tuple(excited[i] and follows[i] and _lead(scores, best, i) > ENOUGH for i in range(3))
     return _decided(scores, best, axes, (IDENTITY, angular), seen, recorded, known)
 
 
 def _scores(
     seen: FloatArray, recorded: FloatArray, known: BoolArray, design: Design, prior: FloatArray
-) -> dict[str, float]:
-    """Log-likelihood of each convention, at its best lag."""
-    scores = dict.fromkeys(AXIS_CONVENTIONS, -np.inf)
+) -> tuple[dict[str, float], dict[str, int]]:
+    """Log-likelihood of each convention at its best lag, and this lag."""
+    scores, lags = dict.fromkeys(AXIS_CONVENTIONS, -np.inf), dict.fromkeys(AXIS_CONVENTIONS, 0)
     for lag in LAGS:
-        shifted = np.roll(recorded, -lag, axis=0)
-        chosen = known.copy()
-        if lag > 0:
-            chosen[-lag:] = False
-        elif lag < 0:
-            chosen[:-lag] = False
+        shifted, chosen = _lagged(recorded, known, lag)
         for name in AXIS_CONVENTIONS:
             x = shifted[chosen] @ axes_matrix(name).T
             fit = regress(seen[chosen] - x, design(x, chosen), prior)
             # fewer samples at a larger lag: compared per sample
-            scores[name] = max(scores[name], fit.log_likelihood * known.sum() / chosen.sum())
-    return scores
+            score = fit.log_likelihood * known.sum() / chosen.sum()
+            if score > scores[name]:
+                scores[name], lags[name] = score, lag
+    return scores, lags
+
+
+def _lagged(recorded: FloatArray, known: BoolArray, lag: int) -> tuple[FloatArray, BoolArray]:
+    """Sample k + lag in the place of k, and the known intervals (T-1,) that have one."""
+    chosen = known.copy()
+    if lag > 0:
+        chosen[-lag:] = False
+    elif lag < 0:
+        chosen[:-lag] = False
+    return np.roll(recorded, -lag, axis=0), chosen
 
 
 def _lead(scores: dict[str, float], best: str, axis: int) -> float:
     """By how much the best convention leads those that have another component on this axis."""
     row = best.split(",")[axis]
     return scores[best] - max(score for name, score in scores.items() if name.split(",")[axis] != row)
+
+
+def _excited(seen: FloatArray, x: FloatArray, rate: FloatArray) -> list[bool]:
+    """For each axis, whether its motion is more than honest calibration errors leak in from the others and the rates.
+
+    The size of a component is that of what cameras and recording agree on: the noise of neither adds to it.
+    """
+    reach = np.abs(x).max(axis=0)
+    power = np.maximum(np.mean(np.clip(seen, -reach, reach) * x, axis=0), 0.0)
+    turning = np.median(rate**2, axis=0) / CHI_SQUARE_MEDIAN
+    leak = MISALIGNMENT**2 * (power.sum() - power) + LEVER_ARM**2 * (turning.sum() - turning)
+    return [bool(p > EXCITED**2 * q) for p, q in zip(power, leak, strict=True)]
 
 
 def _follows(seen: FloatArray, x: FloatArray, rate: FloatArray) -> list[bool]:

@@ -9,6 +9,9 @@ from fgbaseline.geometry import FloatArray
 TUKEY = 4.685
 """sigmas, beyond which a residual has no weight (Tukey's biweight at 95 % efficiency)"""
 ROUNDS = 8
+FARTHEST = 3.0
+"""prior deviations from zero at which a coefficient is held: a price alone, however high, is paid where there are many
+samples, and an error of 90° or of the whole speed is none of calibration"""
 
 
 class Regression(NamedTuple):
@@ -34,6 +37,7 @@ def regress(y: FloatArray, X: FloatArray, prior: FloatArray) -> Regression:
         weight = np.clip(1.0 - (residual / (TUKEY * sigma)) ** 2, 0.0, None) ** 2 / sigma**2
         information = np.einsum("nip,ni,niq->pq", X, weight, X) + np.diag(1.0 / prior**2)
         theta = np.linalg.solve(information, np.einsum("nip,ni,ni->p", X, weight, y))
+        theta = np.clip(theta, -FARTHEST * prior, FARTHEST * prior)
     sigma = _bulk(y - X @ theta)
     likelihood = -len(y) * float(np.log(sigma).sum()) - 0.5 * float(np.sum((theta / prior) ** 2))
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
