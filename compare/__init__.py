@@ -4,11 +4,15 @@ from .absolute import absolute_errors
 from .alignment import Align, Alignment, align, align_se3
 from .association import Association, Matched, associate
 from .block_bootstrap import error_statistics
-from .consistency import nees
+from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
 from .difference_shares import DifferenceShares, difference_shares
 from .drift import drift
 from .growth import Passing, first_beyond, growing_divergence, growth_by_part
+from .held_out import HeldOutErrors, held_out_errors, held_out_ranking
+from .innovation import NisSummary, nis_per_degree, nis_summary
 from .interpolation import interpolated
+from .maps import map_by_depth, map_difference
+from .moved import moved_points
 from .pairs import Unit, pose_pairs
 from .pose_difference import Difference, absolute_difference, motion_difference
 from .relative import matched_pairs, relative_errors
@@ -19,19 +23,26 @@ from .reprojection import (
     reprojection_by,
     reprojection_summary,
 )
+from .residual_patterns import residual_patterns
 from .segments import SegmentErrors, segment_errors
+from .shared_data import DifferenceNees, difference_nees
 from .statistics import summarised
 from .time_offset import TimeOffset, time_offset
 from .trajectory import divergence, divergence_summary, pose_errors, truth_errors
 from .trust import Trust, Verdict, trust
+from .whitened import track_chi_square, whitened_summary
 
 __all__ = [
     "Align",
     "Alignment",
     "Association",
+    "CovarianceState",
     "Difference",
+    "DifferenceNees",
     "DifferenceShares",
+    "HeldOutErrors",
     "Matched",
+    "NisSummary",
     "Passing",
     "SegmentErrors",
     "TimeOffset",
@@ -42,9 +53,13 @@ __all__ = [
     "absolute_errors",
     "align",
     "align_se3",
+    "anees",
     "associate",
+    "body_error",
     "commonly_used",
     "component_summary",
+    "covariance_state",
+    "difference_nees",
     "difference_shares",
     "divergence",
     "divergence_summary",
@@ -53,19 +68,31 @@ __all__ = [
     "first_beyond",
     "growing_divergence",
     "growth_by_part",
+    "held_out_errors",
+    "held_out_ranking",
     "interpolated",
+    "map_by_depth",
+    "map_difference",
     "matched_pairs",
     "motion_difference",
+    "moved_points",
     "nees",
+    "nees_table",
+    "nis_per_degree",
+    "nis_summary",
     "pose_errors",
     "pose_pairs",
     "relative_errors",
     "reprojection",
     "reprojection_by",
     "reprojection_summary",
+    "residual_patterns",
     "segment_errors",
+    "sigma_ratio",
     "summarised",
     "time_offset",
+    "track_chi_square",
     "trust",
     "truth_errors",
+    "whitened_summary",
 ]

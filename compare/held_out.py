@@ -1,0 +1,170 @@
+"""Paths ranked by tracks that none of them has seen, without ground truth.
+
+Each piece of a held-out track is triangulated along a path from one half of its sights and predicted into the other
+half, and the other way round. What errs is the path between the two halves, so that a track of 13 frames tells of the
+motion over about a second; drift over longer times it cannot see.
+
+One mask for all paths: a piece takes part where at least one path explains it, its smallest error over the paths being
+below `GATE` times the median of these (3 to 12 px). What is left out is explained by no path, so that leaving it out
+favours none; what one path explains counts against all others.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data import HeldOut, Sequence
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FgbaselineError, FloatArray, se3
+from fgbaseline.geometry.triangulation import triangulate_tracks
+
+from .reprojection import NEAR
+
+GATE = 6.0
+GATE_RANGE = (3.0, 12.0)
+"""px"""
+HUBER = 2.5
+"""sigmas, of the triangulation"""
+BLOCK = 5.0
+"""s: tracks that begin in the same stretch of so long share the errors of a path, and are drawn together"""
+RESAMPLES = 400
+SEED = 20264
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HeldOutErrors:
+    """The errors of several paths on the same observations."""
+
+    table: pd.DataFrame
+    """one row per observation that takes part: `piece`, `landmark`, `frame`, `start` (s, when its piece begins)"""
+    error: pd.DataFrame
+    """beside it a column for each path, px: norm of the four differences; infinite behind the camera"""
+    gate: float
+    """px"""
+    pieces: int
+    """that every path has poses for"""
+    inliers: int
+    """of these that take part"""
+
+
+def held_out_errors(
+    sequence: Sequence, held: HeldOut, paths: Mapping[str, FloatArray], pixel_variance: float
+) -> HeldOutErrors:
+    """What paths (T, 4, 4) say of the held-out pieces, over those that lie where all of them have poses.
+
+    `sequence` gives stamps, camera and extrinsic, as the estimators had them; `pixel_variance` px^2 scales the kernel
+    of the triangulation. Raises FgbaselineError without a path.
+    """
+    if not paths:
+        raise FgbaselineError("held-out tracks need at least one path to be judged")
+    everywhere = np.isfinite(np.stack(list(paths.values()))).all(axis=(0, 2, 3))
+    chosen = _by_piece(held, np.asarray(everywhere, dtype=np.bool_))
+    error = np.stack([half_errors(sequence, held, chosen, path, pixel_variance) for path in paths.values()], axis=1)
+    piece = np.unique(held.piece[chosen], return_inverse=True)[1]
+    n = int(piece.max(initial=-1)) + 1
+    count = np.bincount(piece, minlength=n)
+    squares = np.stack([np.bincount(piece, weights=column**2, minlength=n) for column in error.T], axis=1)
+    best = np.sqrt(squares / count[:, None]).min(axis=1)
+    finite = best[np.isfinite(best)]
+    gate = float(np.clip(GATE * np.median(finite), *GATE_RANGE)) if len(finite) else GATE_RANGE[0]
+    inlier = best < gate
+    taken, o = inlier[piece], held.observations
+    frame = o.frame[chosen]
+    first = np.full(n, np.iinfo(np.int64).max)
+    np.minimum.at(first, piece, frame)
+    table = pd.DataFrame(
+        {
+            "piece": held.piece[chosen],
+            "landmark": o.landmark[chosen],
+            "frame": frame,
+            "start": (sequence.t - sequence.t[0])[first[piece]],
+        }
+    )
+    errors = pd.DataFrame(error, columns=list(paths))
+    return HeldOutErrors(
+        table[taken].reset_index(drop=True), errors[taken].reset_index(drop=True), gate, n, int(inlier.sum())
+    )
+
+
+def half_errors(
+    sequence: Sequence, held: HeldOut, chosen: IntArray, path: FloatArray, pixel_variance: float
+) -> FloatArray:
+    """(n,) px: the errors of the held-out observations `chosen` (n,), sorted by piece and frame, along one path.
+
+    Those of the first half of a piece are predicted from its second half, and those of the second from its first.
+    """
+    o = held.observations
+    piece = np.unique(held.piece[chosen], return_inverse=True)[1].astype(np.int64)
+    n = int(piece.max(initial=-1)) + 1
+    count = np.bincount(piece, minlength=n)
+    position = np.arange(len(piece)) - (np.cumsum(count) - count)[piece]
+    late = position >= (count[piece] + 1) // 2
+    world_T_cam, pixel = (path @ sequence.imu_T_cam)[o.frame[chosen]], o.pixel[chosen]
+    error = np.full(len(piece), np.inf)
+    for seen in (~late, late):
+        points = triangulate_tracks(
+            sequence.camera, world_T_cam[seen], piece[seen], pixel[seen], n, pixel_variance, HUBER
+        )
+        p_cam = se3.transform(se3.inverse(world_T_cam[~seen]), points.position[piece[~seen]])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            norm = np.linalg.norm(pixel[~seen] - sequence.camera.project(p_cam), axis=1)
+        error[~seen] = np.where((p_cam[:, 2] > 0.0) & np.isfinite(norm), norm, np.inf)
+    return error
+
+
+def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
+    """One row per path, the best first: its `median`, `p95` (px) and share `under_3px` over the common observations.
+
+    `low` and `high` are a 95 % interval of the median, `behind` its distance from the best median with `behind_low`
+    and `behind_high`: an interval that holds zero says that the two cannot be told apart. By resampling stretches of
+    `BLOCK` seconds (block bootstrap, 400 draws). Empty without observations.
+    """
+    values = errors.error.to_numpy()
+    columns = ["median", "low", "high", "behind", "behind_low", "behind_high", "p95", "under_3px"]
+    if len(values) == 0:
+        return pd.DataFrame(columns=columns, index=pd.Index([], name="estimator"), dtype=np.float64)
+    median = np.median(values, axis=0)
+    best = int(np.argmin(median))
+    drawn = _drawn_medians(values, np.floor(errors.table["start"].to_numpy() / BLOCK).astype(np.int64))
+    low, high = np.percentile(drawn, [2.5, 97.5], axis=0, method="nearest")
+    with np.errstate(invalid="ignore"):
+        behind = np.nan_to_num(drawn - drawn[:, [best]], nan=np.inf)
+    behind_low, behind_high = np.percentile(behind, [2.5, 97.5], axis=0, method="nearest")
+    table = pd.DataFrame(
+        {
+            "median": median,
+            "low": low,
+            "high": high,
+            "behind": median - median[best],
+            "behind_low": behind_low,
+            "behind_high": behind_high,
+            "p95": np.percentile(values, 95, axis=0, method="nearest"),
+            "under_3px": np.mean(values < NEAR, axis=0),
+        },
+        index=pd.Index(errors.error.columns, name="estimator"),
+    )
+    return table.sort_values("median", kind="stable")
+
+
+def _by_piece(held: HeldOut, everywhere: BoolArray) -> IntArray:
+    """(n,) held-out observations of pieces within the frames (T,) that all paths have, sorted by piece, then frame."""
+    o, piece = held.observations, held.piece
+    missing = np.zeros(held.n_pieces, dtype=np.bool_)
+    missing[piece[(piece >= 0) & ~everywhere[o.frame]]] = True
+    chosen = np.flatnonzero(piece >= 0)
+    chosen = chosen[~missing[piece[chosen]]]
+    return chosen[np.lexsort((o.frame[chosen], piece[chosen]))].astype(np.int64)
+
+
+def _drawn_medians(values: FloatArray, block: IntArray) -> FloatArray:
+    """(RESAMPLES, m) medians of values (n, m) over blocks drawn with replacement."""
+    random = np.random.default_rng(SEED)
+    rows = [np.flatnonzero(block == b) for b in np.unique(block)]
+    drawn = np.empty((RESAMPLES, values.shape[1]))
+    for i in range(RESAMPLES):
+        drawn[i] = np.median(
+            values[np.concatenate([rows[j] for j in random.integers(0, len(rows), len(rows))])], axis=0
+        )
+    return drawn
