@@ -1,5 +1,6 @@
 """How one path is laid over another, and what it leaves open."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -113,9 +114,12 @@ def align(
         return Alignment(n=0, of=n)
     used = 1 if kind is Align.FIRST_POSE else (first or n)
     there, here = estimate[:used], reference[:used]
-    turns = _side_by_side(here) @ _side_by_side(there).T
+
+    def turns() -> FloatArray:
+        return _side_by_side(here) @ _side_by_side(there).T
+
     if kind is Align.FIRST_POSE:
-        R = turns
+        R = turns()
         return Alignment(kind, R, here[0, :3, 3] - R @ there[0, :3, 3], 1.0, 1, n)
     return _fitted(there[:, :3, 3], here[:, :3, 3], turns, kind, np.asarray(up, dtype=np.float64), n)
 
@@ -125,7 +129,10 @@ def _side_by_side(poses: FloatArray) -> FloatArray:
     return poses[:, :3, :3].transpose(1, 0, 2).reshape(3, -1)
 
 
-def _fitted(there: FloatArray, here: FloatArray, turns: FloatArray, kind: Align, up: FloatArray, n: int) -> Alignment:
+def _fitted(
+    there: FloatArray, here: FloatArray, turns: Callable[[], FloatArray], kind: Align, up: FloatArray, n: int
+) -> Alignment:
+    there, here = np.ascontiguousarray(there), np.ascontiguousarray(here)
     centre, goal = there.mean(axis=0), here.mean(axis=0)
     x, y = there - centre, here - goal
     M = y.T @ x
@@ -166,4 +173,4 @@ def align_se3(positions: FloatArray, reference: FloatArray) -> FloatArray:
     if not (np.isfinite(positions).all() and np.isfinite(reference).all()):
         raise FgbaselineError("alignment needs finite positions")
     up = np.array([0.0, 0.0, 1.0])
-    return _fitted(positions, reference, np.eye(3), Align.SE3, up, len(positions)).matrix
+    return _fitted(positions, reference, lambda: np.eye(3), Align.SE3, up, len(positions)).matrix

@@ -69,7 +69,7 @@ class Matched:
         if self.alignment.kind is not Align.NONE:
             raise InputError(f"{self.estimate.name}: it is aligned already ({self.alignment.caption}); align it once")
         done = align(self.estimate.world_T_body, self.reference.world_T_body, kind, first=first, up=up)
-        moved = self.estimate.with_poses(done.apply(self.estimate.world_T_body))
+        moved = replace(self.estimate, world_T_body=done.apply(self.estimate.world_T_body), proven=True)
         return replace(self, estimate=moved, alignment=done)
 
 

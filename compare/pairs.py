@@ -13,7 +13,8 @@ ROUNDING = 1e-9
 """of a delta: so much less than it still counts, so that rounding does not decide where steps add up to it exactly"""
 TOLERANCE = 0.1
 """of a delta: by how much all pairs may miss it"""
-BLOCK = 512
+AT_ONCE = 4_000_000
+"""pairs looked at together, to bound the memory"""
 
 
 class Unit(StrEnum):
@@ -38,8 +39,8 @@ def pose_pairs(
 
     Consecutive: each pair begins where the one before ended, and ends with the first pose that is a delta away or more.
     All: for each pose the later one whose distance in time or along the path is nearest to the delta, if within
-    `tolerance` (a share of it); for degrees every later pose whose orientation is a delta away within `tolerance`, the
-    direct angle and not the accumulated one. Raises InputError where there is no such pair.
+    `tolerance` (a share of it; frames are counted exactly); for degrees every later pose whose orientation is a delta
+    away within `tolerance`, the direct angle and not the accumulated one. Raises InputError where there is no pair.
     """
     unit = Unit(unit)
     if not (np.isfinite(delta) and delta > 0 and (unit is not Unit.FRAMES or float(delta).is_integer())):
@@ -51,7 +52,8 @@ def pose_pairs(
         pairs = turned_pairs(poses[:, :3, :3], np.deg2rad(delta), np.deg2rad(delta) * tolerance)
     else:
         along = _coordinate(poses, t, unit)
-        pairs = nearest_delta_pairs(along, delta, tolerance) if all_pairs else chained_pairs(along, delta)
+        miss = 0.0 if unit is Unit.FRAMES else tolerance
+        pairs = nearest_delta_pairs(along, delta, miss) if all_pairs else chained_pairs(along, delta)
     if len(pairs) == 0:
         raise InputError(
             f"delta: no two of the {len(poses)} poses are {delta:g} {unit.value} apart; give a smaller one"
@@ -88,8 +90,9 @@ def turned_pairs(rotations: FloatArray, angle: float, tolerance: float) -> IntAr
     most, least = (np.cos(np.clip(edge, 0.0, np.pi)) for edge in (angle - tolerance, angle + tolerance))
     slack = 1e-12  # the cosine's rounding; the angle itself decides among the candidates
     found = []
-    for first in range(0, n - 1, BLOCK):
-        traces = flat[first : first + BLOCK] @ flat[first:].T
+    block = max(1, AT_ONCE // n)
+    for first in range(0, n - 1, block):
+        traces = flat[first : first + block] @ flat[first:].T
         i, j = np.nonzero((traces >= 1.0 + 2.0 * least - slack) & (traces <= 1.0 + 2.0 * most + slack))
         later = j > i
         found.append(np.stack([i[later], j[later]], axis=1) + first)

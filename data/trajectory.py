@@ -1,7 +1,7 @@
 """A path through time, from anywhere: stamps and the poses of one body in one world."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import InitVar, dataclass, replace
 
 import numpy as np
 
@@ -32,13 +32,16 @@ class Trajectory:
     """(T,) the line or row of `source` that each pose stands in, for errors"""
     stamped: bool = True
     """False where the source has no time: then nothing can be said per second"""
+    proven: InitVar[bool] = False
+    """True leaves out the checks: for what was made of a checked trajectory"""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, proven: bool) -> None:
         for field in ("t", "world_T_body"):
             array = np.array(getattr(self, field), dtype=np.float64)
             array.flags.writeable = False
             object.__setattr__(self, field, array)
-        check_trajectory(self)
+        if not proven:
+            check_trajectory(self)
 
     @staticmethod
     def of_frames(t: FloatArray, world_T_body: FloatArray, name: str, source: str = "") -> "Trajectory":
@@ -63,9 +66,11 @@ class Trajectory:
         return self.world_T_body[:, :3, :3]
 
     def at(self, index: IntArray) -> "Trajectory":
-        """The poses of these rising indices (n,)."""
+        """The poses of these strictly rising indices (n,)."""
+        if len(index) == len(self):
+            return self
         line = None if self.line is None else self.line[index]
-        return replace(self, t=self.t[index], world_T_body=self.world_T_body[index], line=line)
+        return replace(self, t=self.t[index], world_T_body=self.world_T_body[index], line=line, proven=len(index) > 0)
 
     def with_poses(self, world_T_body: FloatArray) -> "Trajectory":
         """The same stamps with other poses (T, 4, 4)."""
@@ -98,8 +103,8 @@ def check_trajectory(path: Trajectory) -> None:
     finite = np.asarray(np.isfinite(poses).all(axis=(1, 2)), dtype=np.bool_)
     _require(finite, path, lambda _: "it is not finite; leave out what is not known")
     with np.errstate(over="ignore", invalid="ignore"):
-        last_row = np.abs(poses[:, 3] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=1)
-        defect = np.maximum(so3.rotation_defect(poses[:, :3, :3]), last_row)
+        last_row = [np.abs(poses[:, 3, i] - float(i == 3)) for i in range(4)]
+        defect = np.maximum.reduce([so3.rotation_defect(poses[:, :3, :3]), *last_row])
     _require(
         defect <= ROTATION_TOLERANCE,
         path,
