@@ -4,13 +4,24 @@ BIN := $(VENV)/bin
 PACKAGES := geometry data ekf smoother compare reports
 OUT ?= out/simulated
 
-.PHONY: run test lint types arrows install schema wheel clean
+QUICK_DRIVE := --path town --duration 10 --features-per-frame 25 --seed 3
+QUICK_ESTIMATORS := dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch
+QUICK_CHECK :=
+
+.PHONY: run test quick lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
 
-test: install lint types arrows
+test: install lint types arrows quick
 	$(BIN)/pytest -n 2
+
+# Are our own estimators as good as they were? QUICK_CHECK=--update-baseline says that they are meant to differ.
+quick: install
+	@mkdir -p out
+	$(BIN)/fgbaseline simulate out/quick.npz $(QUICK_DRIVE) --force
+	$(BIN)/fgbaseline run out/quick.npz --estimators $(QUICK_ESTIMATORS) --out out/quick --force
+	$(BIN)/fgbaseline check out/quick --limits suites/quick-limits.toml --baseline suites/quick-baseline.json $(QUICK_CHECK)
 
 lint: install
 	$(BIN)/ruff check .

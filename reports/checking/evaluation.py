@@ -10,10 +10,8 @@ from fgbaseline.data.toml_file import TomlFile
 
 from .baseline import REFERENCE, before, is_timing
 from .limits_file import Limit, Limits, Needed
-from .line import Checked, Line
+from .line import NEW, Checked, Line
 from .measured import DIGITS, Measured, MeasuredRun, failure, has_metric, metrics_of, nearest, value_of
-
-NEW = "new in the baseline"
 
 
 def evaluate(

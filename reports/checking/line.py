@@ -9,6 +9,8 @@ from .measured import DIGITS, Measured
 
 HOLDS, FALLS_SHORT, CANNOT_TELL = 0, 1, 2
 """exit codes"""
+NEW = "new in the baseline"
+"""the reason of a line that had nothing to be held against, and is about to get it"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from fgbaseline.compare.limits import Bounds, Outcome
 
-from .line import Checked, Line
+from .line import NEW, Checked, Line
 
 COLUMNS = ("limit", "estimator", "metric", "value", "bound", "margin", "baseline", "change")
 WORDS = ("limit", "run", "estimator", "metric")
@@ -52,7 +52,7 @@ def remarks(checked: Checked) -> list[str]:
         f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}: {line.reason} "
         f"({checked.limits}, line {line.limit_line})."
         for line in checked.lines
-        if line.reason
+        if line.reason not in ("", NEW)
     ]
 
 
@@ -68,7 +68,7 @@ def bound(bounds: Bounds | None, tolerance: str = "") -> str:
 def change(line: Line) -> str:
     """By how much, and by which share of the baseline."""
     if line.change is None or line.before is None:
-        return "-"
+        return "new" if line.reason == NEW else "-"
     share = f" ({100.0 * line.change / abs(line.before):+.2g} %)" if line.before and line.change else ""
     return ("none" if line.change == 0 else number(line.change, sign=True)) + share
 
