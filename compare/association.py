@@ -102,7 +102,7 @@ def nearest_pairs(a: FloatArray, b: FloatArray, tolerance: float) -> tuple[IntAr
     """Indices (n,) into rising stamps a and b, both rising: the closest two first, each once, none crossing in time.
 
     Each round pairs those that are nearest to each other among what is left between the pairs so far; of two equally
-    near ones that is the later for `a` and the earlier for `b`, so that a shift of half an interval pairs all.
+    near ones that is the later for `a` and the earlier for `b`, so that a shift of half an interval pairs neighbours.
     """
     left_a, left_b = np.arange(len(a)), np.arange(len(b))
     paired_a, paired_b = np.empty(0, np.int64), np.empty(0, np.int64)

@@ -10,11 +10,15 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .observations import BoolArray, IntArray
 
 ROTATION_TOLERANCE = 1e-6
+"""how far from a rotation the nine numbers of a pose may be"""
+EXACT = 1e-12
+"""up to here it is rounding, and they stay as they are"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trajectory:
-    """T >= 1 poses of a body, sorted by time. Its arrays are copies of what it was given, and cannot be written to.
+    """T >= 1 poses of a body, sorted by time. Its arrays are copies of what it was given, and cannot be written to;
+    rotations that are not exact are replaced by the nearest that is.
 
     Raises InputError, naming the pose (and the line it came from, where that is known), for stamps that do not rise or
     repeat, for poses that are not finite and for rotations that are none (beyond ROTATION_TOLERANCE).
@@ -37,11 +41,10 @@ class Trajectory:
 
     def __post_init__(self, proven: bool) -> None:
         for field in ("t", "world_T_body"):
-            array = np.array(getattr(self, field), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, field, array)
+            object.__setattr__(self, field, np.array(getattr(self, field), dtype=np.float64))
         if not proven:
-            check_trajectory(self)
+            _make_exact(self.world_T_body, check_trajectory(self))
+        self.t.flags.writeable = self.world_T_body.flags.writeable = False
 
     @staticmethod
     def of_frames(t: FloatArray, world_T_body: FloatArray, name: str, source: str = "") -> "Trajectory":
@@ -81,8 +84,11 @@ class Trajectory:
         return replace(self, t=self.t + seconds)
 
 
-def check_trajectory(path: Trajectory) -> None:
-    """Raises InputError, naming pose and line, where a trajectory is not one that can be compared."""
+def check_trajectory(path: Trajectory) -> FloatArray:
+    """(T,) how far each pose is from a rigid motion, at most ROTATION_TOLERANCE.
+
+    Raises InputError, naming pose and line, where a trajectory is not one that can be compared.
+    """
     t, poses = path.t, path.world_T_body
     who = path.source or path.name
     if t.ndim != 1 or poses.shape != (len(t), 4, 4):
@@ -113,6 +119,16 @@ def check_trajectory(path: Trajectory) -> None:
             f"{ROTATION_TOLERANCE:g}); write rigid motions"
         ),
     )
+    return np.asarray(defect)
+
+
+def _make_exact(poses: FloatArray, defect: FloatArray) -> None:
+    """Writes the nearest rigid motions over poses (T, 4, 4) that are off by more than rounding, by `defect` (T,)."""
+    off = np.flatnonzero(defect > EXACT)
+    R = poses[off, :3, :3]
+    for _ in range(2):  # Newton's method for the polar factor: each step squares what is left
+        R = 0.5 * R @ (3.0 * np.eye(3) - np.swapaxes(R, 1, 2) @ R)
+    poses[off, :3, :3], poses[off, 3] = R, [0.0, 0.0, 0.0, 1.0]
 
 
 def _require(good: BoolArray, path: Trajectory, complaint: Callable[[int], str]) -> None:
