@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.data import Estimate, Problem, Status
+from fgbaseline.data import Estimate, HeldOut, Problem, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
+
+from .evidence import Evidence, HeldOutReport, gathered, held_out_report
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""
@@ -30,6 +32,7 @@ class Result:
     """from the truth after SE(3) alignment"""
     nees: FloatArray | None
     """(T,) against truth"""
+    evidence: Evidence
 
     @property
     def name(self) -> str:
@@ -55,6 +58,8 @@ class Run:
     """(n,) the observations that every estimator used which uses any"""
     settings: Mapping[str, object]
     """what the user asked for, for the record"""
+    held_out: HeldOutReport | None = None
+    """None where no tracks were held out"""
 
     @property
     def answered(self) -> list[Result]:
@@ -62,8 +67,13 @@ class Run:
         return [result for result in self.results.values() if result.answered]
 
 
-def compare_all(problem: Problem, estimates: Mapping[str, Estimate], settings: Mapping[str, object]) -> Run:
-    """All comparisons of a run."""
+def compare_all(
+    problem: Problem,
+    estimates: Mapping[str, Estimate],
+    settings: Mapping[str, object],
+    held: HeldOut | None = None,
+) -> Run:
+    """All comparisons of a run, `held` being the tracks that were kept from it."""
     reference = next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
     if reference is None:
         trusted = compare.Trust(compare.Verdict.UNTRUSTED, (NO_REFERENCE,))
@@ -71,16 +81,20 @@ def compare_all(problem: Problem, estimates: Mapping[str, Estimate], settings: M
         trusted = compare.trust(problem, estimates[reference], estimates.get("batch"))
     origin = None if reference is None else estimates[reference]
     results = {name: _compared(problem, estimate, origin) for name, estimate in estimates.items()}
-    return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings)
+    held_out = None if held is None else held_out_report(problem, estimates.values(), held)
+    return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings, held_out)
 
 
 def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> Result:
     truth, up = problem.sequence.truth, problem.sequence.up
+    reprojection = compare.reprojection(problem.sequence, estimate)
+    evidence = gathered(problem, estimate, reprojection, reference)
     return Result(
         estimate=estimate,
-        reprojection=compare.reprojection(problem.sequence, estimate),
+        reprojection=reprojection,
         divergence=None if reference is None else compare.divergence(estimate, reference, up),
         truth=None if truth is None else compare.truth_errors(estimate, truth, up),
         truth_aligned=None if truth is None else compare.truth_errors(estimate, truth, up, aligned=True),
-        nees=None if truth is None else compare.nees(estimate, truth),
+        nees=None if evidence.nees is None else evidence.nees["pose"].to_numpy(),
+        evidence=evidence,
     )

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Literal
 
 from fgbaseline.data import (
     Calibration,
+    HeldOut,
     Problem,
     Reading,
     Sequence,
     calibrated,
     documented,
     estimator_names,
+    hold_out,
     read,
 )
 from fgbaseline.data.documented import DEFAULT_FEATURES
@@ -44,6 +46,8 @@ class RunSettings:
     seed: int = 0
     as_recorded: bool = False
     """take the recording as it is: no diagnosis, no repairs, assumed noise"""
+    held_out: float = 0.0
+    """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
@@ -57,6 +61,7 @@ class RunSettings:
             "truth_frame": self.truth_frame,
             "seed": self.seed,
             "as_recorded": self.as_recorded,
+            "held_out": self.held_out,
         }
 
 
@@ -89,6 +94,11 @@ def read_sequence(settings: RunSettings) -> Sequence:
     return read(settings.sequence, settings.truth, settings.truth_frame)
 
 
+def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
+    """The recording that diagnosis and estimators see, and the tracks held out; raises InputError."""
+    return hold_out(sequence, settings.held_out, settings.seed) if settings.held_out != 0.0 else (sequence, None)
+
+
 def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
     """The problem that the preset makes of a recording."""
     features = None if settings.features == "all" else settings.features
@@ -99,8 +109,8 @@ def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
     return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None)
 
 
-def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched) -> "Run":
+def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched, held: HeldOut | None = None) -> "Run":
     """All estimators on the problem, and their comparison."""
     from .comparison import compare_all  # pandas: not before the input is known to be good
 
-    return compare_all(problem, solve_all(problem, settings.estimators, watch), settings.record())
+    return compare_all(problem, solve_all(problem, settings.estimators, watch), settings.record(), held)

@@ -17,18 +17,20 @@ from .comparison import Result, Run
 from .job import MARK
 from .schema import Summary
 from .summary import metrics_table, summarise
+from .tables import consistency_series, write_tables
 
 
 def write_run(run: Run, folder: Path) -> Summary:
     """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary."""
     summary = summarise(run)
-    for name in ("trajectories", "landmarks", "series", "figures"):
+    for name in ("trajectories", "landmarks", "series", "tables", "figures"):
         (folder / name).mkdir()
     for name, result in run.results.items():
         series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
             write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
+    write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
     drawn: Mapping[str, Figure] = figures.draw(run)
     figures.save(drawn, folder / "figures")
@@ -59,7 +61,6 @@ def series(run: Run, result: Result) -> pd.DataFrame:
         if errors is not None:
             table = table.join(errors.add_prefix(f"{prefix}_"))
     table = table.join(reprojection_by(result.reprojection, "frame").add_prefix("reprojection_"))
-    if result.nees is not None:
-        table["nees"] = result.nees
+    table = table.join(consistency_series(result))
     table["seconds"] = result.estimate.seconds if len(result.estimate.seconds) == T else np.nan
     return table

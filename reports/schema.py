@@ -3,17 +3,26 @@
 import json
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from .evidence_schema import (
+    CovarianceCount,
+    HeldOutError,
+    HeldOutSummary,
+    MapDifference,
+    MovedPoints,
+    NeesInDetail,
+    Nis,
+    ReferenceNees,
+    SigmaRatio,
+    Whitened,
+)
+from .evidence_schema import Nees as Nees
+from .schema_base import Number as Number
+from .schema_base import Part as _Part
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
-
-Number = float | None
-"""null for what is not a number; `notes` then says why"""
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Spread(_Part):
@@ -57,14 +66,6 @@ class ObservationCount(_Part):
     share: Number
 
 
-class Nees(_Part):
-    """Normalised estimation error squared of the poses against truth; 6 is expected."""
-
-    mean: Number
-    median: Number
-    frames: int
-
-
 class TruthCount(_Part):
     """How many frames the truth metrics rest on."""
 
@@ -87,7 +88,15 @@ class EstimatorSummary(_Part):
     ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
     ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
     truth: TruthCount | None
-    nees: Nees | None
+    nees: NeesInDetail | None
+    covariance: CovarianceCount | None
+    nees_reference: ReferenceNees | None
+    sigma_ratio: SigmaRatio | None
+    nis: Nis | None
+    whitened: Whitened
+    moved_points: MovedPoints
+    map: MapDifference | None
+    held_out: HeldOutError | None
     landmarks: int
     observations: ObservationCount
     events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
@@ -136,6 +145,7 @@ class Summary(_Part):
     sequence: SequenceSummary
     problem: ProblemSummary
     reference: ReferenceSummary
+    held_out: Annotated[HeldOutSummary | None, Field(description="null where no tracks were held out")]
     estimators: dict[str, EstimatorSummary]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]

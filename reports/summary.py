@@ -16,6 +16,7 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.geometry import FloatArray
 
 from .comparison import Result, Run
+from .evidence_summary import evidence_reasons, evidence_summary, held_out_summary
 from .schema import EstimatorSummary, Summary
 
 LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
@@ -51,6 +52,7 @@ def summarise(run: Run) -> Summary:
                     "trust": run.trust.verdict.name.lower(),
                     "reasons": list(run.trust.reasons),
                 },
+                "held_out": held_out_summary(run),
                 "estimators": {name: _estimator(run, result) for name, result in run.results.items()},
                 "settings": dict(run.settings),
                 "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
@@ -115,15 +117,15 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
         "ate": None if result.truth_aligned is None else compare.summarised(result.truth_aligned["position"]),
         "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
         "truth": None if result.truth is None else _truth_count(result.truth),
-        "nees": None if result.nees is None else _nees(result.nees),
+        **evidence_summary(run, result),
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
         "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
     }
-    return {**values, "notes": notes(result, _nulls(values))}
+    return {**values, "notes": notes(run, result, _nulls(values))}
 
 
-def notes(result: Result, nulls: Iterable[str]) -> dict[str, str]:
+def notes(run: Run, result: Result, nulls: Iterable[str]) -> dict[str, str]:
     """Why the values at the paths `nulls` are no numbers, by key: for all that lies below it, `*` for all."""
     estimate = result.estimate
     if not result.answered:
@@ -144,17 +146,13 @@ def notes(result: Result, nulls: Iterable[str]) -> dict[str, str]:
         "ate_unaligned.final": last,
         "ate_unaligned.rotation_final_deg": last,
         "truth": "the recording has no truth",
-        "nees": "the recording has no truth"
-        if no_truth
-        else "it gives no covariance"
-        if estimate.covariance is None
-        else "no frame has both a truth and a positive definite covariance",
+        **evidence_reasons(run, result),
         "frames_per_second": "it took no measurable time",
         "observations.share": "the problem has no observations",
     }
     told: dict[str, str] = {}
     for null in nulls:
-        key = next((k for k in (null.partition(".")[0], null) if reasons.get(k)), null)
+        key = next((k for k in (null, null.partition(".")[0]) if reasons.get(k)), null)
         told[key] = reasons.get(key) or "it is not a finite number"
     return told
 
@@ -171,13 +169,6 @@ def _nulls(value: Any, path: str = "") -> Iterator[str]:
 def _truth_count(table: pd.DataFrame) -> dict[str, int]:
     frames = int(table["position"].notna().sum())
     return {"frames": frames, "missing": len(table) - frames}
-
-
-def _nees(values: FloatArray) -> dict[str, float | int]:
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return {"mean": math.nan, "median": math.nan, "frames": 0}
-    return {"mean": float(np.mean(known)), "median": float(np.median(known)), "frames": len(known)}
 
 
 def _length(poses: FloatArray) -> float:

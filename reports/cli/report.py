@@ -23,6 +23,8 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=job.MARK)
 
+    kept, held = job.split(sequence, settings)
+
     # Half a second of imports: bad input is told before.
     from .. import page
     from ..run_folder import write_run
@@ -33,10 +35,12 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
         f"{sequence.name}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
         f"{sequence.n_landmarks} tracks"
     )
+    if held is not None:
+        told.say(f"{held.n_tracks} tracks held out, {len(held.observations)} observations")
     if settings.preset == "calibrated" and not settings.as_recorded:
         told.say("diagnosing the recording")
-    problem = job.pose_problem(sequence, settings)
-    run = job.solve(problem, settings, told.estimator)
+    problem = job.pose_problem(kept, settings)
+    run = job.solve(problem, settings, told.estimator, held)
     for name, result in run.results.items():
         if not result.answered:
             told.say(f"{name} failed: {result.estimate.reason}")

@@ -59,7 +59,20 @@ class FeatureCount(click.ParamType[int | str]):
 @click.option(
     "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the simulated drive.")
+@click.option(
+    "--held-out",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Share of the tracks that diagnosis and estimators never see, to rank the paths by.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the simulated drive, and of which tracks are held out.",
+)
 def command(
     sequence: Path | None,
     out: Path | None,
@@ -71,6 +84,7 @@ def command(
     truth: Path | None,
     truth_frame: Literal["camera", "imu"] | None,
     as_recorded: bool,
+    held_out: float,
     seed: int,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
@@ -95,5 +109,6 @@ def command(
         truth_frame=truth_frame,
         seed=seed,
         as_recorded=as_recorded,
+        held_out=held_out,
     )
     return report(settings, out, force=force)
