@@ -4,17 +4,19 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.data.observations import IntArray
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import FloatArray, InputError
 
 from .association import Matched
 from .block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
-from .pairs import TOLERANCE, nearest_delta_pairs
+from .pairs import nearest_delta_pairs
 from .pose_difference import Difference, motion_difference
 from .relative import require_stamps
 from .travel import distance_travelled
 
 SHARE = 0.1
-"""of the path and of its duration: over so much the drift is measured by default"""
+"""of the path and of its duration: over so much the drift is measured by default, or one step where that is more"""
+TOLERANCE = 0.5
+"""of the length wanted: rates are over what a stretch really measures, so a coarse path may miss it by so much"""
 
 
 def drift(
@@ -29,8 +31,8 @@ def drift(
     """Mean error of the motion over `metres` of the reference's path, per metre, and over `seconds`, per second.
 
     One row per rate, indexed by `quantity`: `value` with `low` and `high` of a block bootstrap, `unit`, and `over` and
-    `n` that say over what and from how many (overlapping) stretches, all pairs within a tenth of the length wanted.
-    Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without stamps), each
+    `n` that say over what and from how many overlapping stretches, each from a pose to the later one that is nearest to
+    so far away. Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without stamps), each
     divided by what the stretch really measures; `end translation` (%) and `end rotation` (deg/m): the error of the
     whole motion from first to last pose over the length of the path. Raises InputError where the reference does not
     move or no stretch is as long as asked for.
@@ -40,7 +42,7 @@ def drift(
     path = float(travelled[-1])
     if len(reference) < 2 or path == 0.0:
         raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per metre")
-    metres = SHARE * path if metres is None else metres
+    metres = _default(travelled) if metres is None else metres
     pairs = _stretches(travelled, metres, "m")
     over = travelled[pairs[:, 1]] - travelled[pairs[:, 0]]
     rates = [
@@ -51,7 +53,7 @@ def drift(
         require_stamps(matched)
     if reference.stamped and matched.estimate.stamped:
         t = reference.t - reference.t[0]
-        seconds = SHARE * float(t[-1]) if seconds is None else seconds
+        seconds = _default(t) if seconds is None else seconds
         pairs = _stretches(t, seconds, "s")
         over = t[pairs[:, 1]] - t[pairs[:, 0]]
         rates += [
@@ -73,7 +75,11 @@ def drift(
     return pd.DataFrame(rows, columns=columns).set_index("quantity")
 
 
-def _stretches(along: np.ndarray, wanted: float, unit: str) -> IntArray:
+def _default(along: FloatArray) -> float:
+    return max(SHARE * float(along[-1]), float(np.diff(along).max()))
+
+
+def _stretches(along: FloatArray, wanted: float, unit: str) -> IntArray:
     pairs = nearest_delta_pairs(along, wanted, TOLERANCE) if wanted > 0 else np.empty((0, 2), np.int64)
     if len(pairs) == 0:
         raise InputError(f"drift: no two poses are {wanted:g} {unit} apart, of {along[-1]:.4g} {unit} in all")
