@@ -32,10 +32,10 @@ def drift(
 
     One row per rate, indexed by `quantity`: `value` with `low` and `high` of a block bootstrap, `unit`, and `over` and
     `n` that say over what and from how many overlapping stretches, each from a pose to the later one that is nearest to
-    so far away. Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without stamps), each
-    divided by what the stretch really measures; `end translation` (%) and `end rotation` (deg/m): the error of the
-    whole motion from first to last pose over the length of the path. Raises InputError where the reference does not
-    move or no stretch is as long as asked for.
+    so far away. Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
+    stamps), each divided by what the stretch really measures; `end translation` (%) and `end rotation` (deg/m): the
+    error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
+    does not move or no stretch is as long as asked for.
     """
     reference = matched.reference
     travelled = distance_travelled(reference.position)
