@@ -22,6 +22,8 @@ from .held_out import HeldOut, hold_out
 from .observations import Observations
 from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
 from .registry import estimator_names, find_estimator
+from .repairs import Repairs, read_repairs
+from .repairs_text import repairs_text
 from .sequence import Sequence, Truth
 from .trajectory import Trajectory
 
@@ -41,6 +43,7 @@ __all__ = [
     "Problem",
     "Progress",
     "Reading",
+    "Repairs",
     "Sequence",
     "Status",
     "Trajectory",
@@ -55,9 +58,11 @@ __all__ = [
     "read",
     "read_kitti",
     "read_problem",
+    "read_repairs",
     "read_times",
     "read_trajectory",
     "read_tum",
+    "repairs_text",
     "write_euroc",
     "write_kitti",
     "write_npz",

@@ -5,10 +5,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .diagnose import Diagnosis, diagnose, repair
+from fgbaseline.geometry import InputError
+
+from .by_hand import ASSUMED, mask_settings, overridden, told
+from .diagnose import Diagnosis, diagnose, findings_of, repair
 from .documented import most_observed
 from .motion import Shift, dead_reckoned_path, increments
 from .problem import Excluded, HuberKernel, Problem
+from .repairs import Repairs
 from .sequence import Sequence
 from .track_mask import MaskSettings, exclusions
 
@@ -17,11 +21,11 @@ from .track_mask import MaskSettings, exclusions
 class NoiseSettings:
     """Standard deviations; the defaults stand in where a recording could not be diagnosed."""
 
-    pixel: float = 1.5
+    pixel: float = ASSUMED.pixel
     """px, of each of the four rows"""
-    linear_velocity: float = 0.3
+    linear_velocity: float = ASSUMED.linear
     """m/s, of the velocity held over an interval"""
-    angular_velocity: float = 0.03
+    angular_velocity: float = ASSUMED.angular
     """rad/s, of the rate held over an interval"""
 
 
@@ -42,36 +46,53 @@ def calibrated(
     *,
     diagnosis: Diagnosis | None = None,
     settings: Calibration | None = None,
+    repairs: Repairs | None = None,
 ) -> Problem:
     """The problem that the recording supports, the first pose held at the identity.
 
     Without `settings` the recording is diagnosed (unless a `diagnosis` of it is given) and repaired, and the noise is
-    what the diagnosis found; where it cannot tell, or with `settings`, the recording is taken as it is. The noise of an
-    increment is the standard deviation of a velocity times dt. A fractional shift makes the errors of neighbouring
-    increments correlated; that is not modelled. `features` keeps only that many landmarks, those seen most often after
-    masking.
+    what the diagnosis found; where it cannot tell, or with `settings`, the recording is taken as it is. What `repairs`
+    has is taken from there and not from the diagnosis. The noise of an increment is the standard deviation of a
+    velocity times dt. A fractional shift makes the errors of neighbouring increments correlated; that is not modelled.
+    `features` keeps only that many landmarks, those seen most often after masking. Raises InputError for repairs that
+    cannot be, or that `settings` would leave without effect.
     """
+    if settings is not None and repairs is not None:
+        raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
     if settings is None:
         diagnosis = diagnosis or diagnose(sequence)
-        if diagnosis.sigmas is not None:
-            return _diagnosed(diagnosis, features)
+        if diagnosis.sigmas is not None or repairs is not None:
+            return _diagnosed(diagnosis, features, repairs or Repairs())
     problem = _as_recorded(sequence, features, settings or Calibration())
     if diagnosis is None or not diagnosis.cannot_tell:
         return problem
     return replace(problem, remarks=(f"not diagnosed: {diagnosis.cannot_tell}", *problem.remarks))
 
 
-def _diagnosed(diagnosis: Diagnosis, features: int | None) -> Problem:
-    sigmas = diagnosis.sigmas
-    assert sigmas is not None
-    repaired = repair(diagnosis, MaskSettings())
+def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Problem:
+    diagnosis = overridden(found, repairs)
+    mask, tracks = mask_settings(repairs)
+    repaired = repair(diagnosis, mask, tracks)
+    sigmas = diagnosis.sigmas or ASSUMED
     noise = NoiseSettings(sigmas.pixel, sigmas.linear, sigmas.angular)
     remarks = (
-        f"noise found in the recording: {sigmas.pixel:.2f} px, {sigmas.linear:.3f} m/s and {sigmas.angular:.4f} rad/s",
-        *repaired.repairs,
+        *((f"not diagnosed: {found.cannot_tell}",) if found.cannot_tell else ()),
+        f"noise {_origin(found, repairs)}: {sigmas.pixel:.2f} px, {sigmas.linear:.3f} m/s and "
+        f"{sigmas.angular:.4f} rad/s",
     )
-    kernel = HuberKernel()
-    return _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, kernel, remarks, True)
+    problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
+    return replace(
+        problem,
+        diagnosed=not found.cannot_tell,
+        findings=findings_of(found),
+        repairs=(*told(repairs), *repaired.repairs),
+    )
+
+
+def _origin(found: Diagnosis, repairs: Repairs) -> str:
+    by_hand = len(repairs.sigma.model_dump(exclude_none=True))
+    rest = "found in the recording" if found.sigmas is not None else "assumed, not estimated from the recording"
+    return rest if by_hand == 0 else "set by hand" if by_hand == 3 else f"set by hand in part, the rest {rest}"
 
 
 def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration) -> Problem:
@@ -83,7 +104,7 @@ def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration
         f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
         + ("" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"),
     )
-    return _posed(sequence, excluded, features, noise, shift, settings.kernel, remarks, False)
+    return _posed(sequence, excluded, features, noise, shift, settings.kernel, remarks)
 
 
 def _posed(
@@ -94,7 +115,6 @@ def _posed(
     shift: float,
     kernel: HuberKernel | None,
     remarks: tuple[str, ...],
-    diagnosed: bool,
 ) -> Problem:
     usable = sequence.observations.select(excluded == Excluded.NO)
     chosen = most_observed(usable, sequence.n_landmarks, features)
@@ -113,6 +133,5 @@ def _posed(
         initial_pose=np.eye(4),
         initial_covariance=np.zeros((6, 6)),
         kernel=kernel,
-        diagnosed=diagnosed,
         remarks=remarks,
     )

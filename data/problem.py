@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from fgbaseline.geometry import FloatArray
 
 from .observations import BoolArray, IntArray, Observations
 from .sequence import Sequence
+
+if TYPE_CHECKING:
+    from .diagnose.wording import Finding
 
 
 class Excluded(IntEnum):
@@ -91,6 +95,11 @@ class Problem:
     """px^2, in place of `pixel_variance` where landmarks are mapped along given poses (the report has V = I there)"""
     reading: Reading = Reading.IN_TURN
     diagnosed: bool = False
+    """whether the noise and the repairs are those that the recording itself told"""
+    findings: "tuple[Finding, ...]" = ()
+    """what the diagnosis found to be wrong with the recording"""
+    repairs: tuple[str, ...] = ()
+    """what was done about it for all estimators alike, and what was set by hand; one sentence each"""
     remarks: tuple[str, ...] = ()
     """what was decided in building the problem, one sentence each"""
 

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import numpy as np
 
-from fgbaseline.data import Diagnosis, diagnose, read
+from fgbaseline.data import Diagnosis, diagnose, read, repairs_text
 from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
 from fgbaseline.geometry import InputError
 
@@ -20,12 +20,14 @@ UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def tell(path: Path, out: Path | None, *, as_json: bool, force: bool) -> int:
+def tell(path: Path, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool) -> int:
     """Diagnoses a recording and says what was found; gives the exit code."""
-    if force and out is None:
-        raise InputError("force: there is no folder to replace; add --out DIR")
+    if force and out is None and repairs is None:
+        raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
     if out is not None:
         require_free(out, force=force, mark=MARK)
+    if repairs is not None:
+        _require_writable(repairs, force=force)
     diagnosis = diagnose(read(path))
     tracks = track_state(diagnosis)
     findings = findings_of(diagnosis, tracks)
@@ -33,24 +35,36 @@ def tell(path: Path, out: Path | None, *, as_json: bool, force: bool) -> int:
     if out is not None:
         with whole_folder(out, force=force, mark=MARK) as folder:
             write(diagnosis, tracks, report, folder)
+    if repairs is not None:
+        repairs.write_text(repairs_text(diagnosis), encoding="utf-8")
     if as_json:
         click.echo(text(report), nl=False)
     else:
         _print(diagnosis, findings)
         if out is not None:
             click.echo(f"\nThe evidence is in {out}")
+        if repairs is not None:
+            click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
     if diagnosis.cannot_tell:
         return CANNOT_TELL
     return FINDINGS if findings else CLEAN
 
 
+def _require_writable(file: Path, *, force: bool) -> None:
+    if file.exists() and not force:
+        raise InputError(f"{file}: the file exists; choose another, or replace it with --force")
+    if file.exists() and not file.is_file():
+        raise InputError(f"{file}: this is no file; give the name of one")
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: there is no folder {file.parent}; make it, or choose another place")
+
+
 def write(diagnosis: Diagnosis, tracks: Tracks, report: dict[str, Any], folder: Path) -> None:
     """diagnosis.json and the figures, into an existing, empty folder."""
     from . import figures
-    from .figures.diagnosis import draw_diagnosis
 
     (folder / "figures").mkdir()
-    figures.save(draw_diagnosis(diagnosis, tracks), folder / "figures")
+    figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
     (folder / MARK).write_text(text(report), encoding="utf-8")
 
 

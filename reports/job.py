@@ -15,6 +15,7 @@ from fgbaseline.data import (
     estimator_names,
     hold_out,
     read,
+    read_repairs,
 )
 from fgbaseline.data.documented import DEFAULT_FEATURES
 from fgbaseline.data.formats import BodyFrame
@@ -48,6 +49,8 @@ class RunSettings:
     """take the recording as it is: no diagnosis, no repairs, assumed noise"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
+    repairs: Path | None = None
+    """TOML file of what is set by hand in place of what the diagnosis finds"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
@@ -62,6 +65,7 @@ class RunSettings:
             "seed": self.seed,
             "as_recorded": self.as_recorded,
             "held_out": self.held_out,
+            "repairs": None if self.repairs is None else str(self.repairs),
         }
 
 
@@ -100,13 +104,17 @@ def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut 
 
 
 def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
-    """The problem that the preset makes of a recording."""
+    """The problem that the preset makes of a recording; raises InputError."""
+    if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
+        why = "--as-recorded" if settings.as_recorded else "the documented preset"
+        raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
+    repairs = None if settings.repairs is None else read_repairs(settings.repairs)
     features = None if settings.features == "all" else settings.features
     if settings.preset == "documented":
         if settings.features is None:
             features = DEFAULT_FEATURES
         return documented(sequence, features, settings.landmarks)
-    return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None)
+    return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None, repairs=repairs)
 
 
 def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched, held: HeldOut | None = None) -> "Run":

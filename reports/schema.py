@@ -119,6 +119,17 @@ class SequenceSummary(_Part):
     remarks: list[str]
 
 
+class FindingSummary(_Part):
+    """One thing that is wrong with the recording."""
+
+    code: str
+    sentence: str
+    before: Annotated[Number, Field(description="a figure of the recording as it is, in `unit`")]
+    after: Annotated[Number, Field(description="the same once repaired and masked")]
+    unit: str
+    certainty: str
+
+
 class ProblemSummary(_Part):
     """What was asked."""
 
@@ -128,6 +139,8 @@ class ProblemSummary(_Part):
     excluded: Annotated[dict[str, int], Field(description="reason -> observations that take no part")]
     pixel_sigma: float
     remarks: list[str]
+    findings: Annotated[list[FindingSummary], Field(description="what the diagnosis found to be wrong")]
+    repairs: Annotated[list[str], Field(description="what was repaired, and what was set by hand")]
 
 
 class ReferenceSummary(_Part):

@@ -5,6 +5,7 @@ import os
 import platform
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
@@ -46,6 +47,8 @@ def summarise(run: Run) -> Summary:
                     "excluded": excluded_counts(problem),
                     "pixel_sigma": math.sqrt(problem.pixel_variance),
                     "remarks": list(problem.remarks),
+                    "findings": [asdict(finding) for finding in problem.findings],
+                    "repairs": list(problem.repairs),
                 },
                 "reference": {
                     "name": run.reference,

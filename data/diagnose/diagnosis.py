@@ -40,6 +40,8 @@ class Diagnosis:
     fit: Fit | None = None
     repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """(T-1,) intervals whose tracks are copies"""
+    by_hand: frozenset[str] = frozenset()
+    """names of `Repairs` that somebody set: taken as they are, however small or uncertain"""
 
     @property
     def gyro_bias(self) -> FloatArray:
@@ -93,9 +95,23 @@ def _diagnose(sequence: Sequence) -> Diagnosis:
     recorded = held_twist(sequence, Shift.MIDDLE)
     angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
     linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name)
+    return explained(sequence, seen_by_cameras, angular, linear, copies)
+
+
+def explained(
+    sequence: Sequence,
+    seen_by_cameras: Odometry,
+    angular: Axes,
+    linear: Axes,
+    copies: BoolArray,
+    given_shift: float | None = None,
+) -> Diagnosis:
+    """Delay, bias, scale, misalignment and noise of velocities in these axes; a shift that is given is taken."""
+    seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
     dt = float(np.median(sequence.dt))
     when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)
-    shift = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
+    found = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
+    shift = found if given_shift is None else given_shift
     fit = fit_windows(sequence, seen_by_cameras, turned(held_twist(sequence, shift), linear.name, angular.name))
     reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
     return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)

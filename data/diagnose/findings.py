@@ -144,7 +144,7 @@ def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
     return Finding(
         "velocity_scale",
         f"Recorded speeds are {abs(scale - 1.0):.1%} {more} than the stereo camera sees; which of the two is wrong "
-        "the recording cannot tell, and neither is changed.",
+        "the recording cannot tell, so neither is changed unless that is set by hand.",
         scale,
         scale,
         "recorded over seen",

@@ -9,8 +9,9 @@ from fgbaseline.geometry import FloatArray, so3
 
 from ..motion import dead_reckoned_path, held_twist
 from ..observations import Observations
+from ..problem import Excluded
 from ..sequence import Sequence, Truth
-from ..track_mask import MaskSettings, TrackLinks, split_tracks
+from ..track_mask import MaskSettings, SplitTracks, TrackLinks, split_tracks
 from .diagnosis import Diagnosis, turned
 from .links import consecutive, sound
 
@@ -25,6 +26,17 @@ GATE = 6.0
 """times the median error of a link"""
 
 
+@dataclass(frozen=True, slots=True)
+class TrackRepairs:
+    """What is done to tracks."""
+
+    gate: float | None = None
+    """px, of a link's prediction; None for `GATE` times the median error"""
+    split: bool = True
+    """whether every run of a track that jumps becomes a landmark of its own, or only the longest takes part"""
+    mask_copies: bool = True
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Repaired:
     """A repaired recording, which of its observations can be trusted, and what was done."""
@@ -32,12 +44,16 @@ class Repaired:
     sequence: Sequence
     excluded: NDArray[np.uint8]
     """(n,) an `Excluded` for each of its observations"""
+    gate: float
+    """px: how far from its prediction an observation may lie"""
     repairs: tuple[str, ...]
 
 
 def sure_bias(diagnosis: Diagnosis) -> FloatArray:
     """(3,) rad/s in recorded axes; zero where the bias is too small or too uncertain to be taken off."""
     bias, deviation = diagnosis.gyro_bias, diagnosis.gyro_bias_deviation
+    if "gyro_bias" in diagnosis.by_hand:
+        return bias
     found = (np.abs(bias) > MIN_BIAS) & (np.abs(bias) > SURE * deviation)
     return bias if found.any() else np.zeros(3)
 
@@ -45,15 +61,23 @@ def sure_bias(diagnosis: Diagnosis) -> FloatArray:
 def sure_misalignment(diagnosis: Diagnosis) -> FloatArray:
     """(3,) rad; zero in each component that is too small or too uncertain."""
     angle, deviation = diagnosis.misalignment
+    if "misalignment_deg" in diagnosis.by_hand:
+        return angle
     return np.where((np.abs(angle) > MIN_MISALIGNMENT) & (np.abs(angle) > SURE * deviation), angle, 0.0)
 
 
-def repair(diagnosis: Diagnosis, mask: MaskSettings) -> Repaired:
+def sure_scale(diagnosis: Diagnosis) -> float:
+    """By which velocities are divided: 1 unless set by hand, since it could as well be the stereo's that is wrong."""
+    return diagnosis.velocity_scale[0] if "velocity_scale" in diagnosis.by_hand else 1.0
+
+
+def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None = None) -> Repaired:
     """Velocities in the axes of imu_T_cam without their bias, the extrinsic turned, broken tracks split."""
     sequence, done = diagnosis.sequence, []
     linear, angular = diagnosis.linear, diagnosis.angular
     bias, angle = sure_bias(diagnosis), sure_misalignment(diagnosis)
-    velocity = sequence.linear_velocity @ linear.matrix.T
+    scale, tracks = sure_scale(diagnosis), tracks or TrackRepairs()
+    velocity = sequence.linear_velocity @ linear.matrix.T / scale
     rate = (sequence.angular_velocity - bias) @ angular.matrix.T
     if angular.changed:
         done.append(f"angular velocity turned from the axes it was recorded in ({angular.name}) to those of imu_T_cam")
@@ -61,6 +85,8 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings) -> Repaired:
         done.append(f"linear velocity turned from the axes it was recorded in ({linear.name}) to those of imu_T_cam")
     if bias.any():
         done.append(f"gyroscope bias of ({', '.join(f'{b:.4f}' for b in bias)}) rad/s taken off")
+    if scale != 1.0:
+        done.append(f"linear velocity divided by {scale:.4g}")
     imu_T_cam = sequence.imu_T_cam.copy()
     if angle.any():
         imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
@@ -68,7 +94,9 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings) -> Repaired:
     if diagnosis.shift != 0.0:
         done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
     path = _path(diagnosis)
-    observations, excluded, pieces = _observations(sequence, path, mask)
+    split, gate = _split(sequence, path, mask, tracks)
+    observations, excluded = _renumbered(sequence, split)
+    pieces = split.n_landmarks - sequence.n_landmarks
     n_landmarks = sequence.n_landmarks + pieces
     if pieces:
         done.append(f"{pieces} tracks that jump to another point split off as landmarks of their own")
@@ -81,7 +109,7 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings) -> Repaired:
         n_landmarks=n_landmarks,
         truth=_with_landmarks(sequence.truth, n_landmarks),
     )
-    return Repaired(repaired, excluded, tuple(done))
+    return Repaired(repaired, excluded, gate, tuple(done))
 
 
 def _path(diagnosis: Diagnosis) -> FloatArray:
@@ -89,6 +117,7 @@ def _path(diagnosis: Diagnosis) -> FloatArray:
     that they see what lies in their middle; elsewhere the velocities."""
     sequence, odometry = diagnosis.sequence, diagnosis.odometry
     twist = turned(held_twist(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
+    twist[:, :3] /= sure_scale(diagnosis)
     twist[:, 3:] -= diagnosis.angular.matrix @ sure_bias(diagnosis)
     if odometry is not None:
         seen, known = odometry.twist(sequence.dt), odometry.known
@@ -98,24 +127,33 @@ def _path(diagnosis: Diagnosis) -> FloatArray:
     return dead_reckoned_path(twist * sequence.dt[:, None])
 
 
-def _observations(
-    sequence: Sequence, path: FloatArray, mask: MaskSettings
-) -> tuple[Observations, NDArray[np.uint8], int]:
-    """Observations with split tracks, what excludes them, and the number of new landmarks."""
+def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs) -> tuple[SplitTracks, float]:
+    """Tracks cut where they jump, what excludes their observations, and the gate by which they were judged."""
     o = sequence.observations
     copied = np.zeros(len(o), dtype=np.bool_)
     before, after = consecutive(sequence)
     same = (o.pixel[before] == o.pixel[after]).all(axis=1)
-    copied[after[same]] = True
-    links = TrackLinks(sequence, path, mask.prediction_gate)
-    usable = sound(sequence)
-    judged = usable[before] & usable[after] & ~same
-    typical = float(np.median(links.error(before[judged], after[judged]))) if judged.any() else GATE_RANGE[1]
-    gate = float(np.clip(GATE * typical, *GATE_RANGE))
+    if tracks.mask_copies:
+        copied[after[same]] = True
+    gate = tracks.gate
+    if gate is None:
+        links, usable = TrackLinks(sequence, path, mask.prediction_gate), sound(sequence)
+        judged = usable[before] & usable[after] & ~same
+        typical = float(np.median(links.error(before[judged], after[judged]))) if judged.any() else GATE_RANGE[1]
+        gate = float(np.clip(GATE * typical, *GATE_RANGE))
     split = split_tracks(sequence, path, replace(mask, prediction_gate=gate), copied)
+    if not tracks.split:
+        split.excluded[split.landmark != o.landmark] = Excluded.PREDICTION
+        split = SplitTracks(o.landmark, sequence.n_landmarks, split.excluded)
+    return split, gate
+
+
+def _renumbered(sequence: Sequence, split: SplitTracks) -> tuple[Observations, NDArray[np.uint8]]:
+    """Observations under their new landmarks, in their order, and what excludes them."""
+    o = sequence.observations
     order = np.lexsort((split.landmark, o.frame))
     moved = Observations(o.frame[order], split.landmark[order], o.pixel[order])
-    return moved, split.excluded[order], split.n_landmarks - sequence.n_landmarks
+    return moved, split.excluded[order]
 
 
 def _with_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:

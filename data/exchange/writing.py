@@ -79,7 +79,7 @@ def scalars(problem: Problem) -> dict[str, Any]:
         "preset": problem.preset,
         "diagnosed": problem.diagnosed,
         "reading": problem.reading.value,
-        "remarks": list(problem.remarks),
+        "remarks": [*problem.remarks, *problem.repairs],
         "camera": {"fu": camera.fu, "fv": camera.fv, "cu": camera.cu, "cv": camera.cv, "baseline": camera.baseline},
         "imu_T_cam": sequence.imu_T_cam.tolist(),
         "up": sequence.up.tolist(),

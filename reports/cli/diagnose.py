@@ -9,8 +9,13 @@ import click
 @click.argument("sequence", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for diagnosis.json and figures.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
-@click.option("--force", is_flag=True, help="Replace the folder of an earlier diagnosis.")
-def command(sequence: Path, out: Path | None, as_json: bool, force: bool) -> int:
+@click.option(
+    "--write-repairs",
+    type=click.Path(path_type=Path),
+    help="TOML file to write what was found to, for run --repairs, to be edited by hand.",
+)
+@click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
+def command(sequence: Path, out: Path | None, as_json: bool, write_repairs: Path | None, force: bool) -> int:
     """Find what is wrong with SEQUENCE: axes, bias, delay, scale, extrinsic, tracks; and how large its noise is.
 
     From the recording alone: ground truth in it is not looked at. `fgbaseline run` repairs what is found here.
@@ -19,4 +24,4 @@ def command(sequence: Path, out: Path | None, as_json: bool, force: bool) -> int
     """
     from ..diagnosing import tell
 
-    return tell(sequence, out, as_json=as_json, force=force)
+    return tell(sequence, out, as_json=as_json, repairs=write_repairs, force=force)

@@ -60,6 +60,11 @@ class FeatureCount(click.ParamType[int | str]):
     "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
 )
 @click.option(
+    "--repairs",
+    type=click.Path(path_type=Path),
+    help="TOML file of repairs set by hand; what it leaves out comes from the diagnosis (calibrated).",
+)
+@click.option(
     "--held-out",
     type=float,
     default=0.0,
@@ -85,6 +90,7 @@ def command(
     truth_frame: Literal["camera", "imu"] | None,
     as_recorded: bool,
     held_out: float,
+    repairs: Path | None,
     seed: int,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
@@ -110,5 +116,6 @@ def command(
         seed=seed,
         as_recorded=as_recorded,
         held_out=held_out,
+        repairs=repairs,
     )
     return report(settings, out, force=force)

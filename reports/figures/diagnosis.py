@@ -15,7 +15,7 @@ from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.geometry import FloatArray
 
 from .drawing import lay_out
-from .style import head, in_style, note, sheet, swatch
+from .style import head, in_style, sheet, swatch
 
 SEEN, RECORDED, REPAIRED, WRONG, COPIED = "#111111", "#D55E00", "#0072B2", "#c0392b", "#E69F00"
 """the cameras, the recording and what the repair makes of it"""
@@ -64,7 +64,8 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
             lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
         axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
         before, after = (median_error(seen[known, i], r[known, i]) for r in (recorded, repaired))
-        note(axis, f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else ""))
+        told = f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else "")
+        axis.set_title(told, loc="right", fontsize=8, color="#555555", pad=2.0)
         handles = handles or lines
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0.0, float(t[-1]))
@@ -97,8 +98,10 @@ def conventions(diagnosis: Diagnosis) -> Figure:
         unseen = [n for n, s in zip("xyz", axes.seen, strict=True) if not s]
         panel.set_title(f"{which} velocity" + (f" ({', '.join(unseen)} not identifiable)" if unseen else ""))
         panel.set_xlabel("behind the best, log-likelihood")
-    names = "found" if diagnosis.angular.changed or diagnosis.linear.changed else "found: as recorded"
-    handles = [swatch(REPAIRED, names), swatch(RECORDED, "as recorded"), swatch("#b8c4d0", "others")]
+    changed = diagnosis.angular.changed or diagnosis.linear.changed
+    handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
+    handles += [swatch(RECORDED, "as recorded")] if changed else []
+    handles.append(swatch("#b8c4d0", "others"))
     head(figure, "Which of the 24 axis conventions agrees with the cameras", handles)
     return figure
 
@@ -128,7 +131,9 @@ def delay(diagnosis: Diagnosis) -> Figure:
             va="top",
             fontsize=8,
             color="#555555",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )
+    axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 100.0])
     axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
     axes.set_ylabel("agreement, % of the variance")
     title = "When the recorded rates agree with what the cameras see"
@@ -182,7 +187,8 @@ def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
     lower.set_xlabel("time, s")
     lower.set_xlim(0.0, float(t[-1]))
     figure.align_ylabels([upper, lower])
-    head(figure, "Tracks: how many, how many wrong, and when they were copied", handles)
+    title = "Tracks: how many, how many wrong" + (", and when they were copied" if len(copied) else "")
+    head(figure, title, handles)
     return figure
 
 

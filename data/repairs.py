@@ -1,0 +1,124 @@
+"""Repairs set by hand in a TOML file, in place of what the diagnosis finds."""
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, field_validator
+
+from .axes import AXIS_CONVENTIONS, IDENTITY
+from .formats.named_file import FilePath
+from .toml_file import read_toml
+
+AS_RECORDED = "as-recorded"
+"""the word that turns a repair off"""
+Vector: TypeAlias = tuple[float, float, float]
+
+
+def read_repairs(path: FilePath) -> "Repairs":
+    """The repairs in a TOML file. Raises InputError with file, line and key for what cannot be."""
+    return read_toml(path, Repairs).content
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _axes(value: object) -> str:
+    if value == AS_RECORDED:
+        return IDENTITY
+    if not isinstance(value, str) or value not in AXIS_CONVENTIONS:
+        raise ValueError(
+            f"it is none of the 24 right-handed axis conventions; write one such as 'x,-y,-z', or '{AS_RECORDED}'"
+        )
+    return value
+
+
+def _vector(most: float, unit: str) -> Callable[[object], Vector]:
+    def vector(value: object) -> Vector:
+        if value == AS_RECORDED:
+            return 0.0, 0.0, 0.0
+        numbers = list(value) if isinstance(value, list | tuple) else []
+        if len(numbers) != 3 or not all(_number(number) and abs(number) <= most for number in numbers):
+            raise ValueError(f"it should be three numbers of at most {most:g} {unit}, or '{AS_RECORDED}'")
+        return float(numbers[0]), float(numbers[1]), float(numbers[2])
+
+    return vector
+
+
+def _between(low: float, high: float, neutral: float | None = None) -> Callable[[object], float]:
+    def number(value: Any) -> float:
+        if neutral is not None and value == AS_RECORDED:
+            return neutral
+        if not _number(value) or not low <= value <= high:
+            word = "" if neutral is None else f", or '{AS_RECORDED}'"
+            raise ValueError(f"it should be a number from {low:g} to {high:g}{word}")
+        return float(value)
+
+    return number
+
+
+def _track(value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 2 <= value <= 10_000:
+        raise ValueError("it should be a whole number from 2 to 10000")
+    return value
+
+
+class _ByHand(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SigmaByHand(_ByHand):
+    """Standard deviations in place of those found."""
+
+    linear_velocity: Annotated[float, PlainValidator(_between(1e-6, 1e3))] | None = None
+    """m/s, of the velocity held over an interval"""
+    angular_velocity: Annotated[float, PlainValidator(_between(1e-7, 1e2))] | None = None
+    """rad/s, of the rate held over an interval"""
+    pixel: Annotated[float, PlainValidator(_between(1e-3, 1e3))] | None = None
+    """px, of each of the four rows"""
+
+
+class MaskByHand(_ByHand):
+    """What an observation must satisfy, in place of `track_mask.MaskSettings` and of the gate found."""
+
+    prediction_gate: Annotated[float, PlainValidator(_between(0.01, 1e4))] | None = None
+    """px"""
+    min_disparity: Annotated[float, PlainValidator(_between(0.0, 1e4))] | None = None
+    """px"""
+    max_row_mismatch: Annotated[float, PlainValidator(_between(0.0, 1e4))] | None = None
+    """px"""
+    min_track: Annotated[int, PlainValidator(_track)] | None = None
+    """observations"""
+    split_tracks: bool | None = None
+    """false: of a track that jumps only the longest run takes part"""
+    use_copied_frames: bool | None = None
+    """true: observations that repeat the frame before take part like any other"""
+
+
+class Repairs(_ByHand):
+    """Each replaces what the diagnosis finds; None leaves it to the diagnosis, 'as-recorded' turns it off."""
+
+    angular_axes: Annotated[str, PlainValidator(_axes)] | None = None
+    """convention (`data.axes`) of the recorded angular velocity"""
+    linear_axes: Annotated[str, PlainValidator(_axes)] | None = None
+    """convention of the recorded linear velocity"""
+    gyro_bias: Annotated[Vector, PlainValidator(_vector(10.0, "rad/s"))] | None = None
+    """rad/s, what the gyroscope reads at rest, in recorded axes; taken off"""
+    velocity_scale: Annotated[float, PlainValidator(_between(0.01, 100.0, 1.0))] | None = None
+    """recorded over true linear velocity; divided by"""
+    time_offset_s: Annotated[float, PlainValidator(_between(-1e3, 1e3, 0.0))] | None = None
+    """s: sample k describes the interval that begins this long after its stamp"""
+    shift_intervals: Annotated[float, PlainValidator(_between(-1e4, 1e4, 0.0))] | None = None
+    """the same in intervals between frames"""
+    misalignment_deg: Annotated[Vector, PlainValidator(_vector(180.0, "degrees"))] | None = None
+    """rotation vector by which imu_T_cam is turned against the velocities, in its own axes; undone"""
+    sigma: SigmaByHand = SigmaByHand()
+    mask: MaskByHand = MaskByHand()
+
+    @field_validator("shift_intervals")
+    @classmethod
+    def _one_shift(cls, value: float | None, info: ValidationInfo) -> float | None:
+        if value is not None and info.data.get("time_offset_s") is not None:
+            raise ValueError("time_offset_s says the same in seconds; give one of the two")
+        return value
