@@ -19,7 +19,8 @@ AT_ONCE = 4_000_000
 """numbers drawn at a time, to bound the memory"""
 
 OF_SERIES = ("rmse", "mean", "median", "std", "p95")
-"""those with an interval: the bootstrap says nothing true of extremes, and a sum grows with the number of errors"""
+WITHOUT_INTERVAL = ("min", "max", "sse")
+"""the bootstrap says nothing true of extremes, and a sum grows with the number of errors"""
 
 
 def error_statistics(
@@ -36,8 +37,9 @@ def error_statistics(
     `repetitions` series put together from random blocks of the errors, so that their correlation in time counts; NaN
     for min, max, sse and n. `block` is by default the longer of Politis and White's for the errors and their squares.
     The table's `attrs` have `block`, `blocks` (how many fit into the series), `confidence` and `reliable`: whether
-    there are FEWEST_BLOCKS of them. All NaN where there is no error. Raises InputError for a confidence outside (0, 1)
-    or fewer than 1 repetition or a block that is not between 1 and n.
+    there are FEWEST_BLOCKS of them and the correlation ends within the series, which that of an error that grows with
+    the path does not. All NaN where there is no error. Raises InputError for a confidence outside (0, 1), fewer than 1
+    repetition, or a block that is not between 1 and n.
     """
     if not 0.0 < confidence < 1.0 or repetitions < 1:
         raise InputError(f"bootstrap: expected 0 < confidence < 1 and repetitions, got {confidence!r}, {repetitions!r}")
@@ -46,9 +48,9 @@ def error_statistics(
     n = len(e)
     if block is not None and not 1 <= block <= max(n, 1):
         raise InputError(f"bootstrap: a block of {block} does not fit into {n} errors")
-    length = block or (max(block_length(e), block_length(e**2)) if n else 1)
-    extremes = {"min": e.min(), "max": e.max()} if n else dict.fromkeys(("min", "max"), np.nan)
-    values = {**_of_series(e), **extremes, "sse": float(e @ e), "n": n}
+    found = [block_length(e), block_length(e**2)] if n else []
+    length = block or max((one.length for one in found), default=1)
+    values = {**_of_series(e), "n": n}
     table = pd.DataFrame({"value": values, "low": np.nan, "high": np.nan}).rename_axis("statistic")
     if n > 1:
         drawn = _resampled(e, length, repetitions, np.random.default_rng(seed))
@@ -58,15 +60,16 @@ def error_statistics(
         "block": length,
         "blocks": n / length,
         "confidence": confidence,
-        "reliable": n / length >= FEWEST_BLOCKS,
+        "reliable": n / length >= FEWEST_BLOCKS and all(one.correlation_ends for one in found),
     }
     return table
 
 
 def _of_series(e: FloatArray) -> dict[str, float]:
     if len(e) == 0:
-        return dict.fromkeys(OF_SERIES, float("nan"))
-    return dict(zip(OF_SERIES, _statistics_of_rows(e[None])[0].tolist(), strict=True))
+        return dict.fromkeys((*OF_SERIES, *WITHOUT_INTERVAL), float("nan"))
+    with_interval = dict(zip(OF_SERIES, _statistics_of_rows(e[None])[0].tolist(), strict=True))
+    return {**with_interval, "min": float(e.min()), "max": float(e.max()), "sse": float(e @ e)}
 
 
 def _statistics_of_rows(rows: FloatArray) -> FloatArray:

@@ -1,0 +1,109 @@
+"""Confidence intervals of statistics of errors that follow each other in time."""
+
+import numpy as np
+import pytest
+from evo.core.metrics import APE, StatisticsType
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from fgbaseline import compare
+from fgbaseline.compare.block_length import autocovariance, block_length
+from fgbaseline.geometry import FloatArray, InputError
+
+
+def autoregressive(n: int, phi: float, seed: int) -> FloatArray:
+    """x_k = phi x_(k-1) + noise, from its stationary state; of mean 0."""
+    noise = np.random.default_rng(seed).normal(size=n + 500)
+    return np.asarray(lfilter([1.0], [1.0, -phi], noise)[500:])
+
+
+@given(errors=st.lists(st.floats(0, 1e6), min_size=1, max_size=40))
+def test_the_values_are_those_of_evo_and_numpy(errors: list[float]) -> None:
+    table = compare.error_statistics([*errors, np.nan], repetitions=5)
+    evo = APE()
+    evo.error = np.array(errors)
+    for statistic in StatisticsType:
+        assert table.loc[statistic.value, "value"] == pytest.approx(evo.get_statistic(statistic), rel=1e-12, abs=1e-12)
+    assert table.loc["p95", "value"] == pytest.approx(np.percentile(errors, 95))
+    assert table.loc["n", "value"] == len(errors)
+    assert table.loc[["min", "max", "sse", "n"], ["low", "high"]].isna().all(axis=None)
+
+
+def test_autocovariance_is_what_the_definition_says() -> None:
+    x = autoregressive(60, 0.5, 0) + 7.0
+    centred = x - x.mean()
+    expected = [np.sum(centred[lag:] * centred[: len(x) - lag]) / len(x) for lag in range(len(x))]
+    np.testing.assert_allclose(autocovariance(x), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("phi", [0.3, 0.6, 0.9])
+def test_the_block_is_as_long_as_theory_has_it(phi: float) -> None:
+    """For an AR(1), G / g = 2 phi / (1 - phi^2), so b = (3/2 (G / g)^2 n)^(1/3)."""
+    n = 4000
+    theory = (1.5 * (2 * phi / (1 - phi**2)) ** 2 * n) ** (1 / 3)
+    found = np.median([block_length(autoregressive(n, phi, seed)).length for seed in range(30)])
+    assert found == pytest.approx(theory, rel=0.25)
+
+
+def test_blocks_at_the_ends_of_what_can_be() -> None:
+    assert block_length(np.random.default_rng(0).normal(size=1000)).length <= 5
+    assert block_length(np.ones(100)) == (1, True)
+    assert block_length(np.arange(5.0)) == (1, True)
+    assert block_length(np.arange(300.0)) == (52, False)  # 3 sqrt(n): a trend has no end of correlation
+
+
+def test_intervals_hold_the_true_value_as_often_as_they_say() -> None:
+    """An AR(1) of 0.8 and 1000 values: blocks come close to 95 %, single values are wrong most of the time."""
+    hits = {None: 0, 1: 0}
+    trials = 100
+    for seed in range(trials):
+        x = autoregressive(1000, 0.8, seed)
+        for block in hits:
+            low, high = compare.error_statistics(x, block=block, repetitions=100, seed=seed).loc[
+                "mean", ["low", "high"]
+            ]
+            hits[block] += bool(low <= 0.0 <= high)
+    assert hits[None] / trials > 0.87
+    assert hits[1] / trials < 0.65
+
+
+def test_the_rmse_has_its_interval_too() -> None:
+    hits = 0
+    for seed in range(100):
+        low, high = compare.error_statistics(autoregressive(1000, 0.7, seed), repetitions=150).loc[
+            "rmse", ["low", "high"]
+        ]
+        hits += bool(low <= 1 / np.sqrt(1 - 0.7**2) <= high)
+    assert hits > 80
+
+
+def test_the_same_seed_gives_the_same_interval() -> None:
+    x = autoregressive(300, 0.9, 1)
+    first, again, other = (compare.error_statistics(x, seed=seed) for seed in (3, 3, 4))
+    assert first.equals(again)
+    assert not first.equals(other)
+    inside = first.loc[["rmse", "mean", "median", "std"]]
+    assert (inside["low"] <= inside["value"]).all()
+    assert (inside["value"] <= inside["high"]).all()
+
+
+def test_a_series_too_short_for_its_correlation_says_so() -> None:
+    assert not compare.error_statistics(np.arange(60.0)).attrs["reliable"]
+    assert not compare.error_statistics(autoregressive(5000, 0.1, 0).cumsum()).attrs["reliable"]
+    assert compare.error_statistics(autoregressive(2000, 0.3, 0)).attrs["reliable"]
+
+
+def test_one_error_has_no_interval_and_none_has_no_value() -> None:
+    one = compare.error_statistics([2.0])
+    assert one.loc["rmse", "value"] == 2.0
+    assert one[["low", "high"]].isna().all(axis=None)
+    none = compare.error_statistics([np.nan])
+    assert none.drop("n").isna().all(axis=None)
+    assert none.loc["n", "value"] == 0
+
+
+@pytest.mark.parametrize("wrong", [{"confidence": 1.0}, {"confidence": 0.0}, {"repetitions": 0}, {"block": 11}])
+def test_settings_that_make_no_sense_are_errors(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError, match="bootstrap:"):
+        compare.error_statistics(np.arange(10.0), **wrong)  # type: ignore[arg-type]
