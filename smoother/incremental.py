@@ -23,11 +23,13 @@ from .waiting import EntryRule
 
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
+SETTLING_UPDATES = 8
+"""at most; three to five are usual"""
 
 
 @dataclass(frozen=True, slots=True)
 class ISAM2Settings:
-    """How the graph is solved; none of these moves its optimum."""
+    """How the graph is solved; only `entry` moves its optimum."""
 
     relinearize_position: float = 0.02
     """m, of a pose"""
@@ -36,6 +38,8 @@ class ISAM2Settings:
     relinearize_landmark: float = 0.002
     """as a share of its distance"""
     entry: EntryRule = field(default_factory=EntryRule)
+    relinearise_at_end: bool = True
+    """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
 
     def params(self) -> gtsam.ISAM2Params:
         """The same in GTSAM's terms."""
@@ -73,6 +77,16 @@ class IncrementalSmoother:
             seconds[k] = time.perf_counter() - start
             if progress is not None:
                 progress(k + 1, T)
+
+    def settle(self) -> None:
+        """After the last frame: updates without anything new, until every variable is within its threshold."""
+        for _ in range(SETTLING_UPDATES):
+            try:
+                result = self._update(gtsam.NonlinearFactorGraph(), gtsam.Values(), ())
+            except IndeterminateSystemError:  # the tree is as it was, and so good enough
+                return
+            if result.getVariablesRelinearized() == 0:
+                return
 
     def _frame(self, k: int, observed: range) -> None:
         arrival = self.arrivals.next(k, observed, self.key, self._dropped)

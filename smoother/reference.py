@@ -18,7 +18,7 @@ from .covariances import covariances
 from .incremental import IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
 from .keys import pose_key
-from .relinearised import compact, relinearised
+from .relinearised import Relinearised, compact, relinearised
 from .values import landmarks_of, poses_of
 
 
@@ -53,7 +53,8 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     smoother = IncrementalSmoother(problem, settings)
     try:
         smoother.run(seconds, progress)
-        graph, values = _relinearise(smoother)
+        smoother.settle()
+        graph, values = _final(smoother, settings.relinearise_at_end)
     except (GivenUpError, IndeterminateSystemError) as error:
         return Estimate.failed("isam2", str(error), T, len(problem.excluded))
     poses, landmarks = _marginals(smoother, graph, values)
@@ -91,11 +92,11 @@ def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
     return replace(estimate, by_products={other.name: replace(other, by_products={})})
 
 
-def _relinearise(smoother: IncrementalSmoother) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-    """The whole graph and its solution, relinearised, without the landmarks whose geometry came undone."""
+def _final(smoother: IncrementalSmoother, relinearise: bool) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """The whole graph and its solution, relinearised or not, without the landmarks whose geometry came undone."""
     while True:
         graph, values = compact(smoother.isam.tree.getFactorsUnsafe()), smoother.isam.tree.calculateEstimate()
-        values, failure = relinearised(graph, values)
+        values, failure = relinearised(graph, values) if relinearise else Relinearised(values)
         if not smoother.drop_undone(values):
             break
     if failure:
