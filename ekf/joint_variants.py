@@ -9,6 +9,9 @@ from .gyro_bias import GyroBiasPrior
 from .joint import joint_ekf
 from .joint_settings import JointSettings, Linearisation
 
+GATE = 0.9999
+"""chi-square probability: one good observation in ten thousand is lost"""
+
 
 def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
     """The joint filter with the gyroscope's bias in its state, `Estimate.gyro_bias`."""
@@ -25,3 +28,8 @@ def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None)
     """The joint filter with first-estimate Jacobians in place of the invariant correction."""
     settings = JointSettings(linearisation=Linearisation.FIRST_ESTIMATE)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
+
+
+def joint_ekf_gated(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """The joint filter that leaves out every observation beyond a chi-square gate of 0.9999; each is counted."""
+    return replace(joint_ekf(problem, progress, JointSettings(gate=GATE)), name="joint-ekf-gated")
