@@ -1,0 +1,182 @@
+"""`assert_accuracy`: limits on one trajectory, for people whose CI is pytest."""
+
+import math
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.compare import Align, Matched, absolute_errors, associate, summarised
+from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.data import Estimate, Status, Trajectory, Truth
+from fgbaseline.data.formats import read_trajectory
+from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.geometry import FloatArray, InputError
+
+from .wording import bound, number
+
+AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
+"""a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
+LONG_GAP = 3.0
+"""median intervals of a trajectory: two poses that are further apart have a gap between them"""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One figure of a trajectory, and what was asked of it."""
+
+    metric: str
+    unit: str
+    value: float
+    bounds: Bounds
+
+    @property
+    def outcome(self) -> Outcome:
+        """Whether it holds."""
+        return self.bounds.judge(self.value)
+
+
+def assert_accuracy(
+    estimate: AnyTrajectory,
+    reference: AnyTrajectory,
+    *,
+    ate: float | None = None,
+    ate_max: float | None = None,
+    divergence: float | None = None,
+    divergence_max: float | None = None,
+    rotation_deg: float | None = None,
+    coverage: float = 0.95,
+    align: Align | str = Align.SE3,
+    tolerance: float | None = None,
+    figure: FilePath | None = None,
+) -> dict[str, float]:
+    """Raises AssertionError, with the table and where the figure is, unless an estimate is as accurate as asked.
+
+    At most: `ate` and `ate_max`, RMSE and largest distance (m) after alignment; `divergence` and `divergence_max`, the
+    same without; `rotation_deg`, RMSE of the angle (deg) after alignment. At least: `coverage`, the share of the
+    reference's time in which there are paired poses. Poses are paired by time within `tolerance` (s; see
+    `compare.associate`), those of estimates and truths of a problem by frame. The figure is drawn where a limit falls
+    short, into the PNG `figure`, by default into a folder of its own among the temporary files.
+
+    Gives the figures by name, such as "ate.rmse". Raises InputError where nothing is asked, or a trajectory is none.
+    """
+    __tracebackhide__ = True
+    asked = {
+        "ate.rmse": ate,
+        "ate.max": ate_max,
+        "divergence.rmse": divergence,
+        "divergence.max": divergence_max,
+        "rotation.rmse": rotation_deg,
+        "coverage": coverage,
+    }
+    _require_bounds(asked)
+    if isinstance(estimate, Estimate) and estimate.status is Status.FAILED:
+        raise AssertionError(f"{estimate.name} failed: {estimate.reason}")
+    matched = _paired(estimate, reference, tolerance)
+    aligned = matched.aligned(align)
+    tables = {"divergence": absolute_errors(matched), "ate": absolute_errors(aligned)}
+    span = _trajectory(reference, "reference").t
+    values = _values(tables, covered(matched.reference.t, span))
+    figures = [_figure(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
+    if all(each.outcome is Outcome.HOLDS for each in figures):
+        return values
+    raise AssertionError(_message(figures, aligned, _drawn(aligned, tables, asked, figure)))
+
+
+def covered(t: FloatArray, reference: FloatArray) -> float:
+    """The share of the time of rising stamps `reference` (n,) in which there are paired stamps t (m,).
+
+    The time between two stamps counts unless they are more than LONG_GAP of their median interval apart: what the
+    reference itself has not seen is not asked for.
+    """
+    whole = _without_gaps(reference)
+    return min(1.0, _without_gaps(t) / whole) if whole else 1.0
+
+
+def _without_gaps(t: FloatArray) -> float:
+    gaps = np.diff(t)
+    return float(gaps[gaps <= LONG_GAP * np.median(gaps)].sum()) if len(gaps) else 0.0
+
+
+def _require_bounds(asked: dict[str, float | None]) -> None:
+    if all(limit is None for metric, limit in asked.items() if metric != "coverage"):
+        raise InputError("accuracy: nothing is asked; give ate=0.5 or another limit")
+    for metric, limit in asked.items():
+        if limit is not None and not (math.isfinite(limit) and limit >= 0):
+            raise InputError(f"accuracy: the limit on {metric} is {limit!r}; give a number of at least 0")
+
+
+def _paired(estimate: AnyTrajectory, reference: AnyTrajectory, tolerance: float | None) -> Matched:
+    by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
+    if any(by_frame) and not all(by_frame):
+        raise InputError(
+            "accuracy: an Estimate and a Truth are frames of a problem and have no time stamps; give the stamps with "
+            "the poses, such as (sequence.t, estimate.world_T_imu), or two of them"
+        )
+    if isinstance(estimate, Estimate | Truth) and isinstance(reference, Estimate | Truth):
+        n, n_reference = len(estimate.world_T_imu), len(reference.world_T_imu)
+        if n != n_reference:
+            raise InputError(
+                f"accuracy: the estimate has {n} frames and the reference {n_reference}; give one problem's"
+            )
+    return associate(_trajectory(reference, "reference"), _trajectory(estimate, "estimate"), tolerance=tolerance)
+
+
+def _trajectory(path: AnyTrajectory, name: str) -> Trajectory:
+    if isinstance(path, Trajectory):
+        return path
+    if isinstance(path, Estimate | Truth):
+        frames = np.arange(len(path.world_T_imu), dtype=np.float64)
+        name = path.name if isinstance(path, Estimate) else "truth"
+        return replace(Trajectory.of_frames(frames, path.world_T_imu, name), stamped=False)
+    if isinstance(path, tuple):
+        t, poses = path
+        return Trajectory.of_frames(t, poses, name)
+    return read_trajectory(path)
+
+
+def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:
+    values = {"coverage": coverage, "rotation.rmse": summarised(tables["ate"]["rotation_deg"])["rmse"]}
+    for name, table in tables.items():
+        statistics = summarised(table["translation"])
+        values |= {f"{name}.rmse": statistics["rmse"], f"{name}.max": statistics["max"]}
+    return dict(sorted(values.items()))
+
+
+def _figure(metric: str, value: float, limit: float) -> Figure:
+    bounds = Bounds(at_least=limit) if metric == "coverage" else Bounds(at_most=limit)
+    return Figure(metric, {"coverage": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
+
+
+def _drawn(
+    aligned: Matched, tables: dict[str, pd.DataFrame], asked: dict[str, float | None], place: FilePath | None
+) -> Path:
+    from .accuracy_figure import draw  # matplotlib: only where something fell short
+
+    path = Path(tempfile.mkdtemp(prefix="fgbaseline-")) / "accuracy.png" if place is None else Path(place)
+    limited = {metric.partition(".")[0] for metric, limit in asked.items() if limit is not None}
+    shown = [name for name in tables if name in limited] or ["ate"]
+    draw(aligned, {name: (tables[name], asked[f"{name}.max"]) for name in shown}, path)
+    return path
+
+
+def _message(figures: Sequence[Figure], aligned: Matched, drawn: Path) -> str:
+    rows = [("limit", "metric", "value", "bound", "margin")]
+    for each in figures:
+        unit = f" ({each.unit})" if each.unit else ""
+        margin = number(each.bounds.margin(each.value), sign=True)
+        rows.append((each.outcome.value, each.metric + unit, number(each.value), bound(each.bounds), margin))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    table = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join(
+        [
+            f"{aligned.estimate.name} is not as accurate as asked, against {aligned.reference.name}:",
+            *table,
+            aligned.caption,
+            f"The figure is in {drawn}",
+        ]
+    )

@@ -1,0 +1,35 @@
+"""The fixture `assert_accuracy` for tests of other projects; nothing of ours is imported before a test asks for it."""
+
+import re
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--accuracy-figures DIR`, for CI systems that keep a folder."""
+    parser.getgroup("fgbaseline").addoption(
+        "--accuracy-figures",
+        metavar="DIR",
+        type=Path,
+        help="Folder for the figures of trajectories that fall short.  [default: the test's tmp_path]",
+    )
+
+
+@pytest.fixture
+def assert_accuracy(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., dict[str, float]]:
+    """`fgbaseline.reports.checking.assert_accuracy`, whose figure is named after the test."""
+    from .checking import assert_accuracy as asserted
+
+    folder = request.config.getoption("--accuracy-figures") or tmp_path
+    stem = re.sub(r"[^\w.-]+", "_", request.node.name)
+    names = (f"{stem}.png" if n == 1 else f"{stem}-{n}.png" for n in count(1))
+
+    def in_test(estimate: Any, reference: Any, **limits: Any) -> dict[str, float]:
+        __tracebackhide__ = True
+        return asserted(estimate, reference, **{"figure": folder / next(names), **limits})
+
+    return in_test
