@@ -15,6 +15,7 @@ def estimator(ate: float | None = 0.4, divergence: float | None = 0.2, status: s
         "seconds": 3.25,
         "ate": {"rmse": ate, "max": None if ate is None else 2.0 * ate},
         "divergence": {"rmse": divergence, "final": 0.0},
+        "map": {"median": 0.3, "n": 100},
         "reprojection": {"median": 0.9, "under_3px": 0.95, "n": 2000},
         "events": {"landmark dropped": 3},
         "notes": {},

@@ -9,6 +9,7 @@ from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.command import Outputs, check
+from fgbaseline.reports.cli import main
 
 from .commands import everything_in, fgbaseline
 from .summaries import estimator, summary, write
@@ -256,11 +257,21 @@ def test_a_summary_is_not_overwritten_by_a_baseline(tmp_path: Path) -> None:
         ("check out --limits limits.toml --baseline out/new.json --update-baseline --junit .", (".", "folder")),
     ],
 )
-def test_bad_input_is_one_sentence(line: str, names: tuple[str, ...], tmp_path: Path) -> None:
+def test_bad_input_is_one_sentence(
+    line: str,
+    names: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     write(tmp_path, GOOD, LIMITS, GOOD)
     there = everything_in(tmp_path)
-    result = fgbaseline(*line.split(), cwd=tmp_path)
-    assert (result.returncode, result.stdout) == (2, "")
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert all(name in result.stderr for name in names), result.stderr
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    told = capsys.readouterr()
+    assert (ended.value.code, told.out) == (2, "")
+    assert len(told.err.strip().splitlines()) == 1
+    assert all(name in told.err for name in names), told.err
     assert everything_in(tmp_path) == there

@@ -152,6 +152,7 @@ DIVERGENCE = '[[limit]]\nmetric = "divergence.rmse"\nat_most = 1\n'
         ("trusted", 'reference = "trusted"\n' + DIVERGENCE, "holds", 0),
         ("untrusted", 'reference = "none"\n' + ATE, "holds", 0),
         ("untrusted", 'reference = "none"\n' + DIVERGENCE, "cannot tell", 2),
+        ("untrusted", 'reference = "none"\n' + DIVERGENCE.replace("divergence.rmse", "map.median"), "cannot tell", 2),
     ],
 )
 def test_a_reference_that_is_not_trusted_cannot_tell(

@@ -11,12 +11,10 @@ from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
 from .line import Checked, Line
-from .measured import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, value_of
+from .measured import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, rests_on_reference, value_of
 
 TIMINGS = frozenset({"seconds", "frames_per_second", "memory", "peak_memory"})
 """parts of metrics that depend on the machine"""
-REFERENCE = "divergence"
-"""the part of a summary that is measured from the reference"""
 
 
 def is_timing(metric: str) -> bool:
@@ -35,7 +33,7 @@ def before(
         return None, f"the baseline has no run '{name}'; it has {', '.join(map(repr, baseline.runs))}"
     if estimator not in old.estimators:
         return None, f"the baseline has no {estimator}"
-    if metric.partition(".")[0] == REFERENCE and old.reference is not None and run.reference is not None:
+    if rests_on_reference(metric) and old.reference is not None and run.reference is not None:
         if old.reference.trust == "untrusted":
             return None, f"the reference of the baseline, {old.reference.name}, was untrusted"
         if old.reference.name != run.reference.name:

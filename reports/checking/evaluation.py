@@ -8,10 +8,20 @@ from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
-from .baseline import REFERENCE, before, is_timing
+from .baseline import before, is_timing
 from .limits_file import Limit, Limits, Needed
 from .line import NEW, Checked, Line
-from .measured import DIGITS, Measured, MeasuredRun, failure, has_metric, metrics_of, nearest, value_of
+from .measured import (
+    DIGITS,
+    Measured,
+    MeasuredRun,
+    failure,
+    has_metric,
+    metrics_of,
+    nearest,
+    rests_on_reference,
+    value_of,
+)
 
 
 def evaluate(
@@ -112,7 +122,7 @@ def _outcome(
 
 def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
     """Why the reference keeps a metric from being judged; empty where it does not."""
-    if metric.partition(".")[0] != REFERENCE or run.reference is None or not below(run, needed):
+    if not rests_on_reference(metric) or run.reference is None or not below(run, needed):
         return ""
     return f"the reference is {run.reference.trust}"
 

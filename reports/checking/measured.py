@@ -19,6 +19,8 @@ DIGITS = 5
 """significant ones, of a baseline: what lies beyond differs between processors and libraries"""
 NO_METRICS = frozenset({"status", "reason", "notes", "events"})
 """what a summary says of an estimator beside its metrics (a kind of event that did not occur is not even a zero)"""
+ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"})
+"""what is measured from the reference"""
 
 
 class _Part(BaseModel):
@@ -122,6 +124,11 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     notes = estimator.get("notes") or {}
     keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
     return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")
+
+
+def rests_on_reference(metric: str) -> bool:
+    """Whether a metric says nothing where the reference is wrong."""
+    return metric.partition(".")[0] in ON_REFERENCE
 
 
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:

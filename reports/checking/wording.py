@@ -8,7 +8,8 @@ COLUMNS = ("limit", "estimator", "metric", "value", "bound", "margin", "baseline
 WORDS = ("limit", "run", "estimator", "metric")
 """the columns that hold words; the others hold numbers"""
 _METRES = ("ate", "ate_unaligned", "divergence")
-_COUNTS = ("behind_camera", "n", "under_3px")
+_PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
+_NO_UNIT = ("behind_camera", "n", "under_3px", "rank")
 
 
 def verdict(checked: Checked) -> str:
@@ -84,6 +85,7 @@ def unit_of(metric: str) -> str:
     last = last.rpartition(".")[2]
     if last.endswith("_deg"):
         return "deg"
-    if first.startswith(("reprojection", "components")):
-        return "" if last in _COUNTS else "px"
-    return "m" if first in _METRES and last else {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
+    if first in _PIXELS:
+        return "" if last in _NO_UNIT else "px"
+    in_metres = (first in _METRES and last) or metric in ("map.median", "map.median_seen")
+    return "m" if in_metres else {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
