@@ -9,6 +9,7 @@ from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.command import Outputs, check
+from fgbaseline.reports.checking.wording import unit_of
 from fgbaseline.reports.cli import main
 
 from .commands import everything_in, fgbaseline
@@ -275,3 +276,25 @@ def test_bad_input_is_one_sentence(
     assert len(told.err.strip().splitlines()) == 1
     assert all(name in told.err for name in names), told.err
     assert everything_in(tmp_path) == there
+
+
+@pytest.mark.parametrize(
+    ("metric", "unit"),
+    [
+        ("ate.rmse", "m"),
+        ("divergence.rotation_rmse_deg", "deg"),
+        ("ate_unaligned.final", "m"),
+        ("reprojection_common.median", "px"),
+        ("reprojection.under_3px", ""),
+        ("reprojection.n", ""),
+        ("held_out.median", "px"),
+        ("map.median", "m"),
+        ("map.n", ""),
+        ("nees.mean", ""),
+        ("seconds", "s"),
+        ("translation.rmse.value", "m"),
+        ("relative.0.5 s.rotation_deg.median.value", "deg"),
+    ],
+)
+def test_units_are_those_of_the_schema(metric: str, unit: str) -> None:
+    assert unit_of(metric) == unit

@@ -1,5 +1,6 @@
 """Bounds, tolerances and what never passes: the laws of `check`."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline.compare.limits import Better, Bounds, Outcome, around, rounded
+from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.evaluation import evaluate
-from fgbaseline.reports.checking.limits_file import read_limits
+from fgbaseline.reports.checking.limits_file import Limits, read_limits
 from fgbaseline.reports.checking.line import Checked, Line
 from fgbaseline.reports.checking.measured import read_folder, read_measured
 
@@ -193,9 +195,41 @@ def test_several_runs_are_held_each_by_its_name(tmp_path: Path) -> None:
     assert only(one).run == "town"
 
 
-def test_trajectories_compared_with_ones_of_the_user_need_no_trust(tmp_path: Path) -> None:
-    document = {"schema": "fgbaseline/compare/1", "estimators": {"mine": {"ate": {"rmse": 0.3}}}}
-    assert checked(tmp_path, document, ATE).exit_code == 0
+def comparison(trust: str | None) -> dict[str, Any]:
+    """A comparison.json, as far as these tests look at it."""
+    value = {"rmse": {"value": 0.3, "low": 0.2, "high": 0.4}, "n": 90}
+    mine = {"source": "mine.tum", "translation": value, "relative": {"0.5 s": {"translation": value}}}
+    return {
+        "schema": "fgbaseline/comparison/1",
+        "reference": {"name": "isam2", "trust": trust, "reasons": ["it lost its way"]},
+        "sequence": None,
+        "estimates": {"mine": {**mine, "reprojection": {"median": 0.9}, "final_m": 0.5, "notes": {}}},
+    }
+
+
+def limited(folder: Path, metric: str) -> TomlFile[Limits]:
+    """A bound of 0.5 on a metric."""
+    (folder / "limits.toml").write_text(f'reference = "none"\n[[limit]]\nmetric = "{metric}"\nat_most = 0.5\n')
+    return read_limits(folder / "limits.toml")
+
+
+@pytest.mark.parametrize(
+    ("trust", "metric", "code"),
+    [
+        (None, "translation.rmse.value", 0),
+        (None, "relative.0.5 s.translation.rmse.value", 0),
+        ("trusted", "final_m", 0),
+        ("untrusted", "translation.rmse.value", 2),
+    ],
+)
+def test_trajectories_from_anywhere_are_held_to_limits(
+    trust: str | None, metric: str, code: int, tmp_path: Path
+) -> None:
+    (tmp_path / "comparison.json").write_text(json.dumps(comparison(trust)))
+    result = evaluate(limited(tmp_path, metric), read_folder(tmp_path), None)
+    assert (only(result).estimator, result.exit_code) == ("mine", code)
+    pixels = evaluate(limited(tmp_path, "reprojection.median"), read_folder(tmp_path), None)
+    assert (only(pixels).value, pixels.exit_code) == (0.9, 1)  # not measured from the reference
 
 
 WRONG = [

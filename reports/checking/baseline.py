@@ -11,7 +11,7 @@ from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
 from .line import Checked, Line
-from .measured import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, rests_on_reference, value_of
+from .measured import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, value_of
 
 TIMINGS = frozenset({"seconds", "frames_per_second", "memory", "peak_memory"})
 """parts of metrics that depend on the machine"""
@@ -33,7 +33,7 @@ def before(
         return None, f"the baseline has no run '{name}'; it has {', '.join(map(repr, baseline.runs))}"
     if estimator not in old.estimators:
         return None, f"the baseline has no {estimator}"
-    if rests_on_reference(metric) and old.reference is not None and run.reference is not None:
+    if run.rests_on_reference(metric):
         if old.reference.trust == "untrusted":
             return None, f"the reference of the baseline, {old.reference.name}, was untrusted"
         if old.reference.name != run.reference.name:
@@ -72,8 +72,7 @@ def updated(checked: Checked) -> str:
         if line.run not in runs:
             reference = checked.measured.runs[line.run].reference
             runs[line.run] = {"estimators": {}, "sequence": {"name": line.run}}
-            if reference is not None:
-                runs[line.run]["reference"] = {"name": reference.name, "trust": reference.trust}
+            runs[line.run]["reference"] = {"name": reference.name, "trust": reference.trust}
         _put(runs[line.run]["estimators"].setdefault(line.estimator, {}), line.metric, rounded(line.value, DIGITS))
     document = {"schema": BASELINE, "runs": runs}
     return json.dumps(document, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"

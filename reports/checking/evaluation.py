@@ -19,7 +19,6 @@ from .measured import (
     has_metric,
     metrics_of,
     nearest,
-    rests_on_reference,
     value_of,
 )
 
@@ -76,7 +75,7 @@ def matched(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tu
 
 def below(run: MeasuredRun, needed: Needed) -> bool:
     """Whether a run's reference is less trusted than needed; where nobody can say, it is the user's own."""
-    trust = "trusted" if run.reference is None else run.reference.trust
+    trust = run.reference.trust
     return trust == "untrusted" or (trust == "doubtful" and needed is Needed.TRUSTED)
 
 
@@ -122,7 +121,7 @@ def _outcome(
 
 def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
     """Why the reference keeps a metric from being judged; empty where it does not."""
-    if not rests_on_reference(metric) or run.reference is None or not below(run, needed):
+    if not run.rests_on_reference(metric) or not below(run, needed):
         return ""
     return f"the reference is {run.reference.trust}"
 
@@ -140,7 +139,7 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
 def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:
     """What is to be said of a reference that is not trusted."""
     reference = run.reference
-    if reference is None or reference.trust == "trusted":
+    if reference.trust in (None, "trusted"):
         return ""
     where = f" of {name}" if several else ""
     why = f": {reference.reasons[0]}" if reference.reasons else ""

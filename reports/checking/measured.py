@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
 SUMMARY = "summary.json"
+COMPARISON = "comparison.json"
 BASELINE = "fgbaseline/baseline/1"
 DIGITS = 5
 """significant ones, of a baseline: what lies beyond differs between processors and libraries"""
@@ -31,7 +32,8 @@ class Reference(_Part):
     """What divergence is measured from, and how far it can be leaned on."""
 
     name: str | None = None
-    trust: Literal["trusted", "doubtful", "untrusted"]
+    trust: Literal["trusted", "doubtful", "untrusted"] | None = None
+    """None where nobody can say: a trajectory that the user gave"""
     reasons: tuple[str, ...] = ()
 
 
@@ -44,10 +46,25 @@ class Sequence(_Part):
 class MeasuredRun(_Part):
     """The estimators of one sequence."""
 
-    reference: Reference | None = None
-    """None where nobody can say: trajectories compared with one that the user gave"""
+    reference: Reference = Reference()
     sequence: Sequence = Sequence()
     estimators: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
+    compared: bool = False
+    """trajectories alone, all of whose errors are from the reference"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_comparison(cls, document: Any) -> Any:
+        """`comparison.json` calls them estimates, and the sequence by its name."""
+        if not isinstance(document, dict) or "estimates" not in document:
+            return document
+        sequence = {"name": document.get("sequence") or ""}
+        return {**document, "estimators": document["estimates"], "sequence": sequence, "compared": True}
+
+    def rests_on_reference(self, metric: str) -> bool:
+        """Whether a metric says nothing where the reference is wrong."""
+        first = metric.partition(".")[0]
+        return first in ON_REFERENCE or (self.compared and not first.startswith("reprojection"))
 
 
 class _Several(_Part):
@@ -64,20 +81,18 @@ class Measured:
 
 
 def read_folder(folder: Path) -> Measured:
-    """What a folder's summary.json holds. Raises InputError."""
+    """What a folder's summary.json or comparison.json holds. Raises InputError."""
+    wanted = "give one that fgbaseline run, compare or bench wrote"
     if not folder.is_dir():
-        raise InputError(
-            f"{shown(folder)}: there is no such folder; give one that fgbaseline run, compare or bench wrote"
-        )
-    if not (folder / SUMMARY).is_file():
-        raise InputError(
-            f"{shown(folder)}: it holds no {SUMMARY}; give a folder that fgbaseline run, compare or bench wrote"
-        )
-    return read_measured(folder / SUMMARY)
+        raise InputError(f"{shown(folder)}: there is no such folder; {wanted}")
+    found = [folder / name for name in (SUMMARY, COMPARISON) if (folder / name).is_file()]
+    if not found:
+        raise InputError(f"{shown(folder)}: it holds no {SUMMARY}; {wanted}")
+    return read_measured(found[0])
 
 
 def read_measured(path: Path) -> Measured:
-    """What a summary.json or a baseline holds. Raises InputError naming the file and what is wrong in it."""
+    """What a summary.json, a comparison.json or a baseline holds. Raises InputError naming file and place."""
     with reading(path):
         text = regular_file(path).read_bytes()
         try:
@@ -126,11 +141,6 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")
 
 
-def rests_on_reference(metric: str) -> bool:
-    """Whether a metric says nothing where the reference is wrong."""
-    return metric.partition(".")[0] in ON_REFERENCE
-
-
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:
     """The paths of all numbers of an estimator."""
     return [path for path, _ in _numbers(estimator, "") if path.partition(".")[0] not in NO_METRICS]
@@ -148,16 +158,19 @@ _ABSENT = object()
 
 def _at(estimator: Mapping[str, Any], metric: str) -> Any:
     """What stands at a path; None where a null stands on the way, _ABSENT where there is nothing."""
-    found: Any = estimator
-    if metric.partition(".")[0] in NO_METRICS:
+    return _ABSENT if metric.partition(".")[0] in NO_METRICS else _below(estimator, metric)
+
+
+def _below(found: Any, path: str) -> Any:
+    """The same from anywhere; keys may have dots in them, such as the '0.5 s' of a relative error."""
+    if found is None:
+        return None
+    if not isinstance(found, Mapping):
         return _ABSENT
-    for part in metric.split("."):
-        if found is None:
-            return None
-        if not isinstance(found, dict) or part not in found:
-            return _ABSENT
-        found = found[part]
-    return found
+    if path in found:
+        return found[path]
+    inner = (_below(found[key], path[len(key) + 1 :]) for key in found if path.startswith(f"{key}."))
+    return next((each for each in inner if each is not _ABSENT), _ABSENT)
 
 
 def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:

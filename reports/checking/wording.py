@@ -9,7 +9,7 @@ WORDS = ("limit", "run", "estimator", "metric")
 """the columns that hold words; the others hold numbers"""
 _METRES = ("ate", "ate_unaligned", "divergence")
 _PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
-_NO_UNIT = ("behind_camera", "n", "under_3px", "rank")
+_NO_UNIT = ("behind_camera", "n", "under_3px", "rank", "block", "sse")
 
 
 def verdict(checked: Checked) -> str:
@@ -80,12 +80,14 @@ def number(value: float | None, *, sign: bool = False) -> str:
 
 
 def unit_of(metric: str) -> str:
-    """The unit of a metric of summary.json; empty for counts, shares and what is not known."""
-    first, _, last = metric.partition(".")
-    last = last.rpartition(".")[2]
-    if last.endswith("_deg"):
+    """The unit of a metric of summary.json or comparison.json; empty for counts, shares and what is not known."""
+    parts = metric.split(".")
+    if parts[-1] in _NO_UNIT:
+        return ""
+    if any(part.endswith("_deg") for part in parts):
         return "deg"
-    if first in _PIXELS:
-        return "" if last in _NO_UNIT else "px"
-    in_metres = (first in _METRES and last) or metric in ("map.median", "map.median_seen")
-    return "m" if in_metres else {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
+    if parts[0] in _PIXELS:
+        return "px"
+    if parts[0] in _METRES or "translation" in parts or metric in ("map.median", "map.median_seen", "final_m"):
+        return "m"
+    return {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
