@@ -14,11 +14,14 @@ from .whole_folder import require_free, whole_folder
 def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
     """Poses the problem of a recording, writes it into the folder and says what it holds; gives the exit code."""
     require_free(out, force=force, mark=layout.SCALARS)
-    problem = job.pose_problem(job.read_sequence(settings), settings)
+    sequence, held = job.split(job.read_sequence(settings), settings)
+    problem = job.pose_problem(sequence, settings)
     with whole_folder(out, force=force, mark=layout.SCALARS) as folder:
         write_problem(problem, folder)
     for sentence in told(problem):
         click.echo(sentence)
+    if held is not None:
+        click.echo(f"{held.n_tracks} tracks are held out: they are not in the problem")
     click.echo(f"\nThe problem is in {out}; docs/export.md describes its files")
     return 0
 

@@ -3,6 +3,7 @@
 from .euroc import read_euroc, write_euroc
 from .ground_truth import BodyFrame, attach_truth
 from .kitti import read_kitti, read_times, write_kitti
+from .landmark_file import read_landmarks
 from .npz_writer import write_npz
 from .recording import read
 from .trajectory_file import TrajectoryFormat, read_pose_covariances, read_trajectory
@@ -16,6 +17,7 @@ __all__ = [
     "read",
     "read_euroc",
     "read_kitti",
+    "read_landmarks",
     "read_pose_covariances",
     "read_times",
     "read_trajectory",

@@ -27,6 +27,11 @@ from .run import FeatureCount
 @click.option(
     "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
 )
+@click.option("--repairs", type=click.Path(path_type=Path), help="TOML file of what is set by hand, as for run.")
+@click.option(
+    "--held-out", type=float, default=0.0, metavar="SHARE", help="Keep this share of the tracks out, as run does."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of what is held out.")
 def command(
     sequence: Path,
     out: Path,
@@ -34,6 +39,9 @@ def command(
     preset: Literal["calibrated", "documented"],
     features: int | Literal["all"] | None,
     as_recorded: bool,
+    repairs: Path | None,
+    held_out: float,
+    seed: int,
 ) -> int:
     """Write the problem that `fgbaseline run` would solve on SEQUENCE: npz, CSV and JSON.
 
@@ -44,5 +52,13 @@ def command(
     from ..exporting import export
     from ..job import RunSettings
 
-    settings = RunSettings(sequence=sequence, preset=preset, features=features, as_recorded=as_recorded)
+    settings = RunSettings(
+        sequence=sequence,
+        preset=preset,
+        features=features,
+        as_recorded=as_recorded,
+        held_out=held_out,
+        seed=seed,
+        repairs=repairs,
+    )
     return export(settings, out, force=force)

@@ -9,7 +9,14 @@ from typing import NoReturn
 
 import click
 
-COMMANDS = {"run": "run", "diagnose": "diagnose", "export": "export", "check": "check", "simulate": "simulate"}
+COMMANDS = {
+    "run": "run",
+    "compare": "compare",
+    "diagnose": "diagnose",
+    "export": "export",
+    "check": "check",
+    "simulate": "simulate",
+}
 """command -> module of this package that holds it under the name `command`"""
 BAD_INPUT, INTERRUPTED = 2, 130
 

@@ -1,6 +1,6 @@
 """One colour for an estimator, in every figure and on the page: Okabe and Ito's, told apart by the colour-blind."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import chain, cycle
 
 from fgbaseline.reports.comparison import Run
@@ -26,17 +26,23 @@ SPARE = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
 
 
 def colours(run: Run) -> dict[str, str]:
-    """The colour of every estimator of a run, by name.
+    """The colour of every estimator of a run, by name."""
+    return colours_of(run.results, run.reference)
 
-    The reference is black, a known name has its own colour, and the others take, in the run's order, those colours
-    that no name of the run has.
+
+def colours_of(names: Iterable[str], reference: str | None) -> dict[str, str]:
+    """The colour of each of the names.
+
+    The reference is black, a known name has its own colour, and the others take, in their order, those colours that
+    none of the names has.
     """
-    taken = {name: OWN[name] for name in run.results if name in OWN}
+    every = list(names)
+    taken = {name: OWN[name] for name in every if name in OWN}
     free = [colour for colour in OWN.values() if colour not in taken.values()]
     rest = chain(free, SPARE, cycle(SPARE))
     chosen: dict[str, str] = {}
-    for name in run.results:
-        if name == run.reference:
+    for name in every:
+        if name == reference:
             chosen[name] = REFERENCE
         else:
             chosen[name] = taken[name] if name in taken else next(rest)

@@ -1,0 +1,145 @@
+"""`fgbaseline compare`: trajectories from anywhere against a reference."""
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+
+class Direction(click.ParamType[tuple[float, ...]]):
+    """Three numbers with commas between."""
+
+    name = "X,Y,Z"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """The three numbers."""
+        try:
+            numbers = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != 3:
+            self.fail(f"expected three numbers such as 0,0,1, got {value!r}", param, ctx)
+        return numbers
+
+
+@click.command(
+    epilog="Example: fgbaseline compare truth.tum mine=out.tum --align yaw --out out/comparison\n\n"
+    "\b\nAgainst a run, with reprojection of your own landmarks:\n"
+    "fgbaseline compare out/drive mine.tum --sequence out/problem --landmarks mine.csv --out out/comparison"
+)
+@click.argument("reference")
+@click.argument("estimates", nargs=-1, metavar="[NAME=]ESTIMATE...")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for tables, figures and report.html.")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier comparison.")
+@click.option(
+    "--align",
+    type=click.Choice(["none", "first-pose", "yaw", "se3", "sim3"]),
+    help="What an estimate may be moved by.  [default: none against a run, whose world is theirs; else se3]",
+)
+@click.option("--align-first", type=click.IntRange(min=1), metavar="N", help="Align over the first N poses.")
+@click.option("--up", type=Direction(), help="Up in the reference's world.  [default: of --sequence, else 0,0,1]")
+@click.option(
+    "--association",
+    type=click.Choice(["nearest", "interpolated"]),
+    default="nearest",
+    show_default=True,
+    help="How poses are paired in time, each at most once.",
+)
+@click.option("--tolerance", type=float, metavar="S", help="Largest difference in time of a pair.  [default: 0.01]")
+@click.option("--offset", type=float, default=0.0, metavar="S", help="Added to the stamps of the estimates.")
+@click.option("--search-offset", type=float, metavar="S", help="Search for the offset within so many seconds.")
+@click.option(
+    "--delta",
+    "deltas",
+    multiple=True,
+    metavar="LENGTH",
+    help="Of relative errors: 1s, 10m, 30deg or 5frames; may be given again.  [default: 1s and 10m]",
+)
+@click.option("--all-pairs", is_flag=True, help="Relative errors from every pose, not end to end.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["tum", "kitti", "euroc", "npz"]),
+    help="Insist on a format of the files.  [default: told from their content]",
+)
+@click.option("--times", type=click.Path(path_type=Path), help="Time stamps of KITTI files, one a line.")
+@click.option(
+    "--sequence",
+    type=click.Path(path_type=Path),
+    help="The recording, or the folder of fgbaseline export: adds reprojection.",
+)
+@click.option(
+    "--landmarks",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    help="Landmarks of an estimate: CSV with id,x,y,z, id being the index in --sequence; may be given again.",
+)
+@click.option(
+    "--reference-body", type=click.Choice(["imu", "camera"]), default="imu", help="Whose poses the reference has."
+)
+@click.option(
+    "--estimate-body", type=click.Choice(["imu", "camera"]), default="imu", help="Whose poses the estimates have."
+)
+@click.option(
+    "--extrinsic",
+    type=click.Path(path_type=Path),
+    help="imu_T_cam, one line of 12 numbers.  [default: of --sequence]",
+)
+@click.option(
+    "--beside", default="all", show_default=True, help="Estimators of the run to show too: names, all or none."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the bootstrap.")
+def command(
+    reference: str,
+    estimates: tuple[str, ...],
+    out: Path | None,
+    force: bool,
+    align: str | None,
+    align_first: int | None,
+    up: tuple[float, float, float] | None,
+    association: str,
+    tolerance: float | None,
+    offset: float,
+    search_offset: float | None,
+    deltas: tuple[str, ...],
+    all_pairs: bool,
+    form: Literal["tum", "kitti", "euroc", "npz"] | None,
+    times: Path | None,
+    sequence: Path | None,
+    landmarks: tuple[str, ...],
+    reference_body: Literal["imu", "camera"],
+    estimate_body: Literal["imu", "camera"],
+    extrinsic: Path | None,
+    beside: str,
+    seed: int,
+) -> int:
+    """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
+
+    REFERENCE may also be the folder of a run: its reference is taken, the trust in it said first, and its other
+    estimators are compared beside yours.
+
+    Exits 0, or 2 on bad input.
+    """
+    from ..comparing.settings import Delta, Settings
+    from ..comparing.telling import tell
+
+    settings = Settings(
+        align=align,
+        align_first=align_first,
+        up=up,
+        association=association,
+        tolerance=tolerance,
+        offset=offset,
+        search_offset=search_offset,
+        deltas=tuple(Delta.parse(text) for text in deltas),
+        all_pairs=all_pairs,
+        form=form,
+        times=times,
+        sequence=sequence,
+        extrinsic=extrinsic,
+        reference_body=reference_body,
+        estimate_body=estimate_body,
+        beside=beside,
+        seed=seed,
+    )
+    return tell(reference, estimates, landmarks, settings, out, force=force)

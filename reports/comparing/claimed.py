@@ -1,0 +1,34 @@
+"""Whether the covariances that came with an estimate tell the truth about its errors."""
+
+import numpy as np
+
+from fgbaseline import compare
+from fgbaseline.compare import Align, Association, Matched
+from fgbaseline.data import Estimate, Truth
+from fgbaseline.geometry import FloatArray, InputError
+
+from .entries import Entry
+
+
+def nees_of(reference: Entry, entry: Entry, matched: Matched) -> FloatArray:
+    """(n,) the NEES of each pair against a reference that is taken for the truth: see `compare.nees`.
+
+    Raises InputError, saying why, where it would not mean anything: without covariances, after an alignment (which
+    would hide errors), between interpolated poses, and against a run's reference, which shares its data.
+    """
+    if entry.covariance is None:
+        raise InputError("no covariances came with it")
+    if matched.alignment.kind is not Align.NONE:
+        raise InputError(f"it was {matched.alignment.caption}, which hides errors; ask for --align none")
+    if matched.association is not Association.NEAREST:
+        raise InputError("poses were interpolated, covariances cannot be; ask for --association nearest")
+    if reference.trust is not None:
+        raise InputError("the reference shares its data with the estimate: compare with the truth for this")
+    chosen = np.searchsorted((entry.trajectory.t + matched.offset), matched.estimate.t)
+    estimate = Estimate(
+        name=entry.name,
+        world_T_imu=matched.estimate.world_T_body,
+        used=np.empty(0, dtype=np.bool_),
+        covariance=entry.covariance[chosen],
+    )
+    return compare.nees(estimate, Truth(matched.reference.world_T_body, source=reference.trajectory.source))

@@ -1,0 +1,152 @@
+"""From what was read to everything that is compared."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline import compare
+from fgbaseline.compare import Align, Matched, TimeOffset
+from fgbaseline.geometry import FloatArray, InputError
+
+from .claimed import nees_of
+from .comparison import Comparison, Result
+from .entries import Entries, Entry
+from .pixels import Pixels, pixels_of
+from .settings import Delta, Settings
+
+Computed = TypeVar("Computed")
+
+FAR, FAR_SHARE = 5.0, 0.01
+"""m, and share of the path: the smaller of both is the bound that says when an estimate has left the reference"""
+AT_MOST = 20_000_000
+"""errors that a bootstrap draws"""
+REPETITIONS = 1000
+FEWEST = 2
+"""pairs of poses, below which there is nothing to compare"""
+
+
+def compare_entries(entries: Entries, settings: Settings) -> Comparison:
+    """All comparisons. Raises InputError where an estimate has too little in common with the reference."""
+    up = _up(entries, settings)
+    kind = settings.align or (Align.NONE if entries.one_world else Align.SE3)
+    everything = [entries.reference, *entries.estimates]
+    pixels = pixels_of(entries.problem, everything, settings.offset)
+    deltas = settings.deltas or _usual(everything)
+    results = {
+        entry.name: _compared(entries.reference, entry, kind, up, deltas, settings, pixels.get(entry.name))
+        for entry in entries.estimates
+    }
+    return Comparison(
+        reference=entries.reference,
+        reference_pixels=pixels.get(entries.reference.name),
+        results=results,
+        up=up,
+        deltas=tuple(delta.text for delta in deltas),
+        settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
+        sequence=None if entries.problem is None else entries.problem.sequence.name,
+    )
+
+
+def _up(entries: Entries, settings: Settings) -> FloatArray:
+    if settings.up is not None:
+        up = np.asarray(settings.up, dtype=np.float64)
+        if not (np.isfinite(up).all() and np.linalg.norm(up) > 0):
+            raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
+        return up / np.linalg.norm(up)
+    return np.array([0.0, 0.0, 1.0]) if entries.problem is None else entries.problem.sequence.up
+
+
+def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
+    stamped = all(entry.trajectory.stamped for entry in entries)
+    return (Delta(1.0, "s") if stamped else Delta(1.0, "frames"), Delta(10.0, "m"))
+
+
+def _compared(
+    reference: Entry,
+    entry: Entry,
+    kind: Align | str,
+    up: FloatArray,
+    deltas: tuple[Delta, ...],
+    settings: Settings,
+    pixels: Pixels | None,
+) -> Result:
+    notes = {} if pixels is None else dict(pixels.notes)
+    matched, offset = _matched(reference, entry, kind, up, settings)
+    absolute = compare.absolute_errors(matched)
+    departure = compare.growing_divergence(matched, up)
+    bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
+    relative = {d.text: _relative(matched, d, settings, notes) for d in deltas}
+    tables = {delta: table for delta, table in relative.items() if table is not None}
+    seed = settings.seed
+    return Result(
+        entry=entry,
+        matched=matched,
+        offset=offset,
+        absolute=absolute,
+        departure=departure,
+        relative=tables,
+        segments=_or_note("segments", notes, lambda: compare.segment_errors(matched)),
+        nees=_or_note("nees", notes, lambda: nees_of(reference, entry, matched)),
+        drift=_or_note("drift", notes, lambda: compare.drift(matched, seed=seed)),
+        shares=compare.difference_shares(matched, up),
+        bound=bound,
+        passing=compare.first_beyond(departure, bound),
+        statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
+        relative_statistics={
+            delta: {name: spread(table[name], seed) for name in ("translation", "rotation_deg")}
+            for delta, table in tables.items()
+        },
+        pixels=pixels,
+        notes=notes,
+    )
+
+
+def spread(errors: "pd.Series[float]", seed: int) -> pd.DataFrame:
+    """`compare.error_statistics` with fewer repetitions for very long paths: a tenth of them tells an interval too."""
+    repetitions = int(np.clip(AT_MOST // max(len(errors), 1), 100, REPETITIONS))
+    return compare.error_statistics(errors, repetitions=repetitions, seed=seed)
+
+
+def _relative(matched: Matched, delta: Delta, settings: Settings, notes: dict[str, str]) -> pd.DataFrame | None:
+    return _or_note(
+        f"relative.{delta.text}",
+        notes,
+        lambda: compare.relative_errors(matched, delta.length, delta.unit, all_pairs=settings.all_pairs),
+    )
+
+
+def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -> Computed | None:
+    """What is computed, or None with a note where the path does not allow it (too short, standing, without stamps)."""
+    try:
+        return compute()
+    except InputError as error:
+        notes[key] = str(error)
+        return None
+
+
+def _matched(
+    reference: Entry, entry: Entry, kind: Align | str, up: FloatArray, settings: Settings
+) -> tuple[Matched, TimeOffset | None]:
+    there, here = reference.trajectory, entry.trajectory
+    if there.stamped != here.stamped:
+        bare = there if here.stamped else here
+        raise InputError(
+            f"{bare.source or bare.name}: it has no time stamps, but the other trajectory does; "
+            "add --times FILE, or --sequence with the recording"
+        )
+    seconds, found = settings.offset, None
+    if settings.search_offset is not None:
+        sought = Align.SE3 if Align(kind) is Align.NONE else kind
+        moved = here.later(seconds) if seconds else here
+        found = compare.time_offset(there, moved, settings.search_offset, sought)
+        seconds += found.seconds
+    matched = compare.associate(there, here, how=settings.association, tolerance=settings.tolerance, offset=seconds)
+    if len(matched) < FEWEST:
+        raise InputError(
+            f"{here.source or here.name}: only {len(matched)} of its poses has a partner in {there.name}, "
+            f"{FEWEST} are needed; give a larger --tolerance, or an --offset"
+        )
+    return matched.aligned(kind, first=settings.align_first, up=up), found

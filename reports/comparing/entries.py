@@ -1,0 +1,212 @@
+"""Everything that is compared, read and brought to one body: reference, estimates and the problem behind them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fgbaseline.compare import Trust
+from fgbaseline.data import Landmarks, Problem, Reading, Trajectory, calibrated, read, read_problem
+from fgbaseline.data.formats import read_kitti, read_landmarks, read_pose_covariances, read_times, read_trajectory
+from fgbaseline.data.formats.named_file import shown
+from fgbaseline.geometry import FloatArray, InputError, se3
+
+from .. import job
+from .run_folder import RunFolder, read_run_folder
+from .settings import Body, Settings
+
+Given = str | Path | Trajectory
+"""[NAME=]FILE, or a trajectory that is at hand"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entry:
+    """A trajectory, and what came with it."""
+
+    trajectory: Trajectory
+    landmarks: Landmarks | None = None
+    """in the trajectory's own world"""
+    covariance: FloatArray | None = None
+    """(n, 6, 6) of the right perturbation of each pose"""
+    trust: Trust | None = None
+    """in a run's reference; a file says nothing of it"""
+
+    @property
+    def name(self) -> str:
+        """What tables and figures call it."""
+        return self.trajectory.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entries:
+    """What is compared."""
+
+    reference: Entry
+    estimates: tuple[Entry, ...]
+    problem: Problem | None
+    """whose observations the reprojection is of"""
+    one_world: bool
+    """whether reference and estimates are taken to be in the same world: that of a run"""
+
+
+def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
+    """Reads all of it. Raises InputError, naming the file, for whatever is wrong."""
+    run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
+    problem = None if settings.sequence is None else _problem(settings.sequence, run)
+    times = _times(settings, problem)
+    imu_T_cam = _extrinsic(settings, problem)
+    if run is None:
+        first = _entry(reference, settings, times, settings.reference_body, imu_T_cam)
+        beside: list[Entry] = []
+    else:
+        first = Entry(run.trajectory(run.reference), run.landmarks(run.reference), None, run.trust)
+        beside = [Entry(run.trajectory(name), run.landmarks(name)) for name in _beside(run, settings.beside)]
+    own = [_entry(given, settings, times, settings.estimate_body, imu_T_cam) for given in estimates]
+    entries = _named_apart([first, *beside, *own])
+    entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)
+    if len(entries) == 1:
+        raise InputError("estimate: there is nothing to compare; name at least one trajectory besides the reference")
+    return Entries(entries[0], tuple(entries[1:]), problem, run is not None)
+
+
+def _is_folder(given: Given) -> bool:
+    return isinstance(given, str | Path) and Path(given).is_dir()
+
+
+def _entry(
+    given: Given, settings: Settings, times: FloatArray | None, body: Body, imu_T_cam: FloatArray | None
+) -> Entry:
+    if isinstance(given, Trajectory):
+        path, covariance = given, None
+    else:
+        name, file = _split(str(given))
+        path = read_trajectory(file, settings.form, times, name)
+        covariance = read_pose_covariances(file)
+    if body == "imu":
+        return Entry(path, None, covariance)
+    if imu_T_cam is None:
+        raise InputError(f"{path.source or path.name}: its poses are the camera's; add --sequence or --extrinsic FILE")
+    return Entry(path.with_poses(path.world_T_body @ se3.inverse(imu_T_cam)))
+
+
+def _split(given: str) -> tuple[str | None, str]:
+    """Name and file of `NAME=FILE`; a file of that very name comes first."""
+    name, mark, file = given.partition("=")
+    if not mark or Path(given).exists() or "/" in name:
+        return None, given
+    if not name or not file:
+        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
+    return name, file
+
+
+def _problem(sequence: Path, run: RunFolder | None) -> Problem:
+    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated."""
+    if sequence.is_dir():
+        return read_problem(sequence)
+    recorded = read(sequence)
+    if run is None:
+        return calibrated(recorded)
+    settings = _of_run(sequence, run)
+    return job.pose_problem(job.split(recorded, settings)[0], settings)
+
+
+def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
+    """What decides the problem of a run, from its summary. Raises InputError where that is not the one of ours."""
+    known = run.settings
+    try:
+        return job.RunSettings(
+            sequence=sequence,
+            preset=known["preset"],
+            features="all" if known["features"] == "all" else int(known["features"]),
+            landmarks=Reading(known["landmarks"]),
+            as_recorded=bool(known["as_recorded"]),
+            held_out=float(known["held_out"]),
+            seed=int(known["seed"]),
+            repairs=None if known["repairs"] is None else Path(known["repairs"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{run.folder}: its summary does not say how its problem was posed ({type(error).__name__}: {error}); "
+            "give --sequence the folder of fgbaseline export"
+        ) from error
+
+
+def _times(settings: Settings, problem: Problem | None) -> FloatArray | None:
+    if settings.times is not None:
+        return read_times(settings.times)
+    return None if problem is None else problem.sequence.t
+
+
+def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:
+    if settings.extrinsic is None:
+        return None if problem is None else problem.sequence.imu_T_cam
+    poses = read_kitti(settings.extrinsic)
+    if len(poses) != 1:
+        raise InputError(f"{settings.extrinsic}: expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
+    return np.asarray(poses[0], dtype=np.float64)
+
+
+def _beside(run: RunFolder, wanted: str) -> list[str]:
+    others = [name for name in run.names if name != run.reference]
+    if wanted in ("all", "none"):
+        return others if wanted == "all" else []
+    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    for name in names:
+        if name not in others:
+            raise InputError(f"beside: the run has no '{name}' besides its reference; it has {', '.join(others)}")
+    return names
+
+
+def _named_apart(entries: list[Entry]) -> list[Entry]:
+    """The same with names that differ: of files of one name, their folder's before it; then a number behind it."""
+    given = [entry.name for entry in entries]
+    names = list(given)
+    for i, entry in enumerate(entries):
+        if given.count(entry.name) > 1 and Path(entry.trajectory.source).parent.name:
+            names[i] = f"{Path(entry.trajectory.source).parent.name}-{entry.name}"
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
+        taken.add(names[i])
+    return [
+        replace(e, trajectory=replace(e.trajectory, name=_file_name(n))) for e, n in zip(entries, names, strict=True)
+    ]
+
+
+def _file_name(name: str) -> str:
+    """The name, if a file can have it. Raises InputError."""
+    if "/" in name or "\\" in name or name.startswith(".") or not name:
+        raise InputError(f"{name!r} can be no file's name; name the trajectory otherwise: NAME=FILE")
+    return name
+
+
+def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], problem: Problem | None) -> list[Entry]:
+    """The entries with the landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
+    if files and problem is None:
+        raise InputError("landmarks: they are compared by the observations of a recording; add --sequence")
+    found: dict[str, Landmarks] = {}
+    for given in files:
+        name, file = _split(given)
+        if name is None:
+            if len(own) != 1:
+                raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; say which: NAME=FILE")
+            name = own[0]
+        if name not in own:
+            raise InputError(f"landmarks: there is no estimate '{name}'; there are {', '.join(own)}")
+        found[name] = read_landmarks(file)
+    merged = [replace(e, landmarks=found.get(e.name, e.landmarks)) for e in entries]
+    for entry in merged:
+        _require_known(entry, problem)
+    return merged
+
+
+def _require_known(entry: Entry, problem: Problem | None) -> None:
+    if problem is None or entry.landmarks is None or not len(entry.landmarks):
+        return
+    last, n = int(entry.landmarks.index[-1]), problem.sequence.n_landmarks
+    if last >= n:
+        raise InputError(
+            f"{entry.name}: its landmark {last} is not one of the sequence's {n}; a run numbers the pieces of split "
+            "tracks beyond the recording's, so give --sequence the folder of fgbaseline export that belongs to it"
+        )

@@ -1,0 +1,47 @@
+"""The page of a comparison: one file that opens offline."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.resources import files
+from itertools import groupby
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from ..figures.palette import colours_of
+from ..page.embedding import picture
+from ..page.rendering import environment
+from .comparison import Comparison
+from .summary import summarise
+from .tables import text_table
+
+CAPTIONS: Mapping[str, str] = {
+    "paths": "Aligned as said above, seen along the direction that points up.",
+    "errors": "Of each pair of poses, along the reference's direction of travel, to its left and up.",
+    "growth": "The same over the length of the path, with the heading: seen from above, to the left positive.",
+    "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. No alignment and no early "
+    "mistake can hide in these.",
+    "segments": "Mean over all segments of a length, per metre.",
+    "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
+    "with it.",
+}
+
+
+def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
+    """`report.html`. All text that comes from files is escaped."""
+    names, lines = text_table(comparison)
+    trust = comparison.reference.trust
+    return (
+        environment()
+        .get_template("compare.html")
+        .render(
+            css=Markup(files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")),
+            comparison=comparison,
+            summary=summarise(comparison).model_dump(mode="json", by_alias=True),
+            trust=None if trust is None else trust.verdict.name.lower(),
+            names=names,
+            groups=[(group, list(same)) for group, same in groupby(lines, key=lambda line: line.group)],
+            colours=colours_of([comparison.reference.name, *comparison.results], comparison.reference.name),
+            pictures=[replace(picture(n, f), caption=CAPTIONS.get(n, "")) for n, f in figures.items()],
+        )
+    )

@@ -1,0 +1,93 @@
+"""What estimates from anywhere say the pixels of a problem should have been."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline import compare
+from fgbaseline.data import Estimate, Excluded, Landmarks, Problem, Trajectory
+from fgbaseline.data.formats.ground_truth import match_stamps
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.geometry import FloatArray
+
+from .entries import Entry
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pixels:
+    """Reprojection of one trajectory. For the columns see `compare.reprojection`; `used` is: is in the problem."""
+
+    own: pd.DataFrame | None
+    """with the landmarks that came with it; None without"""
+    common: pd.DataFrame | None
+    """the same over the observations that all have which came with landmarks"""
+    along: pd.DataFrame | None
+    """with landmarks triangulated along the trajectory, the same way for all; None where no frame has a pose"""
+    frames: int
+    """of the recording that have a pose"""
+    notes: dict[str, str]
+    """why something is missing"""
+
+
+def pixels_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -> dict[str, Pixels]:
+    """By name; nothing without a problem. Each trajectory in its own world: no alignment comes into it.
+
+    Poses belong to the frames of the recording by their stamps, nearest in time within half an interval; `offset` (s)
+    is added to those of all but the first entry, the reference.
+    """
+    if problem is None:
+        return {}
+    estimates = {}
+    for i, entry in enumerate(entries):
+        moved = entry.trajectory.later(offset) if offset and i else entry.trajectory
+        poses = poses_of_frames(problem, moved)
+        estimates[entry.name] = _estimate(problem, entry.name, poses, entry.landmarks)
+    own = {name: compare.reprojection(problem.sequence, e) for name, e in estimates.items() if len(e.landmarks)}
+    common = _common(problem, own)
+    return {name: _pixels(problem, estimate, own.get(name), common) for name, estimate in estimates.items()}
+
+
+def poses_of_frames(problem: Problem, trajectory: Trajectory) -> FloatArray:
+    """(T, 4, 4) the pose of each frame of the problem's sequence, NaN where the trajectory has none."""
+    poses = np.full((problem.n_frames, 4, 4), np.nan)
+    frames, chosen = match_stamps(problem.sequence.t, trajectory.t)
+    poses[frames] = trajectory.world_T_body[chosen]
+    return poses
+
+
+def _estimate(problem: Problem, name: str, poses: FloatArray, landmarks: Landmarks | None) -> Estimate:
+    return Estimate(name, poses, problem.mask, landmarks=Landmarks.none() if landmarks is None else landmarks)
+
+
+def _common(problem: Problem, own: dict[str, pd.DataFrame]) -> BoolArray:
+    """(n,) the problem's observations that every one of the tables has."""
+    common = problem.mask
+    for table in own.values():
+        has = np.zeros(len(common), dtype=np.bool_)
+        has[table["observation"]] = True
+        common &= has
+    return common
+
+
+def _pixels(problem: Problem, estimate: Estimate, own: pd.DataFrame | None, common: BoolArray) -> Pixels:
+    known = np.isfinite(estimate.world_T_imu[:, 0, 0])
+    notes = {}
+    if own is None:
+        notes["reprojection"] = "no landmarks came with it"
+    if not known.any():
+        notes["reprojection_along"] = "no frame of the recording has a pose: its time stamps are others"
+        return Pixels(own, None, None, 0, notes)
+    o = problem.sequence.observations
+    here = replace(problem, excluded=np.where(known[o.frame], problem.excluded, np.uint8(Excluded.GEOMETRY)))
+    along = replace(estimate, used=here.mask, landmarks=landmarks_along(here, estimate.world_T_imu))
+    table = compare.reprojection(problem.sequence, along)
+    return Pixels(
+        own=own,
+        common=None if own is None else own[common[own["observation"]]],
+        along=table[table["used"]],
+        frames=int(known.sum()),
+        notes=notes,
+    )

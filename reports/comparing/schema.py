@@ -1,0 +1,203 @@
+"""The shape of `comparison.json`. `make schema` writes it, with these descriptions, to docs/comparison.schema.json."""
+
+import json
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..schema import Reprojection
+
+SCHEMA: Final = "fgbaseline/comparison/1"
+"""raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
+
+
+Number = float | None
+"""null for what is not a number"""
+
+
+class Part(BaseModel):
+    """An object of the file; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Statistic(Part):
+    """A figure with its 95 % confidence interval, of a block bootstrap that respects correlation in time."""
+
+    value: Number
+    low: Number
+    high: Number
+
+
+class Statistics(Part):
+    """Of errors that follow each other in time."""
+
+    rmse: Statistic
+    mean: Statistic
+    median: Statistic
+    std: Statistic
+    p95: Statistic
+    min: Number
+    max: Number
+    sse: Annotated[Number, Field(description="sum of squares")]
+    n: int
+    block: Annotated[int, Field(description="errors in a row that the bootstrap keeps together")]
+    reliable: Annotated[bool, Field(description="whether so many blocks fit that the intervals mean something")]
+
+
+class Pairing(Part):
+    """Which poses were compared."""
+
+    pairs: int
+    association: Literal["nearest", "interpolated"]
+    tolerance_s: float
+    offset_s: Annotated[float, Field(description="added to the estimate's stamps")]
+    offset_range_s: Annotated[
+        tuple[float, float] | None, Field(description="where it was searched for: offsets that fit nearly as well")
+    ]
+    offset_determined: Annotated[bool | None, Field(description="null where it was not searched for")]
+    left_out_reference: int
+    left_out_estimate: int
+
+
+class AlignmentSummary(Part):
+    """p -> scale * rotation @ p + translation, applied to the estimate."""
+
+    kind: Literal["none", "first-pose", "yaw", "se3", "sim3"]
+    rotation: list[list[float]]
+    translation: list[float]
+    scale: float
+    poses: Annotated[int, Field(description="pairs that decided it")]
+    free: Annotated[list[str], Field(description="what the positions of the paths left open")]
+
+
+class Relative(Part):
+    """Errors of the motions between poses a delta apart."""
+
+    translation: Annotated[Statistics, Field(description="m")]
+    rotation_deg: Statistics
+
+
+class SegmentsOfLength(Part):
+    """Segments of one length."""
+
+    length: float
+    translation_percent: float
+    rotation_deg_per_m: float
+    n: int
+
+
+class Segments(Part):
+    """KITTI's segment errors."""
+
+    translation_percent: Number
+    rotation_deg_per_m: Number
+    official: Annotated[bool, Field(description="KITTI's own lengths and step: comparable with published figures")]
+    by_length: list[SegmentsOfLength]
+
+
+class Rate(Part):
+    """A drift."""
+
+    value: Number
+    low: Number
+    high: Number
+    unit: str
+    over: str
+    n: int
+
+
+class Consistency(Part):
+    """Normalised estimation error squared of the poses; 6 is expected."""
+
+    mean: Number
+    median: Number
+    frames: int
+
+
+class Shares(Part):
+    """What the position difference is made of: shares of its sum of squares, which add to one."""
+
+    scale: Number
+    heading: Number
+    noise: Number
+    scale_percent: Number
+    heading_deg: Number
+    heading_deg_per_s: Annotated[Number, Field(description="per pose without stamps")]
+
+
+class Passing(Part):
+    """When the position difference is first beyond a bound."""
+
+    bound_m: float
+    t: Number
+    travelled_m: Number
+
+
+class EstimateSummary(Part):
+    """One estimate."""
+
+    source: str
+    poses: int
+    caption: Annotated[str, Field(description="what was paired and how it was aligned, in words")]
+    pairing: Pairing
+    alignment: AlignmentSummary
+    translation: Annotated[Statistics, Field(description="m; its RMSE is the absolute trajectory error")]
+    rotation_deg: Statistics
+    pose: Annotated[Statistics, Field(description="Frobenius norm of E - I, no unit")]
+    relative: dict[str, Relative]
+    segments: Segments | None
+    drift: dict[str, Rate] | None
+    nees: Annotated[
+        Consistency | None, Field(description="of its own covariances, against a reference taken for the truth")
+    ]
+    shares: Shares
+    final_m: Number
+    passing: Passing
+    reprojection: Annotated[Reprojection | None, Field(description="over all observations of the landmarks it gave")]
+    reprojection_common: Annotated[
+        Reprojection | None, Field(description="the same over those of the problem that all gave a landmark for")
+    ]
+    reprojection_along: Annotated[
+        Reprojection | None, Field(description="with landmarks triangulated along its path, the same way for all")
+    ]
+    notes: Annotated[dict[str, str], Field(description="why something is null or missing, by key")]
+
+
+class ReferenceSummary(Part):
+    """What everything is compared with."""
+
+    name: str
+    source: str
+    poses: int
+    duration_s: Number
+    path_m: float
+    trust: Annotated[
+        Literal["trusted", "doubtful", "untrusted"] | None, Field(description="of a run's reference; null for files")
+    ]
+    reasons: list[str]
+    reprojection: Reprojection | None
+    reprojection_common: Reprojection | None
+    reprojection_along: Reprojection | None
+
+
+class Summary(Part):
+    """A comparison."""
+
+    schema_: Annotated[Literal["fgbaseline/comparison/1"], Field(alias="schema")] = SCHEMA
+    caption: str
+    reference: ReferenceSummary
+    estimates: dict[str, EstimateSummary]
+    sequence: Annotated[str | None, Field(description="the recording that the reprojection is of")]
+    settings: dict[str, str | int | float | bool | None]
+    versions: dict[str, str]
+
+
+def json_schema() -> str:
+    """The JSON schema of `comparison.json`, as text."""
+    schema = Summary.model_json_schema(by_alias=True, mode="serialization")
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
+
+
+if __name__ == "__main__":
+    print(json_schema())

@@ -1,0 +1,106 @@
+"""What a user asks of a comparison. Nothing heavy is imported: bad options are told at once."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from fgbaseline.geometry import InputError
+
+MARK = "comparison.json"
+"""the file by which a comparison's folder is known"""
+
+Body = Literal["imu", "camera"]
+
+
+@dataclass(frozen=True, slots=True)
+class Delta:
+    """How far apart two poses are whose relative motion is compared."""
+
+    length: float
+    unit: str
+    """s, m, deg or frames"""
+
+    @staticmethod
+    def parse(text: str) -> "Delta":
+        """Of a text such as `1s`, `10m`, `30deg` or `5frames`; raises InputError."""
+        found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|m|deg|frames)\s*", text)
+        try:
+            length = float(found[1]) if found else 0.0
+        except ValueError:
+            length = 0.0
+        if found is None or not 0.0 < length < float("inf"):
+            raise InputError(
+                f"delta: expected a length above 0 with its unit, such as 1s, 10m, 30deg or 5frames, got {text!r}"
+            )
+        if found[2] == "deg" and length > 180:
+            raise InputError(f"delta: no two orientations are {text.strip()} apart; give one of at most 180deg")
+        if found[2] == "frames" and not length.is_integer():
+            raise InputError(f"delta: expected a whole number of frames, got {text!r}")
+        return Delta(length, found[2])
+
+    @property
+    def text(self) -> str:
+        """As a table's heading has it."""
+        return f"{self.length:g} {self.unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything but the trajectories."""
+
+    align: str | None = None
+    """none, first-pose, yaw, se3 or sim3; None for `none` from a run's reference (the worlds are one), else `se3`"""
+    align_first: int | None = None
+    """over so many pairs of poses; None for all"""
+    up: tuple[float, float, float] | None = None
+    """what points up in the reference's world; None for that of `sequence`, else +z"""
+    association: str = "nearest"
+    tolerance: float | None = None
+    """s; None for the association's own"""
+    offset: float = 0.0
+    """s, added to the stamps of the estimates"""
+    search_offset: float | None = None
+    """s; within it the offset of each estimate is searched for, on top of `offset`"""
+    deltas: tuple[Delta, ...] = ()
+    """of relative errors; empty for 1 s (where there are stamps; else 1 frame) and 10 m"""
+    all_pairs: bool = False
+    form: Literal["tum", "kitti", "euroc", "npz"] | None = None
+    times: Path | None = None
+    """stamps for KITTI files"""
+    sequence: Path | None = None
+    """a recording, or the folder of an exported problem"""
+    extrinsic: Path | None = None
+    """imu_T_cam: a KITTI file of one line; None for that of `sequence`"""
+    reference_body: Body = "imu"
+    estimate_body: Body = "imu"
+    beside: str = "all"
+    """which estimators of a run that is the reference are compared too: names with commas, `all` or `none`"""
+    seed: int = 0
+    """of the bootstrap"""
+
+    def record(self) -> dict[str, str | int | float | bool | None]:
+        """The settings as `comparison.json` has them."""
+        return {
+            "align": self.align,
+            "align_first": self.align_first,
+            "up": None if self.up is None else ",".join(f"{x:g}" for x in self.up),
+            "association": self.association,
+            "tolerance": self.tolerance,
+            "offset": self.offset,
+            "search_offset": self.search_offset,
+            "deltas": ",".join(f"{delta.length:g}{delta.unit}" for delta in self.deltas),
+            "all_pairs": self.all_pairs,
+            "format": self.form,
+            "times": _text(self.times),
+            "sequence": _text(self.sequence),
+            "extrinsic": _text(self.extrinsic),
+            "reference_body": self.reference_body,
+            "estimate_body": self.estimate_body,
+            "beside": self.beside,
+            "seed": self.seed,
+        }
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

@@ -1,0 +1,144 @@
+"""All figures of a comparison, as `comparison.json` and `metrics.csv` hold them."""
+
+import math
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline import compare
+from fgbaseline.compare import SegmentErrors
+from fgbaseline.compare.travel import distance_travelled
+from fgbaseline.geometry import FloatArray
+
+from .comparison import Comparison, Result
+from .entries import Entry
+from .pixels import Pixels
+from .schema import Summary
+
+LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
+WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
+
+
+def summarise(comparison: Comparison) -> Summary:
+    """The summary; what is not a number is None, and where a part is missing `notes` says why."""
+    return Summary.model_validate(
+        _finite(
+            {
+                "caption": comparison.caption,
+                "reference": _reference(comparison.reference, comparison.reference_pixels),
+                "estimates": {name: _estimate(result) for name, result in comparison.results.items()},
+                "sequence": comparison.sequence,
+                "settings": comparison.settings.record(),
+                "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+            }
+        )
+    )
+
+
+def _reference(entry: Entry, pixels: Pixels | None) -> dict[str, Any]:
+    path, trust = entry.trajectory, entry.trust
+    return {
+        "name": path.name,
+        "source": path.source,
+        "poses": len(path),
+        "duration_s": float(path.t[-1] - path.t[0]) if path.stamped else None,
+        "path_m": float(distance_travelled(path.position)[-1]),
+        "trust": None if trust is None else trust.verdict.name.lower(),
+        "reasons": [] if trust is None else list(trust.reasons),
+        **_pixels(pixels),
+    }
+
+
+def _estimate(result: Result) -> dict[str, Any]:
+    matched, motion = result.matched, result.matched.alignment
+    return {
+        "source": result.entry.trajectory.source,
+        "poses": len(result.entry.trajectory),
+        "caption": matched.caption,
+        "pairing": {
+            "pairs": len(matched),
+            "association": str(matched.association),
+            "tolerance_s": matched.tolerance,
+            "offset_s": matched.offset,
+            "offset_range_s": None if result.offset is None else (result.offset.low, result.offset.high),
+            "offset_determined": None if result.offset is None else result.offset.determined,
+            "left_out_reference": matched.left_out_reference,
+            "left_out_estimate": matched.left_out_estimate,
+        },
+        "alignment": {
+            "kind": str(motion.kind),
+            "rotation": motion.rotation.tolist(),
+            "translation": motion.translation.tolist(),
+            "scale": float(motion.scale),
+            "poses": motion.n,
+            "free": list(motion.free),
+        },
+        **{name: _statistics(table) for name, table in result.statistics.items()},
+        "relative": {
+            delta: {name: _statistics(table) for name, table in tables.items()}
+            for delta, tables in result.relative_statistics.items()
+        },
+        "segments": None if result.segments is None else _segments(result.segments),
+        "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
+        "nees": None if result.nees is None else _nees(result.nees),
+        "shares": {
+            name: getattr(result.shares, name)
+            for name in ("scale", "heading", "noise", "scale_percent", "heading_deg", "heading_deg_per_s")
+        },
+        "final_m": float(result.departure["position"].iloc[-1]),
+        "passing": {
+            "bound_m": result.bound,
+            "t": None if result.passing is None else result.passing.t,
+            "travelled_m": None if result.passing is None else result.passing.travelled,
+        },
+        **_pixels(result.pixels),
+        "notes": result.notes,
+    }
+
+
+def _statistics(table: pd.DataFrame) -> dict[str, Any]:
+    values = table["value"]
+    return {
+        **{name: table.loc[name, ["value", "low", "high"]].to_dict() for name in WITH_INTERVAL},
+        **{name: float(values[name]) for name in ("min", "max", "sse")},
+        "n": int(values["n"]),
+        "block": int(table.attrs["block"]),
+        "reliable": bool(table.attrs["reliable"]),
+    }
+
+
+def _segments(segments: SegmentErrors) -> dict[str, Any]:
+    return {
+        "translation_percent": segments.translation_percent,
+        "rotation_deg_per_m": segments.rotation_deg_per_m,
+        "official": segments.official,
+        "by_length": segments.by_length.reset_index().to_dict(orient="records"),
+    }
+
+
+def _nees(values: FloatArray) -> dict[str, float | int]:
+    known = values[np.isfinite(values)]
+    mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
+    return {"mean": mean, "median": median, "frames": len(known)}
+
+
+def _pixels(pixels: Pixels | None) -> dict[str, Any]:
+    tables = {} if pixels is None else {"": pixels.own, "_common": pixels.common, "_along": pixels.along}
+    return {f"reprojection{kind}": _reprojection(tables.get(kind)) for kind in ("", "_common", "_along")}
+
+
+def _reprojection(table: pd.DataFrame | None) -> dict[str, Any] | None:
+    return None if table is None else compare.reprojection_summary(table)
+
+
+def _finite(value: Any) -> Any:
+    """The same tree with None for every float that is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
