@@ -85,9 +85,16 @@ def associate(
 
     `offset` (s) is added to the estimate's stamps. `tolerance` (s) is the largest difference to the nearest stamp:
     by default TOLERANCE for `nearest`, the median interval of the interpolated trajectory for `interpolated`. Of two
-    equally dense trajectories the reference is interpolated. Raises InputError where no pose has a partner.
+    equally dense trajectories the reference is interpolated. Raises InputError where no pose has a partner, or one
+    trajectory has time stamps and the other only frame numbers.
     """
     how = Association(how)
+    if reference.stamped != estimate.stamped:
+        bare, timed = (estimate, reference) if reference.stamped else (reference, estimate)
+        raise InputError(
+            f"{bare.source or bare.name}: it has no time stamps, but {timed.source or timed.name} has; "
+            "give it the times of its frames"
+        )
     moved = estimate.later(offset) if offset else estimate
     if how is Association.INTERPOLATED:
         return _interpolated(reference, moved, tolerance, offset)

@@ -40,15 +40,19 @@ def time_offset(
 
     The trajectory with the denser stamps is interpolated at those of the other (at most MOST_POSES of them, evenly
     chosen) that overlap at every offset searched, so that all offsets are judged by the same poses. Raises InputError
-    where fewer than three do, or there are no stamps.
+    where fewer than three do, there are no stamps, or nothing to search.
     """
     for path in (reference, estimate):
         if not path.stamped:
             raise InputError(f"{path.source or path.name}: it has no time stamps, so no offset in time can be found")
+        if len(path) < 2:
+            raise InputError(f"{path.source or path.name}: it has one pose only, so no offset in time can be found")
+    if not within > 0:
+        raise InputError(f"the search for an offset in time needs a width above 0 s, got {within!r}")
     reference_is_coarse = np.median(np.diff(reference.t)) > np.median(np.diff(estimate.t))
     coarse, dense = (reference, estimate) if reference_is_coarse else (estimate, reference)
     both = np.flatnonzero((coarse.t - within >= dense.t[0]) & (coarse.t + within <= dense.t[-1]))
-    if len(both) < 3 or not within > 0:
+    if len(both) < 3:
         raise InputError(
             f"an offset within {within:g} s cannot be searched for: {len(both)} poses of {coarse.name} overlap with "
             f"{dense.name} at each of them, 3 are needed; give a width that is smaller than their overlap"

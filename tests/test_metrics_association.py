@@ -1,5 +1,7 @@
 """Poses are paired by time: each once, none across another, and what is left over is counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from evo.core import sync
@@ -160,3 +162,18 @@ def test_an_offset_that_the_path_does_not_tell_is_said_to_be_open() -> None:
     assert not compare.time_offset(path(t), path(t).later(-0.6), 0.5).determined
     with pytest.raises(InputError, match="give a width that is smaller than their overlap"):
         compare.time_offset(path(t), path(t), 20.0)
+    with pytest.raises(InputError, match="needs a width above 0 s, got 0"):
+        compare.time_offset(path(t), path(t), 0.0)
+    with pytest.raises(InputError, match="it has one pose only"):
+        compare.time_offset(path(t), path([1.0]), 1.0)
+    with pytest.raises(InputError, match="it has no time stamps, so no offset"):
+        compare.time_offset(path(t), replace(path(t), stamped=False), 1.0)
+
+
+def test_frame_numbers_are_not_taken_for_seconds() -> None:
+    t = np.arange(5.0)
+    bare = replace(path(t, "bare"), stamped=False)
+    assert len(compare.associate(bare, replace(path(t), stamped=False))) == 5
+    for pair in ((bare, path(t)), (path(t), bare)):
+        with pytest.raises(InputError, match=r"bare.tum: it has no time stamps, but path.tum has; give it the times"):
+            compare.associate(*pair)
