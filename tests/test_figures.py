@@ -59,6 +59,12 @@ def test_every_figure_of_a_full_run_is_there_in_the_order_of_the_page() -> None:
         "reprojection_distribution",
         "nees",
         "time_per_frame",
+        "consistency",
+        "reprojection_classes",
+        "map_difference",
+        "three_sigma_dead-reckoning",
+        "three_sigma_ekf",
+        "three_sigma_isam2",
     ]
 
 

@@ -91,7 +91,7 @@ def test_the_page_is_well_formed_named_and_described() -> None:
     ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]
     assert len(set(ids)) == len(ids)
     images = [attributes for tag, attributes in elements.tags if tag == "img"]
-    assert len(images) == 12
+    assert len(images) == 18
     assert all(len(image["alt"]) > 10 for image in images)
     links = [attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"]
     assert set(links) <= set(ids)

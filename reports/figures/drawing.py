@@ -8,6 +8,9 @@ from matplotlib.transforms import Bbox
 
 from fgbaseline.reports.comparison import Run
 
+from .beyond import held_out, map_difference
+from .classes import reprojection_classes
+from .consistency import consistency, three_sigma
 from .errors import divergence, error_to_truth, height
 from .health import nees, time_per_frame
 from .paths import path_with_landmarks, paths_overlaid, paths_side_by_side
@@ -22,6 +25,10 @@ OVER_TIME: tuple[Callable[[Run], Figure | None], ...] = (
     reprojection_distribution,
     nees,
     time_per_frame,
+    held_out,
+    consistency,
+    reprojection_classes,
+    map_difference,
 )
 """each answers None where the run has nothing for it to show"""
 
@@ -30,7 +37,8 @@ def draw(run: Run) -> dict[str, Figure]:
     """The figures of a run by name, as `DIR/figures` and the page have them; none where no estimator answered.
 
     `paths_overlaid`, `paths_side_by_side`, `path_NAME` for each estimator that answered, then those over time that
-    have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations.
+    have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations. Last the
+    `three_sigma_NAME` of each that has covariances, where there is truth.
     """
     if not run.answered:
         return {}
@@ -41,6 +49,8 @@ def draw(run: Run) -> dict[str, Figure]:
             figure = draw_one(run)
             if figure is not None:
                 figures[draw_one.__name__] = figure
+        bands = {f"three_sigma_{result.name}": three_sigma(run, result) for result in run.answered}
+        figures |= {name: figure for name, figure in bands.items() if figure is not None}
         for figure in figures.values():
             lay_out(figure)
     return figures

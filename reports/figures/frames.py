@@ -51,6 +51,13 @@ def fit_log(axes: Axes, series: Mapping[str, FloatArray], decades: float = 6.0) 
     axes.set_ylim(max(float(low) / 1.5, top * 10.0**-decades), top)
 
 
+def log_where_positive(axes: Axes) -> None:
+    """A logarithmic ordinate, unless no line of the panel has anything positive to show on it."""
+    values = [np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.get_lines()]
+    if any((v[np.isfinite(v)] > 0.0).any() for v in values):
+        axes.set_yscale("log")
+
+
 def fit_signed(run: Run, axes: Axes, series: Mapping[str, FloatArray], reach: float) -> None:
     """A linear ordinate out to `reach` on either side, with a note of who leaves it and when."""
     values = np.concatenate([v[np.isfinite(v)] for v in series.values()] or [np.empty(0)])

@@ -26,6 +26,14 @@ CAPTIONS: Mapping[str, str] = {
     "those it used. Farther left is better.",
     "nees": "Inside the band a covariance tells the truth about the error; above it the estimator claims to know more "
     "than it does.",
+    "held_out": "Each half of a track predicted from its other half, along each path. Intervals that overlap may still "
+    "be told apart: the table has the difference from the best.",
+    "consistency": "The band of the NEES and of the NIS holds 95 % of the single frames of a consistent filter; frames "
+    "of the NEES are correlated. A filter's sigmas should be above the reference's.",
+    "reprojection_classes": "Flat lines say that errors do not depend on where a point is or how long it was followed. "
+    "Tracks below the dots have smaller errors than the noise assumed, above them larger ones.",
+    "map_difference": "Landmarks matched by number. In the world the paths' drift is part of the distance, as seen by "
+    "the cameras it is not.",
     "time_per_frame": "Below the dotted line an estimator keeps up with the camera.",
 }
 

@@ -14,6 +14,7 @@ from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
 
 from .embedding import picture
+from .evidence import EVIDENCE, evidence_table, folded_tables
 from .numbers import number, per_cent
 from .table import main_table
 from .verdict import verdict
@@ -53,6 +54,10 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
             table=main_table(run, summary.get("estimators", {})),
             pictures=pictures,
             paths=[p for name, p in pictures.items() if name.startswith("path_")],
+            over_time=[p for name, p in pictures.items() if not name.startswith(("path", *EVIDENCE))],
+            evidence=evidence_table(run, summary.get("estimators", {})),
+            folded=folded_tables(run),
+            bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
             colours=colours(run),
             components=_components(summary),
             excluded=_excluded(summary),

@@ -1,6 +1,6 @@
 """The table on top of the page: a row for each estimator, a column for each main figure."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite
@@ -94,9 +94,14 @@ def main_table(run: Run, estimators: Mapping[str, Mapping[str, Any]]) -> Table:
 
     What belongs to the reference's own run is near to it by nature and is not called best.
     """
+    return table_of(run, estimators, COLUMNS)
+
+
+def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequence[Column]) -> Table:
+    """A table of some columns, as `main_table`."""
     answered = [name for name in run.results if name in estimators and run.results[name].answered]
-    values = {c: {name: _value(estimators[name], c) for name in answered} for c in COLUMNS}
-    columns = [c for c in COLUMNS if any(value is not None for value in values[c].values())]
+    values = {c: {name: _value(estimators[name], c) for name in answered} for c in chosen}
+    columns = [c for c in chosen if any(value is not None for value in values[c].values())]
     columns = [c for c in columns if c.group != REFERENCE or len(answered) > 1]
     opens = {c: i > 0 and columns[i - 1].group != c.group for i, c in enumerate(columns)}
     best = {c: _best(run, c, values[c]) for c in columns}

@@ -11,6 +11,7 @@ from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
 from .departure import AROUND, departure, far, path_length, wrong_share
+from .evidence_verdict import covariance_sentences, held_out_sentences
 from .numbers import listed, number, per_cent
 
 
@@ -23,6 +24,8 @@ def verdict(run: Run) -> list[str]:
         _departures,
         _ends,
         _consistency,
+        covariance_sentences,
+        held_out_sentences,
         _common_observations,
         _mask,
         _noise,
