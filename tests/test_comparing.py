@@ -142,7 +142,7 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
         files / "truth.tum",
         f"same={files / 'truth.tum'}",
         files / "far.npz",
-        sequence=files / "problem",
+        sequence=str(files / "problem"),
         landmarks=[f"same={files / 'landmarks.csv'}"],
     )
     row, far = result.table.loc["same"], result.table.loc["far"]

@@ -14,6 +14,9 @@ from .entries import Given, read_entries
 from .settings import Delta, Settings
 
 
+FILES = ("times", "sequence", "extrinsic")
+
+
 def compare(
     reference: Given,
     *estimates: Given,
@@ -32,6 +35,7 @@ def compare(
 
     Raises InputError, in one sentence, for whatever is wrong with a file or an option.
     """
+    options |= {name: Path(options[name]) for name in FILES if options.get(name) is not None}
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
     given = [item if isinstance(item, Trajectory) else str(item) for item in (reference, *estimates)]
     with np.errstate(all="ignore"):
