@@ -13,7 +13,6 @@ from .computing import compare_entries
 from .entries import Given, read_entries
 from .settings import Delta, Settings
 
-
 FILES = ("times", "sequence", "extrinsic")
 
 
