@@ -38,4 +38,5 @@ def told(problem: Problem) -> list[str]:
         f"{sigma:.3g} px, {kernel}, "
         + ("no prior on landmarks" if problem.landmark_prior is None else "a prior on every landmark"),
         *problem.remarks,
+        *problem.repairs,
     ]

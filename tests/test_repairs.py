@@ -205,3 +205,6 @@ def test_from_the_diagnosis_to_a_file_to_a_run(tmp_path: Path) -> None:
     assert "set by hand: velocity_scale = 1.5" in summary["problem"]["repairs"]
     codes = [finding["code"] for finding in summary["problem"]["findings"]]
     assert codes == ["angular_axes", "gyro_bias", "time_offset"]
+    page = (tmp_path / "out/report.html").read_text()
+    assert "Set by hand: velocity_scale = 1.5." in page
+    assert "w_y and w_z are recorded with the opposite sign" in page

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from math import isfinite
 
 DASH = "–"
+NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def number(value: object) -> str:
@@ -27,6 +28,15 @@ def number(value: object) -> str:
 def per_cent(share: float) -> str:
     """A share of one as per cent."""
     return f"{100.0 * share:.3g} %"
+
+
+def quantity(value: float, unit: str) -> str:
+    """A finding's figure: a share as per cent, a physical unit beside the number, and none beside what is counted."""
+    if unit.startswith("share"):
+        return per_cent(value)
+    if unit in ("m/s", "rad/s", "°"):
+        return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
+    return number(int(value) if float(value).is_integer() else value)
 
 
 def listed(items: Iterable[str]) -> str:

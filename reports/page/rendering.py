@@ -13,12 +13,15 @@ from fgbaseline.data import Event
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
 
+from .diagnosis import findings
 from .embedding import picture
 from .evidence import EVIDENCE, evidence_table, folded_tables
 from .numbers import number, per_cent
 from .table import main_table
 from .verdict import verdict
 
+FIRST_SENTENCES = 3
+"""of the verdict that stand above the table"""
 MOST_EVENTS = 200
 """of an estimator that are listed one by one"""
 REASONS: Mapping[str, str] = {
@@ -50,6 +53,9 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
             sequence=summary.get("sequence", {}),
             problem=summary.get("problem", {}),
             verdict=verdict(run),
+            first=FIRST_SENTENCES,
+            findings=findings(run),
+            repairs=run.problem.repairs,
             trust=run.trust.verdict.name.lower(),
             table=main_table(run, summary.get("estimators", {})),
             pictures=pictures,
