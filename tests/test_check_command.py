@@ -142,6 +142,23 @@ def test_the_json_file_has_every_number_in_full(tmp_path: Path) -> None:
     assert (before["at_most"], before["tolerance"]) == (0.22, "10 %")
 
 
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        (GOOD, "The limit holds."),
+        (UNTRUSTED, "By the figures the limit holds, but the reference is not trusted enough"),
+    ],
+)
+def test_a_reference_that_is_not_trusted_keeps_good_figures_from_counting(
+    document: Any, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path, document, '[[limit]]\nmetric = "ate.rmse"\nestimators = "ekf"\nat_most = 0.5\n')
+    code = check(tmp_path / "out", tmp_path / "limits.toml", None, Outputs(tmp_path / "check.xml"))
+    assert said in capsys.readouterr().out
+    report = JUnitXml.fromfile(str(tmp_path / "check.xml"))
+    assert (code, report.errors) == ((2, 1) if document is UNTRUSTED else (0, 0))
+
+
 def test_files_are_written_all_or_none(tmp_path: Path) -> None:
     write(tmp_path, GOOD, LIMITS, GOOD)
     there = everything_in(tmp_path)

@@ -20,9 +20,10 @@ def verdict(checked: Checked) -> str:
     parts += [f"{unknown} of {n} cannot be told"] if unknown else []
     if parts:
         return f"{' and '.join(parts)}."
+    hold = "the limit holds" if n == 1 else f"all {n} limits hold"
     if checked.undecided:
-        return f"The reference is not trusted enough to say so, though all {n} limits hold by their figures."
-    return f"All {n} limits hold."
+        return f"By the figures {hold}, but the reference is not trusted enough to say so."
+    return f"{hold[0].upper()}{hold[1:]}."
 
 
 def columns(checked: Checked) -> tuple[str, ...]:
