@@ -13,10 +13,11 @@ QUICK_CHECK :=
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
 
-test: install lint types arrows quick
+test: install lint types arrows
 	$(BIN)/pytest -n 2
 
-# Are our own estimators as good as they were? QUICK_CHECK=--update-baseline says that they are meant to differ.
+# Are our own estimators as good as they were? `make test` asks the same (tests/test_check_ourselves.py), without the
+# report. QUICK_CHECK=--update-baseline says that they are meant to differ.
 quick: install
 	@mkdir -p out
 	$(BIN)/fgbaseline simulate out/quick.npz $(QUICK_DRIVE) --force

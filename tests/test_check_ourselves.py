@@ -24,7 +24,13 @@ from .commands import fgbaseline
 
 ROOT = Path(__file__).parents[1]
 SUITES = ROOT / "suites"
-ESTIMATORS = ("dead-reckoning", "ekf", "joint-ekf", "isam2", "isam2-online")
+
+
+def in_makefile(variable: str) -> str:
+    """What the Makefile gives to `make quick`."""
+    found = re.search(rf"^{variable} := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert found is not None
+    return found[1]
 
 
 @dataclass(frozen=True)
@@ -47,13 +53,11 @@ class Quick:
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
     folder = tmp_path_factory.mktemp("quick")
-    found = re.search(r"^QUICK_DRIVE := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert found is not None
-    simulated = fgbaseline("simulate", "quick.npz", *found[1].split(), cwd=folder)
+    simulated = fgbaseline("simulate", "quick.npz", *in_makefile("QUICK_DRIVE").split(), cwd=folder)
     assert simulated.returncode == 0, simulated.stderr
-    settings = job.RunSettings(estimators=ESTIMATORS)
-    problem = job.pose_problem(read(folder / "quick.npz"), settings)
-    return Quick(problem, solve_all(problem, ESTIMATORS), folder)
+    estimators = tuple(in_makefile("QUICK_ESTIMATORS").split(","))
+    problem = job.pose_problem(read(folder / "quick.npz"), job.RunSettings(estimators=estimators))
+    return Quick(problem, solve_all(problem, estimators), folder)
 
 
 def test_what_is_committed_holds(quick: Quick) -> None:
