@@ -129,6 +129,31 @@ def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:
         compare(files / "truth.tum", files / "camera.tum", estimate_body="camera")
 
 
+def test_up_is_carried_from_the_recording_into_the_worlds_of_others(files: Path) -> None:
+    t, poses = truth()
+    problem = matched(drive(seconds=12.0))
+    (files / "problem").mkdir()
+    write_problem(problem, files / "problem")
+    turned = se3.exp([1.0, 2.0, 3.0, 2.0, -1.0, 0.5])
+    data.write_tum(files / "turned.tum", t, turned @ poses)
+    data.write_tum(files / "late.tum", t[7:], (turned @ poses)[7:])
+    expected = turned[:3, :3] @ problem.sequence.up
+    for name, tolerance in (("turned.tum", 1e-12), ("late.tum", 0.02)):
+        result = compare(files / name, files / "near.csv", sequence=files / "problem")
+        np.testing.assert_allclose(result.up, expected, atol=tolerance)
+    np.testing.assert_array_equal(compare(files / "turned.tum", files / "near.csv").up, [0.0, 0.0, 1.0])
+
+
+def test_when_a_path_leaves_is_said_only_of_paths_that_start_together(files: Path) -> None:
+    aligned = compare(files / "truth.tum", files / "far.npz")
+    assert aligned.results["far"].passing is None
+    assert "do not start together" in aligned.results["far"].notes["passing"]
+    together = compare(files / "truth.tum", files / "far.npz", align="first-pose").results["far"]
+    assert together.passing is not None
+    assert together.departure["position"][together.passing.frame] > together.bound
+    assert (together.departure["position"][: together.passing.frame] <= together.bound).all()
+
+
 def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> None:
     problem = matched(drive(seconds=12.0))
     sequence = problem.sequence

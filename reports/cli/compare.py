@@ -37,7 +37,11 @@ class Direction(click.ParamType[tuple[float, ...]]):
     help="What an estimate may be moved by.  [default: none against a run, whose world is theirs; else se3]",
 )
 @click.option("--align-first", type=click.IntRange(min=1), metavar="N", help="Align over the first N poses.")
-@click.option("--up", type=Direction(), help="Up in the reference's world.  [default: of --sequence, else 0,0,1]")
+@click.option(
+    "--up",
+    type=Direction(),
+    help="Up in the reference's world; 0,-1,0 in a camera's.  [default: by --sequence, else 0,0,1]",
+)
 @click.option(
     "--association",
     type=click.Choice(["nearest", "interpolated"]),

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.compare import Align, Matched, TimeOffset
+from fgbaseline.compare import Align, Matched, Passing, TimeOffset
 from fgbaseline.geometry import FloatArray, InputError
 
 from .claimed import nees_of
 from .comparison import Comparison, Result
 from .entries import Entries, Entry
-from .pixels import Pixels, pixels_of
+from .pixels import Pixels, pixels_of, up_of_problem
 from .settings import Delta, Settings
 
 Computed = TypeVar("Computed")
@@ -51,12 +51,14 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
 
 
 def _up(entries: Entries, settings: Settings) -> FloatArray:
+    """(3,) what points up in the reference's world: as asked for, by the recording where it is at hand, else +z."""
     if settings.up is not None:
         up = np.asarray(settings.up, dtype=np.float64)
         if not (np.isfinite(up).all() and np.linalg.norm(up) > 0):
             raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
         return up / np.linalg.norm(up)
-    return np.array([0.0, 0.0, 1.0]) if entries.problem is None else entries.problem.sequence.up
+    found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
+    return np.array([0.0, 0.0, 1.0]) if found is None else found
 
 
 def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
@@ -93,7 +95,7 @@ def _compared(
         drift=_or_note("drift", notes, lambda: compare.drift(matched, seed=seed)),
         shares=compare.difference_shares(matched, up),
         bound=bound,
-        passing=compare.first_beyond(departure, bound),
+        passing=_passing(matched, departure, bound, notes),
         statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
         relative_statistics={
             delta: {name: spread(table[name], seed) for name in ("translation", "rotation_deg")}
@@ -102,6 +104,14 @@ def _compared(
         pixels=pixels,
         notes=notes,
     )
+
+
+def _passing(matched: Matched, departure: pd.DataFrame, bound: float, notes: dict[str, str]) -> Passing | None:
+    """Where the estimate leaves the reference; only of paths that start together."""
+    if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
+        return compare.first_beyond(departure, bound)
+    notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
+    return None
 
 
 def spread(errors: "pd.Series[float]", seed: int) -> pd.DataFrame:

@@ -20,6 +20,10 @@ Given = str | Path | Trajectory
 """[NAME=]FILE, or a trajectory that is at hand"""
 
 
+ONLINE = "-online"
+"""what is added to the name of a smoother for its poses as known when their frames came"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Entry:
     """A trajectory, and what came with it."""
@@ -31,6 +35,8 @@ class Entry:
     """(n, 6, 6) of the right perturbation of each pose"""
     trust: Trust | None = None
     """in a run's reference; a file says nothing of it"""
+    by_product: bool = False
+    """whether the reference's own run gave it along: near to it by nature"""
 
     @property
     def name(self) -> str:
@@ -61,7 +67,10 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
         beside: list[Entry] = []
     else:
         first = Entry(run.trajectory(run.reference), run.landmarks(run.reference), None, run.trust)
-        beside = [Entry(run.trajectory(name), run.landmarks(name)) for name in _beside(run, settings.beside)]
+        beside = [
+            Entry(run.trajectory(name), run.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
+            for name in _beside(run, settings.beside)
+        ]
     own = [_entry(given, settings, times, settings.estimate_body, imu_T_cam) for given in estimates]
     entries = _named_apart([first, *beside, *own])
     entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)

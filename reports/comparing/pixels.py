@@ -11,7 +11,7 @@ from fgbaseline.data import Estimate, Excluded, Landmarks, Problem, Trajectory
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulated import landmarks_along
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, se3
 
 from .entries import Entry
 
@@ -56,6 +56,21 @@ def poses_of_frames(problem: Problem, trajectory: Trajectory) -> FloatArray:
     frames, chosen = match_stamps(problem.sequence.t, trajectory.t)
     poses[frames] = trajectory.world_T_body[chosen]
     return poses
+
+
+def up_of_problem(problem: Problem, trajectory: Trajectory) -> FloatArray | None:
+    """(3,) the problem's up in the world of a trajectory, which may be any: by its first pose that belongs to a frame.
+
+    The problem knows up in the IMU's frame at frame 0; from there to that frame its increments lead. None where no
+    pose belongs to a frame.
+    """
+    rotations = poses_of_frames(problem, trajectory)[:, :3, :3]
+    known = np.flatnonzero(np.isfinite(rotations[:, 0, 0]))
+    if len(known) == 0:
+        return None
+    k = int(known[0])
+    since_start = se3.compose(se3.exp(problem.increment[:k]))[-1, :3, :3]
+    return np.asarray(rotations[k] @ since_start.T @ problem.sequence.up)
 
 
 def _estimate(problem: Problem, name: str, poses: FloatArray, landmarks: Landmarks | None) -> Estimate:

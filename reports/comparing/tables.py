@@ -142,14 +142,15 @@ def text_table(comparison: Comparison) -> tuple[list[str], list[Line]]:
     known, chosen = values(comparison), columns(comparison)
     reference = comparison.reference.name
     names = list(comparison.results)
+    rivals = [name for name, result in comparison.results.items() if not result.entry.by_product]
     if any(np.isfinite(value_at(known[reference], c.path).value) for c in chosen):
         names.insert(0, reference)
     lines = []
     for column in chosen:
         cells = [value_at(known[name], column.path) for name in names]
-        others = [c.value for n, c in zip(names, cells, strict=True) if n != reference and np.isfinite(c.value)]
+        others = [c.value for n, c in zip(names, cells, strict=True) if n in rivals and np.isfinite(c.value)]
         least = min(others) if column.compared and len(others) > 1 else None
-        best = [n != reference and c.value == least for n, c in zip(names, cells, strict=True)]
+        best = [n in rivals and c.value == least for n, c in zip(names, cells, strict=True)]
         lines.append(Line(column.group, column.heading, [c.text for c in cells], best))
     return names, lines
 

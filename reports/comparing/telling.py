@@ -56,7 +56,7 @@ def _print(comparison: Comparison) -> None:
 
     names, lines = text_table(comparison)
     table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for name in names:
         table.add_column(Text(name), justify="right")
     for line in lines:

@@ -69,16 +69,25 @@ def _reference(comparison: Comparison) -> list[str]:
 
 
 def _nearest(comparison: Comparison) -> list[str]:
-    first, *rest = ranked(comparison)
+    own = [result for result in ranked(comparison) if result.entry.by_product]
+    sentences = [
+        f"{result.name} is the same run, each pose as known when its frame came: {_with_interval(result)} away."
+        for result in own
+    ]
+    others = [result for result in ranked(comparison) if not result.entry.by_product]
+    if not others:
+        return sentences
+    first, *rest = others
     path = float(first.departure["travelled"].iloc[-1])
     of_path = f", {per_cent(rmse(first) / path)} of its path of {number(path)} m" if path > 0 else ""
     text = f"{first.name} is {_with_interval(first)} from {comparison.reference.name} (RMSE of the positions){of_path}"
     if rest:
         text = f"Nearest: {text}; then " + listed(f"{r.name} with {_with_interval(r)}" for r in rest)
-    sentences = [text + "."]
+    sentences.insert(0, text + ".")
     if rest and _interval(rest[0])[0] <= _interval(first)[1]:
-        sentences.append(
-            f"The intervals of {first.name} and {rest[0].name} overlap: this recording does not settle their order."
+        sentences.insert(
+            1,
+            f"The intervals of {first.name} and {rest[0].name} overlap: this recording does not settle their order.",
         )
     return sentences
 
@@ -95,12 +104,12 @@ def _passing(comparison: Comparison) -> list[str]:
     for result in ranked(comparison):
         bound = f"{number(result.bound)} m"
         if result.passing is None:
-            most = number(float(result.departure["position"].max()))
-            sentences.append(f"{result.name} stays within {bound} throughout: {most} m at most.")
+            most = float(result.departure["position"].max())
+            within = f"stays within {bound} throughout: " if most <= result.bound else "is "
+            sentences.append(f"{result.name} {within}{number(most)} m off at most.")
             continue
-        stamped = result.matched.reference.stamped
         t = result.passing.t - float(result.matched.reference.t[0])
-        when = f"after {number(t)} s" if stamped else f"at frame {result.passing.frame}"
+        when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
         along = f"{number(result.passing.travelled)} m along the path"
         sentences.append(f"{result.name} is first more than {bound} off {when}, {along}.")
     return sentences
@@ -136,15 +145,16 @@ def _offsets(comparison: Comparison) -> list[str]:
 
 
 def _left_out(comparison: Comparison) -> list[str]:
-    sentences = []
+    same: dict[tuple[int, int], list[str]] = {}
     for result in comparison.results.values():
-        here, there = result.matched.left_out_estimate, result.matched.left_out_reference
-        if here or there:
-            sentences.append(
-                f"{number(here)} poses of {result.name} and {number(there)} of {comparison.reference.name} have no "
-                "partner and take no part."
-            )
-    return sentences
+        counts = (result.matched.left_out_estimate, result.matched.left_out_reference)
+        same.setdefault(counts, []).append(result.name)
+    return [
+        f"{number(here)} poses of {listed(names)} and {number(there)} of {comparison.reference.name} have no partner "
+        "and take no part."
+        for (here, there), names in same.items()
+        if here or there
+    ]
 
 
 def _open(comparison: Comparison) -> list[str]:
