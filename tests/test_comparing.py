@@ -144,6 +144,18 @@ def test_up_is_carried_from_the_recording_into_the_worlds_of_others(files: Path)
     np.testing.assert_array_equal(compare(files / "turned.tum", files / "near.csv").up, [0.0, 0.0, 1.0])
 
 
+def test_yaw_is_refused_between_worlds_that_are_not_both_level(files: Path) -> None:
+    t, poses = truth()
+    problem = matched(drive(seconds=12.0))
+    (files / "problem").mkdir()
+    write_problem(problem, files / "problem")
+    data.write_tum(files / "camera_world.tum", t, se3.inverse(problem.sequence.imu_T_cam) @ poses)
+    with pytest.raises(InputError, match=r"truth\.tum: up in its world is 9\d degrees off .*--align se3"):
+        compare(files / "camera_world.tum", files / "truth.tum", align="yaw", sequence=files / "problem")
+    level = compare(files / "truth.tum", f"it={files / 'truth.tum'}", align="yaw", sequence=files / "problem")
+    assert level.table["absolute error: largest, m"]["it"] < 1e-9
+
+
 def test_when_a_path_leaves_is_said_only_of_paths_that_start_together(files: Path) -> None:
     aligned = compare(files / "truth.tum", files / "far.npz")
     assert aligned.results["far"].passing is None
@@ -222,6 +234,11 @@ def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
     again = compare(files / "truth.tum", files / "near.csv", f"<b>&|%_$={files / 'far.npz'}")
     assert again.write(files / "out", force=True) == report
     assert {path: path.read_bytes() for path in (files / "out").rglob("*") if path.is_file()} == before
+
+
+def test_the_published_schema_is_the_one_that_is_kept_to() -> None:
+    published = Path(__file__).parents[1] / "docs" / "comparison.schema.json"
+    assert published.read_text() == json_schema() + "\n"  # make schema writes it
 
 
 def test_short_and_standing_paths_say_what_they_lack(tmp_path: Path) -> None:

@@ -24,6 +24,8 @@ FAR, FAR_SHARE = 5.0, 0.01
 AT_MOST = 20_000_000
 """errors that a bootstrap draws"""
 REPETITIONS = 1000
+TILT = 10.0
+"""deg: worlds whose ups are farther apart are not both level"""
 FEWEST = 2
 """pairs of poses, below which there is nothing to compare"""
 
@@ -33,6 +35,8 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     up = _up(entries, settings)
     kind = settings.align or (Align.NONE if entries.one_world else Align.SE3)
     everything = [entries.reference, *entries.estimates]
+    if kind == Align.YAW:
+        _require_one_up(entries, up)
     pixels = pixels_of(entries.problem, everything, settings.offset)
     deltas = settings.deltas or _usual(everything)
     results = {
@@ -59,6 +63,20 @@ def _up(entries: Entries, settings: Settings) -> FloatArray:
         return up / np.linalg.norm(up)
     found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
     return np.array([0.0, 0.0, 1.0]) if found is None else found
+
+
+def _require_one_up(entries: Entries, up: FloatArray) -> None:
+    """Raises InputError where the recording says that up is another direction in the world of an estimate."""
+    if entries.problem is None:
+        return
+    for entry in entries.estimates:
+        there = up_of_problem(entries.problem, entry.trajectory)
+        apart = 0.0 if there is None else float(np.rad2deg(np.arccos(np.clip(there @ up, -1.0, 1.0))))
+        if apart > TILT:
+            raise InputError(
+                f"{entry.trajectory.source or entry.name}: up in its world is {apart:.0f} degrees off that of "
+                f"{entries.reference.name}, which a yaw alignment cannot mend; ask for --align se3 or first-pose"
+            )
 
 
 def _usual(entries: list[Entry]) -> tuple[Delta, ...]:

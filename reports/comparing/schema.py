@@ -3,22 +3,13 @@
 import json
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from ..schema import Reprojection
+from ..schema_base import Number, Part
 
 SCHEMA: Final = "fgbaseline/comparison/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
-
-
-Number = float | None
-"""null for what is not a number"""
-
-
-class Part(BaseModel):
-    """An object of the file; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Statistic(Part):
