@@ -129,6 +129,8 @@ BAD = {
     "compare truth.tum mine.tum --estimate-body camera": ("mine.tum", "--extrinsic"),
     "compare truth.tum mine.tum --extrinsic moved.txt": ("moved.txt", "one line"),
     "compare run mine.tum --beside isam2": ("'isam2'", "dead-reckoning"),
+    "compare run mine.tum --sequence drive.npz --held-out 0.2": ("run", "--held-out"),
+    "compare truth.tum mine.tum --sequence drive.npz --held-out 2": ("held-out", "2"),
     "compare truth.tum mine.tum --force": ("--out",),
     "compare truth.tum mine.tum --out theirs": ("theirs", "--force"),
     "compare truth.tum mine.tum --out theirs --force": ("theirs", "comparison.json"),

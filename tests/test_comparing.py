@@ -156,6 +156,23 @@ def test_yaw_is_refused_between_worlds_that_are_not_both_level(files: Path) -> N
     assert level.table["absolute error: largest, m"]["it"] < 1e-9
 
 
+def test_held_out_tracks_rank_the_paths(files: Path) -> None:
+    data.write_npz(drive(seconds=12.0, features_per_frame=30.0), files / "drive.npz")
+    t, poses = truth()
+    data.write_tum(files / "shaken.tum", t, astray(poses, 0.1, 5))
+    given = {"sequence": files / "drive.npz", "held_out": 0.3}
+    result = compare(files / "truth.tum", files / "near.csv", files / "shaken.tum", **given)
+    assert result.held_out is not None
+    assert list(result.held_out.index) == ["truth", "near", "shaken"]
+    figures = summarise(result).estimates["shaken"].held_out
+    assert figures is not None
+    assert figures.behind.low is not None
+    assert figures.behind.low > 0.0
+    assert "held-out tracks: median, px" in result.table.columns
+    assert any(sentence.startswith("On tracks that were held out") for sentence in result.verdict)
+    assert compare(files / "truth.tum", files / "near.csv", sequence=files / "drive.npz").held_out is None
+
+
 def test_when_a_path_leaves_is_said_only_of_paths_that_start_together(files: Path) -> None:
     aligned = compare(files / "truth.tum", files / "far.npz")
     assert aligned.results["far"].passing is None
@@ -276,6 +293,7 @@ BAD: dict[str, Bad] = {
     "insisted": (("truth.tum", "near.csv"), {"form": "kitti"}, r"truth\.tum: line 2: expected 12 \(KITTI\)"),
     "another time": (("truth.tum", "near.csv"), {"offset": 100.0}, r"no pose of .*near\.csv is within 0\.01 s"),
     "landmarks alone": (("truth.tum", "near.csv"), {"landmarks": ["times.txt"]}, "landmarks: .* add --sequence"),
+    "held out of nothing": (("truth.tum", "near.csv"), {"held_out": 0.2}, "held-out: .* give it with --sequence"),
     "no name": (("truth.tum", "=near.csv"), {}, "expected FILE or NAME=FILE"),
     "many extrinsics": (("truth.tum", "near.csv"), {"extrinsic": "frames.txt"}, "imu_T_cam in one line of 12 numbers"),
     "first": (("truth.tum", "near.csv"), {"align_first": 10_000}, "the first 10000 cannot be taken"),

@@ -79,6 +79,14 @@ class Direction(click.ParamType[tuple[float, ...]]):
     help="Landmarks of an estimate: CSV with id,x,y,z, id being the index in --sequence; may be given again.",
 )
 @click.option(
+    "--held-out",
+    type=float,
+    default=0.0,
+    metavar="SHARE",
+    help="Judge all paths by this share of the recording's tracks; export with the same SHARE and --seed for a filter "
+    "that has not seen them.  [default: as the run]",
+)
+@click.option(
     "--reference-body", type=click.Choice(["imu", "camera"]), default="imu", help="Whose poses the reference has."
 )
 @click.option(
@@ -92,7 +100,9 @@ class Direction(click.ParamType[tuple[float, ...]]):
 @click.option(
     "--beside", default="all", show_default=True, help="Estimators of the run to show too: names, all or none."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the bootstrap.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the bootstrap and --held-out."
+)
 def command(
     reference: str,
     estimates: tuple[str, ...],
@@ -111,6 +121,7 @@ def command(
     times: Path | None,
     sequence: Path | None,
     landmarks: tuple[str, ...],
+    held_out: float,
     reference_body: Literal["imu", "camera"],
     estimate_body: Literal["imu", "camera"],
     extrinsic: Path | None,
@@ -140,6 +151,7 @@ def command(
         form=form,
         times=times,
         sequence=sequence,
+        held_out=held_out,
         extrinsic=extrinsic,
         reference_body=reference_body,
         estimate_body=estimate_body,

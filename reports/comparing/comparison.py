@@ -65,6 +65,8 @@ class Comparison:
     """(3,) in the reference's world"""
     deltas: tuple[str, ...]
     settings: Settings
+    held_out: pd.DataFrame | None
+    """see `compare.held_out_ranking`: the reference among them"""
     sequence: str | None
     """the recording that the reprojection is of"""
 

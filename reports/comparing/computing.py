@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray, InputError
 from .claimed import nees_of
 from .comparison import Comparison, Result
 from .entries import Entries, Entry
-from .pixels import Pixels, pixels_of, up_of_problem
+from .pixels import Pixels, held_out_of, paths_of, pixels_of, up_of_problem
 from .settings import Delta, Settings
 
 Computed = TypeVar("Computed")
@@ -37,7 +37,8 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     everything = [entries.reference, *entries.estimates]
     if kind == Align.YAW:
         _require_one_up(entries, up)
-    pixels = pixels_of(entries.problem, everything, settings.offset)
+    paths = paths_of(entries.problem, everything, settings.offset)
+    pixels = pixels_of(entries.problem, everything, paths)
     deltas = settings.deltas or _usual(everything)
     results = {
         entry.name: _compared(entries.reference, entry, kind, up, deltas, settings, pixels.get(entry.name))
@@ -50,6 +51,7 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
         up=up,
         deltas=tuple(delta.text for delta in deltas),
         settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
+        held_out=held_out_of(entries.problem, entries.held, paths),
         sequence=None if entries.problem is None else entries.problem.sequence.name,
     )
 

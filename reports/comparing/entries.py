@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fgbaseline.compare import Trust
-from fgbaseline.data import Landmarks, Problem, Reading, Trajectory, calibrated, read, read_problem
+from fgbaseline.data import HeldOut, Landmarks, Problem, Reading, Trajectory, read, read_problem
 from fgbaseline.data.formats import read_kitti, read_landmarks, read_pose_covariances, read_times, read_trajectory
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
@@ -52,6 +52,8 @@ class Entries:
     estimates: tuple[Entry, ...]
     problem: Problem | None
     """whose observations the reprojection is of"""
+    held: HeldOut | None
+    """the tracks that are in no problem, to judge all paths by"""
     one_world: bool
     """whether reference and estimates are taken to be in the same world: that of a run"""
 
@@ -59,7 +61,7 @@ class Entries:
 def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
     """Reads all of it. Raises InputError, naming the file, for whatever is wrong."""
     run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
-    problem = None if settings.sequence is None else _problem(settings.sequence, run)
+    problem, held = _problem(settings, run)
     times = _times(settings, problem)
     imu_T_cam = _extrinsic(settings, problem)
     if run is None:
@@ -76,7 +78,7 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)
     if len(entries) == 1:
         raise InputError("estimate: there is nothing to compare; name at least one trajectory besides the reference")
-    return Entries(entries[0], tuple(entries[1:]), problem, run is not None)
+    return Entries(entries[0], tuple(entries[1:]), problem, held, run is not None)
 
 
 def _is_folder(given: Given) -> bool:
@@ -109,15 +111,31 @@ def _split(given: str) -> tuple[str | None, str]:
     return name, file
 
 
-def _problem(sequence: Path, run: RunFolder | None) -> Problem:
-    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated."""
+def _problem(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, HeldOut | None]:
+    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated.
+
+    With it the tracks that were held out of it.
+    """
+    sequence = settings.sequence
+    if settings.held_out and (sequence is None or sequence.is_dir()):
+        raise InputError(
+            "held-out: the tracks are kept from a recording; give it with --sequence, not an exported folder"
+        )
+    if sequence is None:
+        return None, None
     if sequence.is_dir():
-        return read_problem(sequence)
+        return read_problem(sequence), None
     recorded = read(sequence)
     if run is None:
-        return calibrated(recorded)
-    settings = _of_run(sequence, run)
-    return job.pose_problem(job.split(recorded, settings)[0], settings)
+        posed = job.RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
+    else:
+        posed = _of_run(sequence, run)
+        if settings.held_out not in (0.0, posed.held_out):
+            raise InputError(
+                f"held-out: {run.folder} was run with {posed.held_out:g}; leave --held-out out, or run it again"
+            )
+    kept, held = job.split(recorded, posed)
+    return job.pose_problem(kept, posed), held
 
 
 def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:

@@ -1,13 +1,13 @@
 """What estimates from anywhere say the pixels of a problem should have been."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.data import Estimate, Excluded, Landmarks, Problem, Trajectory
+from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulated import landmarks_along
@@ -32,22 +32,37 @@ class Pixels:
     """why something is missing"""
 
 
-def pixels_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -> dict[str, Pixels]:
-    """By name; nothing without a problem. Each trajectory in its own world: no alignment comes into it.
+def paths_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -> dict[str, FloatArray]:
+    """By name the poses (T, 4, 4) of the problem's frames; nothing without a problem.
 
-    Poses belong to the frames of the recording by their stamps, nearest in time within half an interval; `offset` (s)
-    is added to those of all but the first entry, the reference.
+    Poses belong to the frames by their stamps, nearest in time within half an interval; `offset` (s) is added to those
+    of all but the first entry, the reference.
     """
     if problem is None:
         return {}
-    estimates = {}
-    for i, entry in enumerate(entries):
-        moved = entry.trajectory.later(offset) if offset and i else entry.trajectory
-        poses = poses_of_frames(problem, moved)
-        estimates[entry.name] = _estimate(problem, entry.name, poses, entry.landmarks)
+    moved = [e.trajectory.later(offset) if offset and i else e.trajectory for i, e in enumerate(entries)]
+    return {e.name: poses_of_frames(problem, path) for e, path in zip(entries, moved, strict=True)}
+
+
+def pixels_of(problem: Problem | None, entries: Sequence[Entry], paths: Mapping[str, FloatArray]) -> dict[str, Pixels]:
+    """By name; nothing without a problem. Each trajectory in its own world: no alignment comes into it."""
+    if problem is None:
+        return {}
+    estimates = {e.name: _estimate(problem, e.name, paths[e.name], e.landmarks) for e in entries}
     own = {name: compare.reprojection(problem.sequence, e) for name, e in estimates.items() if len(e.landmarks)}
     common = _common(problem, own)
     return {name: _pixels(problem, estimate, own.get(name), common) for name, estimate in estimates.items()}
+
+
+def held_out_of(problem: Problem | None, held: HeldOut | None, paths: Mapping[str, FloatArray]) -> pd.DataFrame | None:
+    """The paths ranked by held-out tracks: see `compare.held_out_ranking`; None without any.
+
+    Paths that no frame has a pose of are left out: there would be nothing in common.
+    """
+    known = {name: path for name, path in paths.items() if np.isfinite(path[:, 0, 0]).any()}
+    if problem is None or held is None or not known:
+        return None
+    return compare.held_out_ranking(compare.held_out_errors(problem.sequence, held, known, problem.pixel_variance))
 
 
 def poses_of_frames(problem: Problem, trajectory: Trajectory) -> FloatArray:

@@ -106,6 +106,15 @@ class Consistency(Part):
     frames: int
 
 
+class HeldOutFigures(Part):
+    """Errors on tracks that were in no problem, px, over the same observations for all."""
+
+    median: Statistic
+    behind: Annotated[Statistic, Field(description="by how much the median is above the best one")]
+    p95: Number
+    under_3px: Number
+
+
 class Shares(Part):
     """What the position difference is made of: shares of its sum of squares, which add to one."""
 
@@ -152,6 +161,7 @@ class EstimateSummary(Part):
     reprojection_along: Annotated[
         Reprojection | None, Field(description="with landmarks triangulated along its path, the same way for all")
     ]
+    held_out: HeldOutFigures | None
     notes: Annotated[dict[str, str], Field(description="why something is null or missing, by key")]
 
 
@@ -170,6 +180,7 @@ class ReferenceSummary(Part):
     reprojection: Reprojection | None
     reprojection_common: Reprojection | None
     reprojection_along: Reprojection | None
+    held_out: HeldOutFigures | None
 
 
 class Summary(Part):

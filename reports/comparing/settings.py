@@ -70,6 +70,8 @@ class Settings:
     """stamps for KITTI files"""
     sequence: Path | None = None
     """a recording, or the folder of an exported problem"""
+    held_out: float = 0.0
+    """share of the tracks of a recording to judge all paths by; a run that held some out has its own"""
     extrinsic: Path | None = None
     """imu_T_cam: a KITTI file of one line; None for that of `sequence`"""
     reference_body: Body = "imu"
@@ -77,7 +79,7 @@ class Settings:
     beside: str = "all"
     """which estimators of a run that is the reference are compared too: names with commas, `all` or `none`"""
     seed: int = 0
-    """of the bootstrap"""
+    """of the bootstrap, and of what is held out"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `comparison.json` has them."""
@@ -94,6 +96,7 @@ class Settings:
             "format": self.form,
             "times": _text(self.times),
             "sequence": _text(self.sequence),
+            "held_out": self.held_out,
             "extrinsic": _text(self.extrinsic),
             "reference_body": self.reference_body,
             "estimate_body": self.estimate_body,

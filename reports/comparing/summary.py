@@ -15,7 +15,6 @@ from fgbaseline.compare.travel import distance_travelled
 from fgbaseline.geometry import FloatArray
 
 from .comparison import Comparison, Result
-from .entries import Entry
 from .pixels import Pixels
 from .schema import Summary
 
@@ -29,8 +28,8 @@ def summarise(comparison: Comparison) -> Summary:
         _finite(
             {
                 "caption": comparison.caption,
-                "reference": _reference(comparison.reference, comparison.reference_pixels),
-                "estimates": {name: _estimate(result) for name, result in comparison.results.items()},
+                "reference": _reference(comparison),
+                "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
                 "sequence": comparison.sequence,
                 "settings": comparison.settings.record(),
                 "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
@@ -39,8 +38,8 @@ def summarise(comparison: Comparison) -> Summary:
     )
 
 
-def _reference(entry: Entry, pixels: Pixels | None) -> dict[str, Any]:
-    path, trust = entry.trajectory, entry.trust
+def _reference(comparison: Comparison) -> dict[str, Any]:
+    path, trust = comparison.reference.trajectory, comparison.reference.trust
     return {
         "name": path.name,
         "source": path.source,
@@ -49,11 +48,12 @@ def _reference(entry: Entry, pixels: Pixels | None) -> dict[str, Any]:
         "path_m": float(distance_travelled(path.position)[-1]),
         "trust": None if trust is None else trust.verdict.name.lower(),
         "reasons": [] if trust is None else list(trust.reasons),
-        **_pixels(pixels),
+        **_pixels(comparison.reference_pixels),
+        "held_out": _held_out(comparison, path.name),
     }
 
 
-def _estimate(result: Result) -> dict[str, Any]:
+def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
     matched, motion = result.matched, result.matched.alignment
     return {
         "source": result.entry.trajectory.source,
@@ -96,6 +96,7 @@ def _estimate(result: Result) -> dict[str, Any]:
             "travelled_m": None if result.passing is None else result.passing.travelled,
         },
         **_pixels(result.pixels),
+        "held_out": _held_out(comparison, result.name),
         "notes": result.notes,
     }
 
@@ -124,6 +125,18 @@ def _nees(values: FloatArray) -> dict[str, float | int]:
     known = values[np.isfinite(values)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
     return {"mean": mean, "median": median, "frames": len(known)}
+
+
+def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:
+    if comparison.held_out is None or name not in comparison.held_out.index:
+        return None
+    row = comparison.held_out.to_dict(orient="index")[name]
+    return {
+        "median": {"value": row["median"], "low": row["low"], "high": row["high"]},
+        "behind": {"value": row["behind"], "low": row["behind_low"], "high": row["behind_high"]},
+        "p95": row["p95"],
+        "under_3px": row["under_3px"],
+    }
 
 
 def _pixels(pixels: Pixels | None) -> dict[str, Any]:

@@ -76,6 +76,7 @@ def columns(comparison: Comparison) -> list[Column]:
         Column("reprojection, median px", "its landmarks", ("reprojection", "median")),
         Column("reprojection, median px", "of common", ("reprojection_common", "median")),
         Column("reprojection, median px", "triangulated", ("reprojection_along", "median")),
+        Column("held-out tracks", "median, px", ("held_out", "median")),
     ]
     known = values(comparison)
     return [c for c in every if any(np.isfinite(value_at(e, c.path).value) for e in known.values())]

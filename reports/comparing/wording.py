@@ -39,6 +39,7 @@ def verdict(comparison: Comparison) -> list[str]:
         _open,
         _unsure,
         _pixels,
+        _held_out,
     )
     return [sentence for part in parts for sentence in part(comparison)]
 
@@ -192,3 +193,15 @@ def _pixels(comparison: Comparison) -> list[str]:
         f"With landmarks triangulated along each path in the same way, the median reprojection error is {each}: it "
         "ranks them locally, by what happens within the life of a track."
     ]
+
+
+def _held_out(comparison: Comparison) -> list[str]:
+    table = comparison.held_out
+    if table is None or len(table) < 2:
+        return []
+    each = listed(
+        f"{number(float(median))} px for {name}" for name, median in zip(table.index, table["median"], strict=True)
+    )
+    tied = [str(name) for name, low in zip(table.index[1:], table["behind_low"][1:], strict=True) if low <= 0.0]
+    said = f"; {listed(tied)} cannot be told from {table.index[0]}" if tied else ""
+    return [f"On tracks that were held out, one half predicted from the other, the median error is {each}{said}."]
