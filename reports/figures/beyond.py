@@ -22,6 +22,8 @@ def map_difference(run: Run) -> Figure | None:
     """Median distance of landmarks from the reference's by depth, in metres and sigmas; None where none is shared."""
     maps = {r.name: r.evidence.map for r in run.answered}
     tables = {name: map_by_depth(m) for name, m in maps.items() if m is not None and len(m)}
+    for table in tables.values():
+        table["sigmas"] = table["sigmas"].where(table["with_sigmas"] >= FEWEST)
     if not tables:
         return None
     columns = {"distance": "in the world, m", "seen": "as seen by the cameras, m", "sigmas": "in the world, sigmas"}
@@ -31,9 +33,8 @@ def map_difference(run: Run) -> Figure | None:
     handles: list[Any] = []
     for panel, (column, title) in zip(panels, shown.items(), strict=True):
         for name, table in tables.items():
-            values = table[column].where(table["with_sigmas"] >= FEWEST) if column == "sigmas" else table[column]
             style = {**line(run, run.results[name]), "marker": "o", "markersize": 3.5}
-            handles += panel.plot(np.arange(len(table)), values.to_numpy(), **style)
+            handles += panel.plot(np.arange(len(table)), table[column].to_numpy(), **style)
         labels = [str(of).replace(" m and more", "+").replace(" to ", "–").removesuffix(" m") for of in table.index]
         panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right", fontsize=8)
         log_where_positive(panel)

@@ -60,9 +60,9 @@ def _probabilities(run: Run, panel: Axes, results: list[Result]) -> list[Any]:
     diagonal = panel.plot([0, 1], [0, 100], color="#6b9a72", linewidth=1.0, linestyle=":", label="noise as assumed")
     panel.set_xlim(0.0, 1.0)
     panel.set_ylim(0.0, 100.0)
-    panel.set_xlabel("probability of a track's residuals or larger ones")
+    panel.set_xlabel("probability of a track's residuals, or larger")
     panel.set_ylabel("share of tracks, %")
-    panel.set_title("tracks; above the dots: noise larger than assumed")
+    panel.set_title("by chi-square of each track")
     return list(diagonal)
 
 

@@ -33,8 +33,8 @@ COLUMNS = (
 )
 EXPLAINED: Mapping[str, str] = {
     HELD_OUT: "Held-out tracks were kept from diagnosis and estimators; each half is predicted from the other half "
-    "along each path. They judge motion over a second or two, not drift. Where 'by at least' is not above 0 the path "
-    "cannot be told from the best.",
+    "along each path. They judge motion over a second or two as these cameras see it, not drift. Where 'by at least' "
+    "is not above 0 the path cannot be told from the best.",
     CONSISTENCY: "Expected of who knows their errors: 6 for NEES (5.35 in the median), 1 for NIS per row, sigmas above "
     "the reference's. The NEES of the difference has P − P_ref as covariance, as filter and reference share their "
     "data; frames where that is not positive definite are left out.",

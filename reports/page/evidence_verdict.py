@@ -31,7 +31,7 @@ def held_out_sentences(run: Run) -> list[str]:
     same = [name for name in names[1:] if low[name] <= 0.0]
     if same:
         sentence += f"; {listed(same)} cannot be told from {names[0]}"
-    return [sentence + ". That judges motion over a second or two, not drift."]
+    return [sentence + ". That judges motion over a second or two as these cameras see it, not drift."]
 
 
 def covariance_sentences(run: Run) -> list[str]:
