@@ -17,7 +17,7 @@ DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
-    """One row per `landmark` that both have and some frame with both poses sees:
+    """One row per `landmark` that both have, at a finite place, and some frame with both poses sees:
 
     `distance` in the world as it is, m, with whatever drift the paths have; `seen` the distance of the two points as
     the two cameras see them, each in its own camera frame at the sight nearest to the reference's camera, m, which has
@@ -28,7 +28,7 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
     """
     index, mine, its = np.intersect1d(estimate.landmarks.index, reference.landmarks.index, return_indices=True)
     frame = _nearest_sight(sequence, estimate, reference)[index]
-    known = frame >= 0
+    known = (frame >= 0) & np.isfinite(estimate.landmarks.position[mine]).all(axis=1)
     index, mine, its, frame = index[known], mine[known], its[known], frame[known]
     p, q = estimate.landmarks.position[mine], reference.landmarks.position[its]
     p_cam, q_cam = (

@@ -84,6 +84,9 @@ def checked(answer: object, name: str, problem: Problem) -> Estimate:
         raise FgbaselineError(f"its used has the type {answer.used.dtype}, expected bool")
     if answer.covariance is not None:
         _require_shape("covariance", answer.covariance, (T, 6, 6))
+    if answer.innovations is not None:
+        _require_shape("innovations.nis", answer.innovations.nis, (T,))
+        _require_shape("innovations.degrees", answer.innovations.degrees, (T,))
     if len(answer.seconds):
         _require_shape("seconds", answer.seconds, (T,))
     _require_landmarks(answer, problem)
@@ -101,6 +104,8 @@ def _require_shape(field: str, array: object, expected: tuple[int, ...]) -> None
 def _require_landmarks(answer: Estimate, problem: Problem) -> None:
     index, m = answer.landmarks.index, len(answer.landmarks)
     _require_shape("landmarks.position", answer.landmarks.position, (m, 3))
+    if answer.landmarks.covariance is not None:
+        _require_shape("landmarks.covariance", answer.landmarks.covariance, (m, 3, 3))
     if m and not (np.all(np.diff(index) > 0) and index[0] >= 0 and index[-1] < problem.sequence.n_landmarks):
         raise FgbaselineError(
             f"its landmarks.index must rise and name landmarks of the sequence, 0 to {problem.sequence.n_landmarks - 1}"

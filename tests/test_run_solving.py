@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import ekf
-from fgbaseline.data import Estimate, Landmarks, Problem, Progress, Status
+from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status
 from fgbaseline.geometry import InputError
 from fgbaseline.reports import solving
 from fgbaseline.reports.comparison import compare_all
@@ -78,6 +78,10 @@ ANSWERS = {
     "covariance is (10, 3, 3)": with_changes(covariance=np.zeros((T, 3, 3))),
     "seconds is (3,)": with_changes(seconds=np.zeros(3)),
     "landmarks.position is (2, 2)": with_changes(landmarks=Landmarks(np.arange(2), np.zeros((2, 2)))),
+    "landmarks.covariance is (2, 3)": with_changes(
+        landmarks=Landmarks(np.arange(2), np.zeros((2, 3)), np.zeros((2, 3)))
+    ),
+    "innovations.nis is (3,)": with_changes(innovations=Innovations.none(3)),
     "landmarks.index must rise": with_changes(landmarks=Landmarks(np.array([1, 0]), np.zeros((2, 3)))),
     "0 to 11": with_changes(landmarks=Landmarks(np.array([M]), np.zeros((1, 3)))),
     "frame 4 is no rigid motion": with_changes(world_T_imu=BENT),
@@ -98,6 +102,20 @@ def test_an_answer_that_is_none_is_a_failed_row_that_says_what_is_wrong(installe
 def test_an_answer_goes_by_the_name_it_was_asked_for(installed: dict[str, Any]) -> None:
     installed["mine"] = ekf.dead_reckoning
     assert solve_all(PROBLEM, ["mine"])["mine"].name == "mine"
+
+
+def test_landmarks_and_covariances_that_are_no_numbers_stop_no_comparison(installed: dict[str, Any]) -> None:
+    position = ekf.dead_reckoning(PROBLEM).landmarks.position.copy()
+    position[0], position[1] = np.nan, np.inf
+    wild = np.full((M, 3, 3), 1e300)
+    wild[:4] = [np.full((3, 3), value) for value in (np.nan, np.inf, 0.0, -1.0)]
+    covariance = np.full((T, 6, 6), 1e300)
+    covariance[1:4] = [np.full((6, 6), value) for value in (np.inf, 0.0, -1.0)]
+    installed["wild"] = with_changes(landmarks=Landmarks(np.arange(M), position, wild), covariance=covariance)
+    run = compare_all(PROBLEM, solve_all(PROBLEM, ["wild", "dead-reckoning"]), {})
+    assert run.results["wild"].answered
+    assert run.results["wild"].evidence.map is not None
+    assert len(run.results["wild"].evidence.map) == M - 2
 
 
 def test_poses_from_a_frame_on_may_be_missing(installed: dict[str, Any]) -> None:
