@@ -10,8 +10,12 @@ from fgbaseline.geometry import FloatArray
 
 from .arrival import Arrival
 from .factors import Factors
+from .pieces import solved
 from .pose_guess import corrected
 from .waiting import EntryRule, WaitingLandmarks
+
+LAST_FRAMES = 2
+"""before the one that sees nothing known: three sights are what a landmark needs to enter"""
 
 
 class Arrivals:
@@ -36,10 +40,11 @@ class Arrivals:
         waiting = [(j, i) for j, i in zip(landmarks, observed, strict=True) if j not in known and j not in dropped]
         for landmark, i in waiting:
             self.waiting.add(landmark, i)
-        self.path[k] = guess = self._guess(k, seen)
-        entries = self.waiting.enter([landmark for landmark, _ in waiting], self.path, since)
+        self.path[k] = self._guess(k, seen)
+        path = self.path if seen else self._anew(k, since)
+        entries = self.waiting.enter([landmark for landmark, _ in waiting], path, since)
         motion = self.factors.first_pose() if k == 0 else self.factors.motion(k - 1)
-        return Arrival(k, guess, motion, tuple(entries), seen)
+        return Arrival(k, path[k], motion, tuple(entries), seen)
 
     def _guess(self, k: int, seen: dict[int, int]) -> FloatArray:
         if k == 0:
@@ -49,6 +54,19 @@ class Arrivals:
             return pose
         points = np.array([self.position[j] for j in seen])
         return corrected(self.problem, k, pose, points, self.observations.pixel[list(seen.values())])
+
+    def _anew(self, k: int, since: int) -> FloatArray:
+        """The path (T, 4, 4) where frame k sees no landmark that is known: its last frames fitted to the images alone.
+
+        At the start, or after a gap, nothing corrects where the velocities lead. Landmarks triangulated along it would
+        start so far off, all at once, that the first step throws some behind the cameras and bends the path.
+        """
+        first = max(k - LAST_FRAMES, since)
+        if self.problem.landmark_prior is not None or k - first < LAST_FRAMES:
+            return self.path
+        path = self.path.copy()
+        path[first : k + 1] = solved(self.factors, self.path, first, k)
+        return path
 
     def landmarks_seen(self, observed: range) -> IntArray:
         """The landmarks of a frame's observations."""

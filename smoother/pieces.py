@@ -26,13 +26,13 @@ def piecewise(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
     """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
     factors, T = Factors(problem), problem.n_frames
     for length in LENGTHS:
-        pieces = [_solved(factors, world_T_imu, a, min(a + length, T - 1)) for a in range(0, T - 1, length)]
+        pieces = [solved(factors, world_T_imu, a, min(a + length, T - 1)) for a in range(0, T - 1, length)]
         steps = np.concatenate([se3.relative(piece) for piece in pieces])
         world_T_imu = se3.compose(steps, world_T_imu[0])
     return world_T_imu
 
 
-def _solved(factors: Factors, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
+def solved(factors: Factors, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
     """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
     everything = factors.problem.observations()
     o = everything.select((everything.frame >= first) & (everything.frame <= last))

@@ -8,6 +8,9 @@ import pytest
 
 from fgbaseline import data, ekf, smoother
 from fgbaseline.data import Estimate, HuberKernel, Observations, Problem, Sequence, Status
+from fgbaseline.data.motion import Shift
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.track_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.factors import Factors
 from fgbaseline.smoother.keys import landmark_key
@@ -275,3 +278,17 @@ def test_progress_is_told_after_every_frame() -> None:
     told: list[tuple[int, int]] = []
     smoother.isam2(PROBLEMS["plain"], lambda done, total: told.append((done, total)))
     assert told == [(k + 1, 10) for k in range(10)]
+
+
+@pytest.mark.parametrize("seed", [2, 8, 15])
+def test_the_first_landmarks_that_all_come_at_once_do_not_throw_the_path(seed: int) -> None:
+    # Velocities so noisy that the first frames' dead reckoning is 4 px off in the images.
+    sequence = simulate(
+        Simulation(
+            duration=3.0, features_per_frame=35.0, seed=seed, sigma_linear=0.5, sigma_angular=0.05, wrong_share=0.0
+        )
+    )
+    noise = data.NoiseSettings(pixel=0.5, linear_velocity=0.5, angular_velocity=0.05)
+    told = data.Calibration(noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None)
+    estimate = smoother.isam2(data.calibrated(sequence, settings=told))
+    assert position_errors(estimate.by_products["isam2-online"], sequence)[2:].max() < 0.12
