@@ -116,6 +116,7 @@ class SequenceSummary(_Part):
     path_length_m: Annotated[
         Number, Field(description="of the truth, else of the reference; null where there is neither")
     ]
+    up: Annotated[list[float], Field(description="unit vector that points up in the world of the trajectories")]
     remarks: list[str]
 
 

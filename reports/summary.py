@@ -38,6 +38,7 @@ def summarise(run: Run) -> Summary:
                     "observations": len(sequence.observations),
                     "tracks": sequence.n_landmarks,
                     "path_length_m": path_length(run),
+                    "up": sequence.up.tolist(),
                     "remarks": list(sequence.remarks),
                 },
                 "problem": {

@@ -4,6 +4,7 @@ import json
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fgbaseline import data
@@ -60,6 +61,8 @@ def test_against_a_run_the_trust_comes_first_and_its_estimators_stand_beside(mad
         run["estimators"]["ekf"]["reprojection"]["median"], rel=1e-9
     )
     assert mine["reprojection"]["n"] == summary["reference"]["reprojection"]["n"]
+    up = compare(made / "run", made / "mine.tum").up
+    np.testing.assert_array_equal(up, drive(features_per_frame=20.0).up)
     page = (made / "out/c/report.html").read_text()
     assert 'class="trust' in page
 

@@ -57,12 +57,14 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
 
 
 def _up(entries: Entries, settings: Settings) -> FloatArray:
-    """(3,) what points up in the reference's world: as asked for, by the recording where it is at hand, else +z."""
+    """(3,) what points up in the reference's world: as asked for, as the run or the recording says, else +z."""
     if settings.up is not None:
         up = np.asarray(settings.up, dtype=np.float64)
         if not (np.isfinite(up).all() and np.linalg.norm(up) > 0):
             raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
         return up / np.linalg.norm(up)
+    if entries.up is not None:
+        return entries.up
     found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
     return np.array([0.0, 0.0, 1.0]) if found is None else found
 

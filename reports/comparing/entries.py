@@ -54,6 +54,8 @@ class Entries:
     """whose observations the reprojection is of"""
     held: HeldOut | None
     """the tracks that are in no problem, to judge all paths by"""
+    up: FloatArray | None
+    """(3,) up in the reference's world, where a run says it"""
     one_world: bool
     """whether reference and estimates are taken to be in the same world: that of a run"""
 
@@ -78,7 +80,8 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)
     if len(entries) == 1:
         raise InputError("estimate: there is nothing to compare; name at least one trajectory besides the reference")
-    return Entries(entries[0], tuple(entries[1:]), problem, held, run is not None)
+    up = None if run is None or run.up is None else np.array(run.up)
+    return Entries(entries[0], tuple(entries[1:]), problem, held, up, run is not None)
 
 
 def _is_folder(given: Given) -> bool:

@@ -99,7 +99,8 @@ def errors(comparison: Comparison) -> Figure:
         _fit(panel, column, series)
     figure.align_ylabels(axes)
     axes[-1].set_xlabel("time, s" if comparison.reference.trajectory.stamped else "frame")
-    nearest = [f"{plain(r.name)} {rmse(r):.3g} m" for r in ranked(comparison)]
+    rivals = [r for r in ranked(comparison) if not r.entry.by_product] or ranked(comparison)
+    nearest = [f"{plain(r.name)} {rmse(r):.3g} m" for r in rivals]
     said = ", ".join(nearest) if sum(map(len, nearest)) < LETTERS else f"nearest {nearest[0]}"
     head(figure, f"Difference from {plain(comparison.reference.name)} (RMSE: {said})", handles)
     return figure

@@ -25,6 +25,8 @@ class RunFolder:
     names: tuple[str, ...]
     """the estimators that gave an answer"""
     settings: dict[str, Any]
+    up: tuple[float, ...] | None
+    """up in the world of its trajectories; None in the summaries of older runs"""
 
     def trajectory(self, name: str) -> Trajectory:
         """The path of an estimator; raises InputError."""
@@ -50,8 +52,10 @@ def read_run_folder(folder: Path) -> RunFolder:
             trust = Trust(Verdict[str(reference["trust"]).upper()], tuple(map(str, reference["reasons"])))
             names = tuple(str(name) for name, e in estimators.items() if e["status"] != "failed")
             settings = dict(summary["settings"])
+            up = summary["sequence"].get("up")
+            up = None if up is None else tuple(map(float, up))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         if reference["name"] not in names:
             raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
-    return RunFolder(folder, str(reference["name"]), trust, names, settings)
+    return RunFolder(folder, str(reference["name"]), trust, names, settings, up)

@@ -54,7 +54,7 @@ class Settings:
     align_first: int | None = None
     """over so many pairs of poses; None for all"""
     up: tuple[float, float, float] | None = None
-    """what points up in the reference's world; None for what `sequence` says, else +z"""
+    """what points up in the reference's world; None for what the run or `sequence` says, else +z"""
     association: str = "nearest"
     tolerance: float | None = None
     """s; None for the association's own"""
