@@ -11,8 +11,9 @@ from .diagnose import Diagnosis
 from .diagnose.axes import Axes
 from .diagnose.diagnosis import explained
 from .diagnose.fit import Fit
+from .diagnose.inflation import Inflation
 from .diagnose.repair import TrackRepairs
-from .diagnose.window import SHARED, Sigmas
+from .diagnose.window import OFFSET, SCALE, SHARED, TURN, Sigmas
 from .repairs import Repairs
 from .track_mask import MaskSettings
 
@@ -63,14 +64,18 @@ def _turned(axes: Axes, name: str | None) -> Axes:
 
 
 def _fit(found: Diagnosis, repairs: Repairs) -> Fit:
-    fit = found.fit or Fit(ASSUMED, np.zeros(SHARED), np.full(SHARED, np.inf), 0, 1.0, ASSUMED.pixel, np.empty((0, 6)))
+    fit = found.fit or Fit(
+        ASSUMED, np.zeros(SHARED), np.full(SHARED, np.inf), 0, Inflation(), ASSUMED, np.empty((0, 6))
+    )
     shared, deviation = fit.shared.copy(), fit.deviation.copy()
     if repairs.gyro_bias is not None:
         shared[:3], deviation[:3] = axes_matrix(found.angular.name) @ repairs.gyro_bias, 0.0
     if repairs.velocity_scale is not None:
-        shared[3], deviation[3] = repairs.velocity_scale - 1.0, 0.0
+        shared[SCALE], deviation[SCALE] = repairs.velocity_scale - 1.0, 0.0
     if repairs.misalignment_deg is not None:
-        shared[4:], deviation[4:] = np.deg2rad(repairs.misalignment_deg), 0.0
+        shared[TURN], deviation[TURN] = np.deg2rad(repairs.misalignment_deg), 0.0
+    if repairs.disparity_offset_px is not None:
+        shared[OFFSET], deviation[OFFSET] = repairs.disparity_offset_px, 0.0
     sigma = repairs.sigma
     sigmas = Sigmas(
         pixel=fit.sigmas.pixel if sigma.pixel is None else sigma.pixel,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fgbaseline.geometry import InputError
 
 from .by_hand import ASSUMED, mask_settings, overridden, told
-from .diagnose import Diagnosis, diagnose, findings_of, repair
+from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair
 from .documented import most_observed
 from .motion import Shift, dead_reckoned_path, increments
 from .problem import Excluded, HuberKernel, Problem
@@ -82,7 +82,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     )
     problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
     return replace(
-        problem,
+        _bridged(problem, diagnosis, noise),
         diagnosed=not found.cannot_tell,
         findings=findings_of(found),
         repairs=(*told(repairs), *repaired.repairs),
@@ -93,6 +93,30 @@ def _origin(found: Diagnosis, repairs: Repairs) -> str:
     by_hand = len(repairs.sigma.model_dump(exclude_none=True))
     rest = "found in the recording" if found.sigmas is not None else "assumed, not estimated from the recording"
     return rest if by_hand == 0 else "set by hand" if by_hand == 3 else f"set by hand in part, the rest {rest}"
+
+
+def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Problem:
+    """With the velocities of neighbours where the cameras are blind for a moment."""
+    sequence, odometry = problem.sequence, diagnosis.odometry
+    blind = blind_intervals(problem.observations(), problem.n_frames)
+    if odometry is None or not blind.any():
+        return problem
+    dt = sequence.dt[:, None]
+    sigma = np.repeat([noise.linear_velocity, noise.angular_velocity], 3)
+    found = bridged(problem.increment / dt, odometry.twist(sequence.dt), blind, sigma)
+    if len(found.blind) == 0:
+        return problem
+    linear, angular = (np.sqrt(np.mean(found.deviation[found.blind, part] ** 2)) for part in (slice(3), slice(3, 6)))
+    remark = (
+        f"over {len(found.blind)} intervals that the cameras do not see, velocities are averaged over neighbours: "
+        f"their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
+    )
+    return replace(
+        problem,
+        increment=found.twist * dt,
+        increment_covariance=(dt * found.deviation)[:, :, None] ** 2 * np.eye(6),
+        remarks=(*problem.remarks, remark),
+    )
 
 
 def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration) -> Problem:

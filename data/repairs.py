@@ -113,6 +113,8 @@ class Repairs(_ByHand):
     """the same in intervals between frames"""
     misalignment_deg: Annotated[Vector, PlainValidator(_vector(180.0, "degrees"))] | None = None
     """rotation vector by which imu_T_cam is turned against the velocities, in its own axes; undone"""
+    disparity_offset_px: Annotated[float, PlainValidator(_between(-100.0, 100.0, 0.0))] | None = None
+    """px by which every recorded uR is too large, and every disparity too small; taken off"""
     sigma: SigmaByHand = SigmaByHand()
     mask: MaskByHand = MaskByHand()
 

@@ -9,7 +9,7 @@ from fgbaseline.geometry import FloatArray
 from .by_hand import ASSUMED
 from .diagnose import Diagnosis, repair
 from .diagnose.axes import Axes
-from .diagnose.repair import sure_bias, sure_misalignment, sure_scale
+from .diagnose.repair import sure_bias, sure_misalignment, sure_offset, sure_scale
 from .track_mask import MaskSettings
 
 
@@ -36,6 +36,8 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     angle, (found, deviation) = sure_misalignment(diagnosis), diagnosis.misalignment
     known = _found(np.rad2deg(angle), np.rad2deg(found), np.rad2deg(deviation))
     yield f"misalignment_deg = {_vector(np.rad2deg(angle))}  # rotation vector of imu_T_cam{known}"
+    offset, uncertain = diagnosis.disparity_offset
+    yield f"disparity_offset_px = {sure_offset(diagnosis):.6g}  # of every uR; found {offset:.3f} +- {uncertain:.3f}"
     yield ""
     yield "[sigma]"
     yield f"linear_velocity = {sigmas.linear:.6g}  # m/s"

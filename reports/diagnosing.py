@@ -99,11 +99,15 @@ def noise(diagnosis: Diagnosis) -> str:
     fit = diagnosis.fit
     assert fit is not None
     sigma = fit.sigmas
-    return (
+    told = (
         f"Noise (one sigma): {sigma.linear:.3f} m/s and {sigma.angular:.4f} rad/s of a velocity held over an interval, "
-        f"{sigma.pixel:.2f} px of a pixel row ({fit.white_pixel:.2f} px from frame to frame, "
-        f"{fit.track_inflation:.1f} times that because the errors of a track last)."
+        f"{sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
     )
+    if fit.inflation.pixel > 1.0:
+        told += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"
+    if fit.inflation.velocity > 1.0:
+        told += f"; velocities {fit.inflation.velocity:.1f} times what single intervals show, because their errors last"
+    return told + ")."
 
 
 def _table(findings: tuple[Finding, ...]) -> None:

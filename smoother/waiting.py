@@ -15,7 +15,7 @@ class EntryRule:
     """When the geometry of a landmark counts as determined."""
 
     min_observations: int = 3
-    max_relative_deviation: float = 0.25
+    max_relative_deviation: float = 0.5
     """of the worst-known direction, as a share of the distance to the camera"""
 
 

@@ -70,7 +70,7 @@ def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: 
     report = strict(result.stdout)
     assert report["schema"] == "fgbaseline/diagnosis/1"
     assert report["findings"] == []
-    assert set(report["sigma"]) >= {"linear_velocity", "angular_velocity", "pixel", "pixel_white", "track_inflation"}
+    assert set(report["sigma"]) >= {"linear_velocity", "angular_velocity", "pixel", "pixel_white", "pixel_inflation"}
     assert len(report["wrong_matches"]) == report["sequence"]["frames"]
     assert report["wrong_matches"][0] is None
     assert "wrong_matches" in report["notes"]

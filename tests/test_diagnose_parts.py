@@ -17,6 +17,7 @@ from fgbaseline.data.diagnose.regression import regress
 from fgbaseline.data.diagnose.timing import timing
 from fgbaseline.data.diagnose.window import (
     HUBER,
+    OFFSET,
     SHARED,
     SHARED_PRIOR,
     Sigmas,
@@ -67,16 +68,16 @@ def moved(poses: FloatArray, k: int, axis: int, step: float) -> FloatArray:
 def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -> None:
     scene, data, poses, points = window()
     sequence, h = scene.sequence(), 1e-6
-    shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015])
+    shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
     cam_T_imu = se3.inverse(sequence.imu_T_cam)
     _, before, after, by_shared = _motion_terms(data, poses, SIGMAS, shared)
-    _, by_pose, by_point, _ = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, 0.5)
+    _, by_pose, by_point, _ = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, 0.5, 0.3)
 
     def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
         return _motion_terms(data, p, SIGMAS, s)[0]
 
     def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
-        return _pixel_terms(sequence.camera, cam_T_imu, data, p, x, 0.5)[0]
+        return _pixel_terms(sequence.camera, cam_T_imu, data, p, x, 0.5, 0.3)[0]
 
     k = 3
     for axis in range(6):
@@ -107,7 +108,7 @@ def test_a_window_ends_where_scipy_ends() -> None:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
         shared = fit.shared + x[-SHARED:]
-        r = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, SIGMAS.pixel)[0]
+        r = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, SIGMAS.pixel, float(shared[OFFSET]))[0]
         norm = np.linalg.norm(r, axis=1)
         beyond = np.maximum(norm, HUBER)  # the squared norm becomes Huber's cost
         r = r * np.sqrt(2.0 * HUBER * beyond - HUBER**2)[:, None] / beyond[:, None]

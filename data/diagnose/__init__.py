@@ -1,5 +1,6 @@
 """What is wrong with a recording, found from the recording alone, and its repair."""
 
+from .bridge import blind_intervals, bridged
 from .diagnosis import Diagnosis, diagnose
 from .findings import findings_of, not_identifiable
 from .repair import Repaired, repair
@@ -12,6 +13,8 @@ __all__ = [
     "Finding",
     "Repaired",
     "Tracks",
+    "blind_intervals",
+    "bridged",
     "diagnose",
     "findings_of",
     "not_identifiable",

@@ -12,11 +12,12 @@ from ..motion import Shift, held_twist
 from ..observations import BoolArray
 from ..sequence import Sequence
 from .axes import Axes, angular_axes, linear_axes
-from .fit import Fit, fit_windows
+from .fit import Fit, fit_windows, half_cost
 from .links import repeated
 from .odometry import Odometry, odometry
 from .timing import Timing, timing
-from .window import Sigmas
+from .whole_shift import whole_shift
+from .window import OFFSET, TURN, Sigmas
 
 MIN_INTERVALS = 20
 """of which the cameras must tell the motion"""
@@ -65,7 +66,14 @@ class Diagnosis:
         """(3,) rad, the rotation vector by which imu_T_cam is off, in its own axes, and its standard errors."""
         if self.fit is None:
             return np.zeros(3), np.full(3, np.inf)
-        return self.fit.shared[4:], self.fit.deviation[4:]
+        return self.fit.shared[TURN], self.fit.deviation[TURN]
+
+    @property
+    def disparity_offset(self) -> tuple[float, float]:
+        """px by which every recorded disparity is too small, and its standard error."""
+        return (
+            (0.0, np.inf) if self.fit is None else (float(self.fit.shared[OFFSET]), float(self.fit.deviation[OFFSET]))
+        )
 
     @property
     def sigmas(self) -> Sigmas | None:
@@ -110,9 +118,20 @@ def explained(
     seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
     dt = float(np.median(sequence.dt))
     when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)
+
+    def twist(shift: float) -> FloatArray:
+        return turned(held_twist(sequence, shift), linear.name, angular.name)
+
+    fit = None
+    if not when.identifiable and given_shift is None:
+        fit = fit_windows(sequence, seen_by_cameras, twist(Shift.AFTER))
+        white = None if fit is None else fit.white
+        if white is not None:
+            when = whole_shift(lambda shift: half_cost(sequence, seen_by_cameras, twist(shift), white), dt) or when
     found = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
     shift = found if given_shift is None else given_shift
-    fit = fit_windows(sequence, seen_by_cameras, turned(held_twist(sequence, shift), linear.name, angular.name))
+    if fit is None or shift != Shift.AFTER:
+        fit = fit_windows(sequence, seen_by_cameras, twist(shift))
     reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
     return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
 

@@ -10,7 +10,7 @@ from ..axes import IDENTITY, axes_matrix
 from ..motion import Shift, held_twist
 from .axes import Axes
 from .diagnosis import Diagnosis, turned
-from .repair import SURE, sure_bias, sure_misalignment
+from .repair import SURE, sure_bias, sure_misalignment, sure_offset
 from .track_findings import track_findings
 from .tracks import Tracks, track_state
 from .wording import Finding, listed, vector
@@ -36,6 +36,7 @@ def findings_of(diagnosis: Diagnosis, tracks: Tracks | None = None) -> tuple[Fin
             _time_offset,
             _velocity_scale,
             _extrinsic,
+            _disparity_offset,
         )
         told = [finding for part in parts if (finding := part(diagnosis)) is not None]
     return (*told, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_state(diagnosis)))
@@ -164,6 +165,22 @@ def _extrinsic(diagnosis: Diagnosis) -> Finding | None:
         0.0,
         "°",
         f"standard errors {vector(np.rad2deg(diagnosis.misalignment[1]), 2)}°",
+    )
+
+
+def _disparity_offset(diagnosis: Diagnosis) -> Finding | None:
+    offset, deviation = sure_offset(diagnosis), diagnosis.disparity_offset[1]
+    if not offset:
+        return None
+    small = "small" if offset > 0 else "large"
+    return Finding(
+        "disparity_offset",
+        f"Disparities are {abs(offset):.2f} px too {small}: with uR moved by {-offset:+.2f} px, near and far points "
+        "agree on one motion, as they do not as recorded.",
+        abs(offset),
+        0.0,
+        "px",
+        f"standard error {deviation:.2f} px",
     )
 
 

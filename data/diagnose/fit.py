@@ -1,6 +1,6 @@
 """Noise, bias and calibration errors from bundle adjustments of many short windows."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,24 +9,22 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..observations import IntArray
 from ..sequence import Sequence
+from .inflation import Inflation, inflation_of
 from .links import three_rows
 from .odometry import Odometry
 from .window import SHARED, SHARED_PRIOR, Sigmas, WindowData, WindowFit, fit_window
 
 FRAMES = 25
 """of a window: longer than most tracks"""
-MAX_WINDOWS = 24
+MAX_WINDOWS = 48
+MAX_UNBROKEN = 24
+"""windows without gaps, the longest ones"""
 MIN_TRACK = 3
 MIN_OBSERVATIONS = 60
-ROUNDS = 5
+ROUNDS = 6
 START = Sigmas(pixel=1.0, linear=0.2, angular=0.02)
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
-CHI_SQUARE_6_MEDIAN = 5.3481
-LOOSE = 30.0
-"""times the velocity noise, with which each half of the tracks is fitted: the cameras decide"""
-MIN_HALF = 8
-"""landmarks"""
 MIN_REDUNDANCY = 0.05
 """of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
 its residual is no evidence of noise"""
@@ -39,16 +37,15 @@ class Fit:
     """What the windows agree on."""
 
     sigmas: Sigmas
+    """the noise that a filter may believe"""
     shared: FloatArray
-    """(7,) see `window.SHARED`"""
+    """(8,) see `window.SHARED`"""
     deviation: FloatArray
-    """(7,) standard errors, from the spread between windows where that is larger than what each claims"""
+    """(8,) standard errors, from the spread between windows where that is larger than what each claims"""
     windows: int
-    track_inflation: float
-    """by how much the motions that two halves of the tracks tell differ, over what `white_pixel` lets them; the errors
-    of a track last, so that averaging over it helps less than for white noise"""
-    white_pixel: float
-    """px, of the pixel residuals within a window; `sigmas.pixel` is this times the inflation"""
+    inflation: Inflation
+    white: Sigmas
+    """the noise as it seems within a window: `sigmas` without what lasts"""
     motion: FloatArray
     """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
     unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
@@ -83,7 +80,7 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
         fits = [
-            fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, common, iterations=2)
+            fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, common, iterations=1)
             for (data, poses, points), common in zip(windows, shared, strict=True)
         ]
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
@@ -91,12 +88,25 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
         sigmas = _components(fits, sigmas)
     shared_mean, deviation = _agreed(fits)
     unbroken = _windows(sequence, odometry, twist, _unbroken(odometry))
-    inflation = _track_inflation(sequence, unbroken, shared_mean, sigmas)
-    effective = replace(sigmas, pixel=sigmas.pixel * inflation)
+    inflation = inflation_of(sequence, unbroken, shared_mean, sigmas)
+    believed = Sigmas(
+        sigmas.pixel * inflation.pixel, sigmas.linear * inflation.velocity, sigmas.angular * inflation.velocity
+    )
     residual = np.concatenate([fit.motion_residual for fit in fits]) / np.repeat([sigmas.linear, sigmas.angular], 3)
     redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
     motion = np.where(redundancy > MIN_REDUNDANCY, residual / np.sqrt(np.maximum(redundancy, MIN_REDUNDANCY)), np.nan)
-    return Fit(effective, shared_mean, deviation, len(fits), inflation, sigmas.pixel, motion)
+    return Fit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
+
+
+def half_cost(sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas: Sigmas) -> float:
+    """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
+    whiten = np.repeat([sigmas.linear, sigmas.angular], 3)
+    total = 0.0
+    for data, poses, points in _windows(sequence, odometry, twist, _spread(sequence.n_frames)):
+        start = np.zeros(SHARED)
+        fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, start, iterations=5)
+        total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
+    return total
 
 
 Span = tuple[int, int]
@@ -118,7 +128,7 @@ def _unbroken(odometry: Odometry) -> list[Span]:
         for first in range(int(start), int(end) - MIN_UNBROKEN + 1, FRAMES):
             spans.append((first, min(FRAMES, int(end) - first + 1)))
     spans.sort(key=lambda span: -span[1])
-    return spans[:MAX_WINDOWS]
+    return spans[:MAX_UNBROKEN]
 
 
 def _windows(
@@ -163,31 +173,8 @@ def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
     )
 
 
-def _track_inflation(
-    sequence: Sequence, windows: list[tuple[WindowData, FloatArray, FloatArray]], shared: FloatArray, sigmas: Sigmas
-) -> float:
-    """At least 1: see `Fit.track_inflation`. By the motion over a whole window from even and from odd landmarks."""
-    loose = Sigmas(sigmas.pixel, LOOSE * sigmas.linear, LOOSE * sigmas.angular)
-    ratios = []
-    for data, poses, points in windows:
-        if len(points) < 2 * MIN_HALF:
-            continue
-        halves = []
-        for parity in (0, 1):
-            chosen = data.row % 2 == parity
-            half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
-            subset = points[parity::2]
-            halves.append(fit_window(sequence.camera, sequence.imu_T_cam, half, poses, subset, loose, shared, 4))
-        difference = se3.log(se3.inverse(halves[0].poses[-1]) @ halves[1].poses[-1])
-        covariance = halves[0].last_covariance + halves[1].last_covariance
-        ratios.append(float(difference @ np.linalg.solve(covariance, difference)))
-    if len(ratios) < 3:
-        return 1.0
-    return float(np.sqrt(max(1.0, float(np.median(ratios)) / CHI_SQUARE_6_MEDIAN)))
-
-
 def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
-    """The information-weighted mean (7,) of the shared parameters, windows far off left out, and its deviation."""
+    """The information-weighted mean (8,) of the shared parameters, windows far off left out, and its deviation."""
     information = np.array([fit.shared_information for fit in fits])
     values = np.array([fit.shared for fit in fits])
     centre = np.median(values, axis=0)

@@ -14,12 +14,16 @@ from ..sequence import Sequence, Truth
 from ..track_mask import MaskSettings, SplitTracks, TrackLinks, split_tracks
 from .diagnosis import Diagnosis, turned
 from .links import consecutive, sound
+from .odometry import Odometry, odometry
+from .points import judged
 
 SURE = 4.0
 """standard errors, from which on a figure counts as found"""
 MIN_BIAS = 0.002
 """rad/s"""
 MIN_MISALIGNMENT = np.deg2rad(0.25)
+MIN_OFFSET = 0.05
+"""px"""
 GATE_RANGE = (3.0, 12.0)
 """px"""
 GATE = 6.0
@@ -71,8 +75,17 @@ def sure_scale(diagnosis: Diagnosis) -> float:
     return diagnosis.velocity_scale[0] if "velocity_scale" in diagnosis.by_hand else 1.0
 
 
+def sure_offset(diagnosis: Diagnosis) -> float:
+    """px; zero where the disparity offset is too small or too uncertain."""
+    offset, deviation = diagnosis.disparity_offset
+    if "disparity_offset_px" in diagnosis.by_hand:
+        return offset
+    return offset if abs(offset) > max(MIN_OFFSET, SURE * deviation) else 0.0
+
+
 def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None = None) -> Repaired:
-    """Velocities in the axes of imu_T_cam without their bias, the extrinsic turned, broken tracks split."""
+    """Velocities in the axes of imu_T_cam without their bias, the extrinsic turned, disparities without their offset,
+    broken tracks split."""
     sequence, done = diagnosis.sequence, []
     linear, angular = diagnosis.linear, diagnosis.angular
     bias, angle = sure_bias(diagnosis), sure_misalignment(diagnosis)
@@ -91,15 +104,22 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     if angle.any():
         imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
         done.append(f"imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities")
+    offset = sure_offset(diagnosis)
+    if offset:
+        sequence = _without_offset(sequence, offset)
+        done.append(f"{offset:+.2f} px taken off every uR, so that disparities agree with the motion")
     if diagnosis.shift != 0.0:
         done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
-    path = _path(diagnosis)
+    path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)
     split, gate = _split(sequence, path, mask, tracks)
     observations, excluded = _renumbered(sequence, split)
     pieces = split.n_landmarks - sequence.n_landmarks
     n_landmarks = sequence.n_landmarks + pieces
     if pieces:
         done.append(f"{pieces} tracks that jump to another point split off as landmarks of their own")
+    tracked = replace(sequence, observations=observations, n_landmarks=n_landmarks, truth=None)
+    sigma = GATE_RANGE[0] if diagnosis.sigmas is None else diagnosis.sigmas.pixel
+    excluded = judged(tracked, path, excluded, sigma)
     repaired = replace(
         sequence,
         linear_velocity=velocity,
@@ -112,15 +132,20 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     return Repaired(repaired, excluded, gate, tuple(done))
 
 
-def _path(diagnosis: Diagnosis) -> FloatArray:
+def _without_offset(sequence: Sequence, offset: float) -> Sequence:
+    o = sequence.observations
+    return replace(sequence, observations=replace(o, pixel=o.pixel - [0.0, 0.0, offset, 0.0]))
+
+
+def _path(diagnosis: Diagnosis, seen_by_cameras: Odometry | None) -> FloatArray:
     """(T, 4, 4) a path that is right locally, which is all it is for: what the cameras see, and between two intervals
     that they see what lies in their middle; elsewhere the velocities."""
-    sequence, odometry = diagnosis.sequence, diagnosis.odometry
+    sequence = diagnosis.sequence
     twist = turned(held_twist(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
     twist[:, :3] /= sure_scale(diagnosis)
     twist[:, 3:] -= diagnosis.angular.matrix @ sure_bias(diagnosis)
-    if odometry is not None:
-        seen, known = odometry.twist(sequence.dt), odometry.known
+    if seen_by_cameras is not None:
+        seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
         twist[known] = seen[known]
         between = np.flatnonzero(~known[1:-1] & known[:-2] & known[2:]) + 1
         twist[between] = 0.5 * (seen[between - 1] + seen[between + 1])

@@ -77,6 +77,8 @@ def _velocities(diagnosis: Diagnosis) -> dict[str, Any]:
         "interval": {"shift": diagnosis.shift, "name": _interval_name(diagnosis.shift)},
         "misalignment_deg": _if(told, np.rad2deg(angle)),
         "misalignment_std_deg": _if(told, np.rad2deg(angle_deviation)),
+        "disparity_offset_px": diagnosis.disparity_offset[0] if told else np.nan,
+        "disparity_offset_std_px": diagnosis.disparity_offset[1],
     }
 
 
@@ -100,8 +102,10 @@ def _noise(diagnosis: Diagnosis) -> dict[str, Any]:
         "linear_velocity": np.nan if fit is None else fit.sigmas.linear,
         "angular_velocity": np.nan if fit is None else fit.sigmas.angular,
         "pixel": np.nan if fit is None else fit.sigmas.pixel,
-        "pixel_white": np.nan if fit is None else fit.white_pixel,
-        "track_inflation": np.nan if fit is None else fit.track_inflation,
+        "pixel_white": np.nan if fit is None else fit.white.pixel,
+        "pixel_inflation": np.nan if fit is None else fit.inflation.pixel,
+        "pixel_inflation_of_single_tracks": np.nan if fit is None else fit.inflation.halves,
+        "velocity_inflation": np.nan if fit is None else fit.inflation.velocity,
         "windows": 0 if fit is None else fit.windows,
     }
     return {"sigma": sigma}
