@@ -103,7 +103,9 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     imu_T_cam = sequence.imu_T_cam.copy()
     if angle.any():
         imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
-        done.append(f"imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities")
+        done.append(
+            f"extrinsic imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities"
+        )
     offset = sure_offset(diagnosis)
     if offset:
         sequence = _without_offset(sequence, offset)
