@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from fgbaseline.compare import Trust
-from fgbaseline.data import HeldOut, Landmarks, Problem, Reading, Trajectory, read, read_problem
+from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.formats import read_kitti, read_landmarks, read_pose_covariances, read_times, read_trajectory
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from .. import job
+from .posing import posed
 from .run_folder import RunFolder, read_run_folder
 from .settings import Body, Settings
 
@@ -63,7 +63,7 @@ class Entries:
 def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
     """Reads all of it. Raises InputError, naming the file, for whatever is wrong."""
     run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
-    problem, held = _problem(settings, run)
+    problem, held = posed(settings, run)
     times = _times(settings, problem)
     imu_T_cam = _extrinsic(settings, problem)
     if run is None:
@@ -112,54 +112,6 @@ def _split(given: str) -> tuple[str | None, str]:
     if not name or not file:
         raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
     return name, file
-
-
-def _problem(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, HeldOut | None]:
-    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated.
-
-    With it the tracks that were held out of it.
-    """
-    sequence = settings.sequence
-    if settings.held_out and (sequence is None or sequence.is_dir()):
-        raise InputError(
-            "held-out: the tracks are kept from a recording; give it with --sequence, not an exported folder"
-        )
-    if sequence is None:
-        return None, None
-    if sequence.is_dir():
-        return read_problem(sequence), None
-    recorded = read(sequence)
-    if run is None:
-        posed = job.RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
-    else:
-        posed = _of_run(sequence, run)
-        if settings.held_out not in (0.0, posed.held_out):
-            raise InputError(
-                f"held-out: {run.folder} was run with {posed.held_out:g}; leave --held-out out, or run it again"
-            )
-    kept, held = job.split(recorded, posed)
-    return job.pose_problem(kept, posed), held
-
-
-def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
-    """What decides the problem of a run, from its summary. Raises InputError where that is not the one of ours."""
-    known = run.settings
-    try:
-        return job.RunSettings(
-            sequence=sequence,
-            preset=known["preset"],
-            features="all" if known["features"] == "all" else int(known["features"]),
-            landmarks=Reading(known["landmarks"]),
-            as_recorded=bool(known["as_recorded"]),
-            held_out=float(known["held_out"]),
-            seed=int(known["seed"]),
-            repairs=None if known["repairs"] is None else Path(known["repairs"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{run.folder}: its summary does not say how its problem was posed ({type(error).__name__}: {error}); "
-            "give --sequence the folder of fgbaseline export"
-        ) from error
 
 
 def _times(settings: Settings, problem: Problem | None) -> FloatArray | None:

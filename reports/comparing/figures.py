@@ -14,13 +14,13 @@ from fgbaseline.geometry import FloatArray
 from ..figures.drawing import lay_out
 from ..figures.frames import fit_log_or_linear
 from ..figures.lettering import plain
-from ..figures.palette import colours_of
-from ..figures.reprojections import GRID, share_within
 from ..figures.style import WIDTH, head, in_style, sheet, swatch
 from ..figures.view import TopView
 from ..figures.window import Window, common_window
 from .comparison import Comparison, Result
-from .pixels import Pixels
+from .lines import colours, line
+from .motion_figures import relative, segments
+from .pixel_figure import reprojection
 from .wording import ranked, rmse
 
 TITLES = {
@@ -41,7 +41,6 @@ ALIGNED = {
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
 }
-THIN: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
 
 
 def draw(comparison: Comparison) -> dict[str, Figure]:
@@ -69,12 +68,12 @@ def paths(comparison: Comparison) -> Figure:
     width, height = box.high - box.low
     figure = Figure(figsize=(WIDTH, (WIDTH - 0.7) * height / width + 1.4))
     axes = figure.subplots()
-    colours = _colours(comparison)
-    handles = axes.plot(*reference.T, **_line(comparison, comparison.reference.name))
-    axes.plot(*reference[-1:].T, "s", color=colours[comparison.reference.name], markersize=5)
+    colour = colours(comparison)
+    handles = axes.plot(*reference.T, **line(comparison, comparison.reference.name))
+    axes.plot(*reference[-1:].T, "s", color=colour[comparison.reference.name], markersize=5)
     for name, path in every.items():
-        handles += axes.plot(*path.T, **_line(comparison, name))
-        axes.plot(*path[-1:].T, "s", color=colours[name], markersize=5, zorder=4)
+        handles += axes.plot(*path.T, **line(comparison, name))
+        axes.plot(*path[-1:].T, "s", color=colour[name], markersize=5, zorder=4)
     white: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "markersize": 8, "zorder": 5}
     handles += axes.plot(*reference[:1].T, "o", label="start of the reference", **white)
     handles.append(swatch("#555555", "end"))
@@ -94,7 +93,7 @@ def errors(comparison: Comparison) -> Figure:
     for panel, (column, title) in zip(axes, TITLES.items(), strict=True):
         series = {n: r.departure[column].to_numpy(dtype=np.float64) for n, r in comparison.results.items()}
         for name, values in series.items():
-            handles += panel.plot(_seconds(comparison, comparison.results[name]), values, **_line(comparison, name))
+            handles += panel.plot(_seconds(comparison, comparison.results[name]), values, **line(comparison, name))
         panel.set_ylabel(title)
         _fit(panel, column, series)
     figure.align_ylabels(axes)
@@ -116,118 +115,13 @@ def growth(comparison: Comparison) -> Figure:
         series = {n: r.departure[column].to_numpy(dtype=np.float64) for n, r in comparison.results.items()}
         for name, values in series.items():
             travelled = comparison.results[name].departure["travelled"]
-            handles += panel.plot(travelled, values, **_line(comparison, name))
+            handles += panel.plot(travelled, values, **line(comparison, name))
         panel.set_ylabel(title)
         _fit(panel, column, series)
     figure.align_ylabels(axes)
     axes[-1].set_xlabel("length of the reference's path so far, m")
     head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure
-
-
-def relative(comparison: Comparison) -> Figure | None:
-    """Errors of the motion over each delta, as boxes."""
-    deltas = [d for d in comparison.deltas if any(d in r.relative for r in comparison.results.values())]
-    if not deltas:
-        return None
-    names = list(comparison.results)
-    figure = Figure(figsize=(WIDTH, 0.9 + len(deltas) * (0.75 + 0.27 * len(names))))
-    panels = figure.subplots(len(deltas), 2, squeeze=False, sharey=True)
-    for row, delta in zip(panels, deltas, strict=True):
-        for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            _boxes(comparison, panel, delta, column)
-            panel.set_xlabel(f"over {delta}: {'translation' if unit == 'm' else 'rotation'}, {unit}")
-            panel.set_xlim(left=0.0)
-    pairs = "all pairs" if comparison.settings.all_pairs else "consecutive pairs"
-    head(figure, f"Errors of the motion between {pairs} of poses")
-    return figure
-
-
-def _boxes(comparison: Comparison, panel: Axes, delta: str, column: str) -> None:
-    colours = _colours(comparison)
-    for i, (name, result) in enumerate(comparison.results.items()):
-        if delta in result.relative:
-            panel.boxplot(
-                [result.relative[delta][column].dropna().to_numpy()],
-                positions=[i],
-                orientation="horizontal",
-                widths=0.55,
-                whis=(5, 95),
-                showfliers=False,
-                patch_artist=True,
-                boxprops={"facecolor": colours[name], "alpha": 0.45, "edgecolor": colours[name]},
-                medianprops={"color": "#222222", "linewidth": 1.6},
-                whiskerprops={"color": colours[name]},
-                capprops={"color": colours[name]},
-            )
-    panel.set_yticks(range(len(comparison.results)), [plain(name) for name in comparison.results])
-    panel.set_ylim(len(comparison.results) - 0.5, -0.5)
-    panel.grid(axis="y", visible=False)
-
-
-def segments(comparison: Comparison) -> Figure | None:
-    """KITTI's segment errors by the length of the segments."""
-    known = {n: r.segments for n, r in comparison.results.items() if r.segments is not None}
-    if not known:
-        return None
-    figure = Figure(figsize=(WIDTH, 3.4))
-    left, right = figure.subplots(1, 2)
-    handles: list[Line2D] = []
-    for name, found in known.items():
-        table = found.by_length
-        style = {**_line(comparison, name), "marker": "o", "markersize": 4}
-        handles += left.plot(table.index, table["translation_percent"], **style)
-        right.plot(table.index, table["rotation_deg_per_m"], **style)
-    for panel, title in ((left, "translation, %"), (right, "rotation, °/m")):
-        panel.set_ylabel(title)
-        panel.set_xlabel("length of the segments, m")
-        panel.set_ylim(bottom=0.0)
-    official = all(found.official for found in known.values())
-    which = "KITTI's lengths" if official else "lengths fitted to the path, not KITTI's"
-    head(figure, f"Segment errors ({which})", handles)
-    return figure
-
-
-def reprojection(comparison: Comparison) -> Figure | None:
-    """The share of the observations that each path explains to within so many pixels."""
-    every: dict[str, Pixels | None] = {comparison.reference.name: comparison.reference_pixels}
-    every |= {name: result.pixels for name, result in comparison.results.items()}
-    known = {name: p for name, p in every.items() if p is not None and p.along is not None and len(p.along)}
-    if not known:
-        return None
-    figure, (axes,) = sheet(4.2)
-    handles: list[Line2D] = []
-    for name, pixels in known.items():
-        assert pixels.along is not None
-        style = _line(comparison, name)
-        handles += axes.plot(GRID, 100.0 * share_within(pixels.along["error"], GRID), **style)
-        if pixels.own is not None and len(pixels.own):
-            axes.plot(GRID, 100.0 * share_within(pixels.own["error"], GRID), **{**style, **THIN, "label": None})
-    axes.set_xscale("log")
-    last = max(float(np.nanpercentile(p.along["error"], 99)) for p in known.values() if p.along is not None)
-    axes.set_xlim(GRID[0], float(np.clip(last, 30.0, GRID[-1])))
-    axes.set_ylim(0.0, 101.0)
-    axes.set_xlabel("reprojection error, px (norm of the four differences)")
-    axes.set_ylabel("share of observations, %")
-    handles += axes.plot([], [], color="#555555", label="triangulated along the path")
-    if any(p.own is not None for p in known.values()):
-        handles += axes.plot([], [], color="#555555", label="its own landmarks", **THIN)
-    head(figure, "Share of the observations explained to within so many pixels", handles)
-    return figure
-
-
-def _colours(comparison: Comparison) -> dict[str, str]:
-    return colours_of([comparison.reference.name, *comparison.results], comparison.reference.name)
-
-
-def _line(comparison: Comparison, name: str) -> dict[str, Any]:
-    is_reference = name == comparison.reference.name
-    return {
-        "color": _colours(comparison)[name],
-        "linewidth": 2.6 if is_reference else 1.3,
-        "zorder": 2.0 if is_reference else 2.5,
-        "label": plain(name) + (" (reference)" if is_reference else ""),
-    }
 
 
 def _seconds(comparison: Comparison, result: Result) -> FloatArray:

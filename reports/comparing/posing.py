@@ -1,0 +1,58 @@
+"""The problem behind a comparison: exported, as a run posed it, or as `fgbaseline export` poses it by default."""
+
+from pathlib import Path
+
+from fgbaseline.data import HeldOut, Problem, Reading, read, read_problem
+from fgbaseline.geometry import InputError
+
+from .. import job
+from .run_folder import RunFolder
+from .settings import Settings
+
+
+def posed(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, HeldOut | None]:
+    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated.
+
+    With it the tracks that were held out of it. Raises InputError.
+    """
+    sequence = settings.sequence
+    if settings.held_out and (sequence is None or sequence.is_dir()):
+        raise InputError(
+            "held-out: the tracks are kept from a recording; give it with --sequence, not an exported folder"
+        )
+    if sequence is None:
+        return None, None
+    if sequence.is_dir():
+        return read_problem(sequence), None
+    recorded = read(sequence)
+    if run is None:
+        wanted = job.RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
+    else:
+        wanted = _of_run(sequence, run)
+        if settings.held_out not in (0.0, wanted.held_out):
+            raise InputError(
+                f"held-out: {run.folder} was run with {wanted.held_out:g}; leave --held-out out, or run it again"
+            )
+    kept, held = job.split(recorded, wanted)
+    return job.pose_problem(kept, wanted), held
+
+
+def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
+    """What decides the problem of a run, from its summary. Raises InputError where that is not the one of ours."""
+    known = run.settings
+    try:
+        return job.RunSettings(
+            sequence=sequence,
+            preset=known["preset"],
+            features="all" if known["features"] == "all" else int(known["features"]),
+            landmarks=Reading(known["landmarks"]),
+            as_recorded=bool(known["as_recorded"]),
+            held_out=float(known["held_out"]),
+            seed=int(known["seed"]),
+            repairs=None if known["repairs"] is None else Path(known["repairs"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{run.folder}: its summary does not say how its problem was posed ({type(error).__name__}: {error}); "
+            "give --sequence the folder of fgbaseline export"
+        ) from error
