@@ -16,9 +16,9 @@ from fgbaseline.data import Trajectory
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparing.paper import latex, markdown
 from fgbaseline.reports.comparing.schema import json_schema
 from fgbaseline.reports.comparing.summary import summarise
-from fgbaseline.reports.comparing.tables import latex, markdown
 
 from .synthetic import drive, matched
 

@@ -12,9 +12,10 @@ from ..whole_folder import whole_folder
 from .comparison import Comparison, Result
 from .figures import draw
 from .page import render
+from .paper import latex, markdown
 from .settings import MARK
 from .summary import summarise
-from .tables import latex, main_table, markdown, metrics_table
+from .tables import main_table, metrics_table
 
 
 def write(comparison: Comparison, place: Path, *, force: bool) -> Path:

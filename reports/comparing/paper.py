@@ -1,0 +1,64 @@
+"""The main table as text for papers and pages: Markdown and LaTeX."""
+
+import re
+from itertools import groupby
+
+from .comparison import Comparison
+from .tables import text_table
+
+
+def markdown(comparison: Comparison) -> str:
+    """The table in Markdown, its caption below."""
+    names, lines = text_table(comparison)
+    rows = [["", *names], ["---", *["---:"] * len(names)], *([line.title, *line.cells] for line in lines)]
+    table = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in rows]
+    return "\n".join([*table, "", comparison.caption, ""])
+
+
+def latex(comparison: Comparison) -> str:
+    """The table in LaTeX (booktabs), its caption with it; the best of a line in bold."""
+    names, lines = text_table(comparison)
+    body: list[str] = []
+    for group, same in groupby(lines, key=lambda line: line.group):
+        body += [r"\midrule", rf"\multicolumn{{{len(names) + 1}}}{{l}}{{\emph{{{_tex(group)}}}}} \\"]
+        for line in same:
+            cells = [
+                rf"\textbf{{{_tex(cell)}}}" if best else _tex(cell)
+                for cell, best in zip(line.cells, line.best, strict=True)
+            ]
+            body.append(" & ".join([rf"\quad {_tex(line.heading)}", *cells]) + r" \\")
+    return "\n".join(
+        [
+            r"% needs \usepackage{booktabs}",
+            r"\begin{table}",
+            r"\centering",
+            rf"\caption{{{_tex(comparison.caption)}}}",
+            rf"\begin{{tabular}}{{l{'r' * len(names)}}}",
+            r"\toprule",
+            " & ".join(["", *map(_tex, names)]) + r" \\",
+            *body,
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+_TEX = {
+    "\\": r"\textbackslash{}",
+    **{c: "\\" + c for c in "&%$#_{}"},
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "°": r"$^\circ$",
+    "×": r"$\times$",
+    "–": "--",
+    "\N{MINUS SIGN}": "$-$",
+    "\N{NARROW NO-BREAK SPACE}": r"\,",
+}
+_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def _tex(text: str) -> str:
+    escaped = "".join(_TEX.get(c, c) for c in text)
+    return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda found: f"$^{{{found[0].translate(_RAISED)}}}$", escaped)
