@@ -47,3 +47,19 @@ def colours_of(names: Iterable[str], reference: str | None) -> dict[str, str]:
         else:
             chosen[name] = taken[name] if name in taken else next(rest)
     return chosen
+
+
+ON_DARK: Mapping[str, str] = {
+    REFERENCE: "#FFFFFF",
+    TRUTH: "#A8A8A8",
+    "#0072B2": "#2E96D3",
+    "#882255": "#C2457F",
+    "#661100": "#B5533C",
+    "#332288": "#8273D9",
+}
+"""the colours that dark ground would swallow: the same hue, lighter"""
+
+
+def on_dark(colour: str) -> str:
+    """The colour that stands for `colour` where the ground is dark."""
+    return ON_DARK.get(colour, colour)

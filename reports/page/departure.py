@@ -58,3 +58,11 @@ def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | No
     wrong = np.isin(problem.excluded, WRONG)
     there = frames[problem.sequence.observations.frame]
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
+
+
+def wrong_seconds(problem: Problem) -> list[float] | None:
+    """`wrong_share` of each whole second, 0 where there is no match; None without a mask or a match."""
+    if wrong_share(problem, np.ones(problem.n_frames, dtype=np.bool_)) is None:
+        return None
+    second = (problem.sequence.t - problem.sequence.t[0]).astype(np.int64)
+    return [wrong_share(problem, second == s) or 0.0 for s in range(int(second[-1]) + 1)]

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping
 from importlib.resources import files
+from itertools import groupby
 from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -11,17 +12,23 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data import Event
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures import colours
 
+from .charts import TRUTH_LINE
+from .colouring import colour_rules, keys
 from .diagnosis import findings
 from .embedding import picture
 from .evidence import EVIDENCE, evidence_table, folded_tables
 from .numbers import number, per_cent
+from .packing import embedded_json
+from .payload import payload
+from .scripting import policy, script
 from .table import main_table
 from .verdict import verdict
 
 FIRST_SENTENCES = 3
 """of the verdict that stand above the table"""
+BESIDE_CHARTS = ("reprojection_over_time", "reprojection_distribution")
+"""figures that stand beside the interactive charts, as they tell what these do not"""
 MOST_EVENTS = 200
 """of an estimator that are listed one by one"""
 REASONS: Mapping[str, str] = {
@@ -43,11 +50,23 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
     that comes from files is escaped.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
+    data = payload(run)
+    numbered = list(enumerate(data["charts"]))
     return (
         environment()
         .get_template("report.html")
         .render(
-            css=Markup(_text("report.css")),
+            css=Markup(_text("report.css") + _text("explore.css")),
+            colour_rules=colour_rules(run),
+            script=script(),
+            policy=policy(),
+            data=embedded_json(data),
+            groups=[(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
+            jumps=data["jumps"],
+            frames_seen=data["observations"] is not None,
+            keys=keys(run),
+            shown=_shown(run),
+            truth_line=TRUTH_LINE,
             run=run,
             summary=summary,
             sequence=summary.get("sequence", {}),
@@ -59,17 +78,21 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) 
             trust=run.trust.verdict.name.lower(),
             table=main_table(run, summary.get("estimators", {})),
             pictures=pictures,
-            paths=[p for name, p in pictures.items() if name.startswith("path_")],
-            over_time=[p for name, p in pictures.items() if not name.startswith(("path", *EVIDENCE))],
+            stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE, *BESIDE_CHARTS))],
             evidence=evidence_table(run, summary.get("estimators", {})),
             folded=folded_tables(run),
             bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
-            colours=colours(run),
             components=_components(summary),
             excluded=_excluded(summary),
             events=_events(run),
         )
     )
+
+
+def _shown(run: Run) -> list[tuple[str, str]]:
+    """Key and name of everybody that can be switched on and off."""
+    answered = [(keys(run)[result.name], result.name) for result in run.answered]
+    return answered if run.problem.sequence.truth is None else [*answered, (TRUTH_LINE, "truth")]
 
 
 def environment() -> Environment:

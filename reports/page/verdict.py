@@ -10,7 +10,7 @@ from fgbaseline.data import Status
 from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
-from .departure import AROUND, departure, far, path_length, wrong_share
+from .departure import AROUND, departure, far, path_length, wrong_seconds, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
 from .numbers import listed, number, per_cent
 
@@ -179,13 +179,10 @@ def _common_observations(run: Run) -> list[str]:
 
 
 def _mask(run: Run) -> list[str]:
-    problem = run.problem
-    overall = wrong_share(problem, np.ones(problem.n_frames, dtype=np.bool_))
-    if overall is None:
+    overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
+    shares = wrong_seconds(run.problem)
+    if overall is None or shares is None:
         return []
-    seconds = problem.sequence.t - problem.sequence.t[0]
-    second = seconds.astype(np.int64)
-    shares = [wrong_share(problem, second == s) or 0.0 for s in range(int(second[-1]) + 1)]
     worst = int(np.argmax(shares))
     return [
         f"The mask excluded {per_cent(overall)} of the matches for contradicting their own tracks as the velocities "

@@ -1,0 +1,80 @@
+// Small pieces of SVG and HTML; text only ever goes in as text.
+const SVG = "http://www.w3.org/2000/svg";
+
+function svg(name, attributes = {}, text = "") {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text) element.textContent = text;
+  return element;
+}
+
+function html(name, attributes = {}, text = "") {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text) element.textContent = text;
+  return element;
+}
+
+function told(value, unit = "") {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  let text;
+  if (size === 0) text = "0";
+  else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
+  else if (size >= 999.5) text = value.toFixed(0);
+  else text = value.toPrecision(3);
+  return text.replace("-", "−") + (unit === "°" ? "°" : unit ? "\u00a0" + unit : "");
+}
+
+const timeOf = frame => seconds[frame].toFixed(1) + "\u00a0s";
+
+// Round values between two ends, about so many of them.
+function ticks(low, high, about) {
+  const raw = (high - low) / Math.max(1, about);
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * [1, 2, 5, 10].find(factor => factor * power >= raw * 0.999);
+  const values = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  return values;
+}
+
+function logTicks(low, high, about) {
+  const from = Math.ceil(Math.log10(low) - 1e-9);
+  const to = Math.floor(Math.log10(high) + 1e-9);
+  if (to - from < 1) return ticks(low, high, about);
+  const every = Math.max(1, Math.ceil((to - from) / about));
+  const values = [];
+  for (let i = from; i <= to; i += every) values.push(10 ** i);
+  return values;
+}
+
+// Redraws when the element gets another width; the first time as soon as it has one.
+function whenResized(element, draw) {
+  let width = 0;
+  new ResizeObserver(() => {
+    const now = Math.round(element.clientWidth);
+    if (now === 0 || now === width) return;
+    width = now;
+    draw();
+  }).observe(element);
+}
+
+const hint = html("div", { class: "hint", role: "status", hidden: "" });
+document.body.append(hint);
+
+// Lines of [text, key of who it is about or null] beside the pointer.
+function showHint(event, lines) {
+  hint.replaceChildren(...lines.map(([text, key]) => {
+    const line = html("div");
+    if (key !== null) line.append(html("span", { class: "swatch who-" + key }));
+    line.append(text);
+    return line;
+  }));
+  hint.hidden = false;
+  const { width, height } = hint.getBoundingClientRect();
+  const left = event.clientX + 14 + width > innerWidth ? event.clientX - width - 10 : event.clientX + 14;
+  const top = event.clientY + 14 + height > innerHeight ? event.clientY - height - 10 : event.clientY + 14;
+  hint.style.left = Math.max(4, left) + "px";
+  hint.style.top = Math.max(4, top) + "px";
+}
+const hideHint = () => { hint.hidden = true; };

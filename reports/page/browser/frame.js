@@ -1,0 +1,123 @@
+// The observations of one frame in both images: where they were measured and where an estimate has them.
+class FrameView {
+  constructor(place) {
+    this.images = ["left", "right"].map(side => {
+      const image = svg("svg", { role: "img", "aria-label": side + " image: measured and reprojected observations" });
+      place.querySelector(`[data-side="${side}"]`).append(image);
+      return image;
+    });
+    this.words = place.querySelector(".said");
+    this.select = place.querySelector("select");
+    for (const who of everybody.values()) {
+      if (who.points && who.points.length) this.select.append(html("option", { value: who.key }, who.name));
+    }
+    const reference = [...this.select.options].find(option => isReference(option.value));
+    const first = [...this.select.options].find(option => !isReference(option.value) && everybody.get(option.value).used);
+    const start = first || reference;
+    if (start) this.select.value = start.value;
+    this.select.addEventListener("change", () => this.draw());
+    whenResized(place, () => this.draw());
+    onFrame.push(() => this.draw());
+  }
+
+  // Every observation of the frame: measured, predicted (or null), and what became of it.
+  seen() {
+    const who = everybody.get(this.select.value);
+    const seen = [];
+    for (let i = observations.starts[chosen.frame]; i < observations.starts[chosen.frame + 1]; i++) {
+      const measured = Array.from(observations.pixel.subarray(4 * i, 4 * i + 4), value => value / observations.parts);
+      const predicted = who ? this.predict(who, observations.landmark[i]) : null;
+      const error = predicted ? Math.hypot(...measured.map((value, row) => value - predicted[row])) : NaN;
+      const fate = observations.excluded[i] ? "excluded" : who && isBit(who.used, i) ? "used" : "rejected";
+      seen.push({ landmark: observations.landmark[i], measured, predicted, error, fate, reason: observations.excluded[i] });
+    }
+    return seen;
+  }
+
+  // [uL, v, uR, v] of a landmark, from the camera's pose (3, 4) in the picture's world.
+  predict(who, landmark) {
+    const row = who.row.get(landmark);
+    const T = who.cameras.subarray(12 * chosen.frame, 12 * chosen.frame + 12);
+    if (row === undefined || !Number.isFinite(T[0])) return null;
+    const d = [0, 1, 2].map(i => who.points[3 * row + i] - T[4 * i + 3]);
+    const [x, y, z] = [0, 1, 2].map(j => T[j] * d[0] + T[4 + j] * d[1] + T[8 + j] * d[2]);
+    const { fu, fv, cu, cv, baseline } = run.camera;
+    const u = fu * x / z + cu;
+    const v = fv * y / z + cv;
+    return [u, v, u - fu * baseline / z, v];
+  }
+
+  draw() {
+    const key = this.select.value;
+    const seen = this.seen();
+    this.images.forEach((image, side) => this.drawImage(image, side, seen, key));
+    this.say(seen, key);
+  }
+
+  drawImage(image, side, seen, key) {
+    const width = image.parentElement.clientWidth;
+    if (width === 0) return;
+    const scale = width / run.camera.width;
+    const height = scale * run.camera.height;
+    image.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(1)}`);
+    const parts = [];
+    for (const one of seen) {
+      const [x, y] = [2 * side, 2 * side + 1].map(row => scale * one.measured[row]);
+      const group = svg("g", { class: `observation ${one.fate} who-${key}` });
+      if (one.predicted) {
+        const [px, py] = [2 * side, 2 * side + 1].map(row => scale * one.predicted[row]);
+        group.append(svg("path", { class: "error", d: `M${x.toFixed(1)} ${y.toFixed(1)}L${bounded(px)} ${bounded(py)}` }));
+        group.append(svg("path", { class: "predicted", d: `M${bounded(px)} ${bounded(py)}m-3.5 0h7m-3.5 -3.5v7` }));
+      }
+      group.append(svg("path", { class: "measured", d: `M${x.toFixed(1)} ${y.toFixed(1)}${MARKS[one.fate]}` }));
+      group.addEventListener("pointermove", event => showHint(event, this.about(one, key)));
+      group.addEventListener("pointerleave", hideHint);
+      parts.push(group);
+    }
+    image.replaceChildren(...parts);
+  }
+
+  about(one, key) {
+    const lines = [[`landmark ${one.landmark}: ${this.fate(one, key)}`, null]];
+    if (one.predicted) lines.push([`${told(one.error, "px")} from its reprojection`, key]);
+    return lines;
+  }
+
+  fate(one, key) {
+    if (one.fate === "excluded") return "excluded, " + (run.reasons[one.reason] || "");
+    if (one.fate === "used") return "used by " + everybody.get(key).name;
+    return key ? "not used by " + everybody.get(key).name : "takes part";
+  }
+
+  say(seen, key) {
+    const name = key ? everybody.get(key).name : "";
+    const of = fate => seen.filter(one => one.fate === fate);
+    const middle = some => {
+      const errors = some.map(one => one.error).filter(Number.isFinite).sort((a, b) => a - b);
+      const half = errors.length >> 1;
+      if (errors.length === 0) return NaN;
+      return errors.length % 2 ? errors[half] : (errors[half - 1] + errors[half]) / 2;
+    };
+    const parts = [`${seen.length} matches`];
+    const kinds = { used: `used by ${name}`, rejected: `offered to but not used by ${name}`, excluded: "excluded by the mask" };
+    for (const [fate, text] of Object.entries(kinds)) {
+      const some = of(fate);
+      if (some.length === 0) continue;
+      const error = middle(some);
+      const errors = Number.isFinite(error) ? ` (median error ${told(error, "px")})` : "";
+      parts.push(`${some.length} ${text}${errors}`);
+    }
+    const reasons = new Map();
+    of("excluded").forEach(one => reasons.set(one.reason, (reasons.get(one.reason) || 0) + 1));
+    const why = [...reasons].sort((a, b) => b[1] - a[1]).map(([reason, n]) => `${n} × ${run.reasons[reason]}`);
+    this.words.textContent = `Frame ${chosen.frame}, ${timeOf(chosen.frame)}: ${parts.join(", ")}.`
+      + (why.length ? ` Excluded: ${why.join(", ")}.` : "");
+  }
+}
+
+// Relative paths around a measured point, told apart by shape and not by colour alone.
+const MARKS = {
+  used: "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0",
+  rejected: "m-4.5 0l4.5 -4.5l4.5 4.5l-4.5 4.5z",
+  excluded: "m-3.5 -3.5l7 7m0 -7l-7 7",
+};

@@ -1,0 +1,59 @@
+// The slider and the switches, and a plot in every place that the page has for one.
+const slider = document.getElementById("frame");
+const clock = document.getElementById("clock");
+
+function tellFrame() {
+  slider.value = String(chosen.frame);
+  slider.setAttribute("aria-valuetext", `frame ${chosen.frame}, ${timeOf(chosen.frame)}`);
+  clock.textContent = `frame ${chosen.frame} · ${timeOf(chosen.frame)}`;
+}
+slider.addEventListener("input", () => goTo(Number(slider.value)));
+onFrame.push(tellFrame);
+
+for (const box of document.querySelectorAll("#who input")) {
+  box.addEventListener("change", () => show(box.value, box.checked));
+}
+
+const play = document.getElementById("play");
+let playing = null;
+function stop() {
+  clearInterval(playing);
+  playing = null;
+  play.setAttribute("aria-pressed", "false");
+}
+play.addEventListener("click", () => {
+  if (playing !== null) return stop();
+  if (chosen.frame === run.frames - 1) goTo(0);
+  play.setAttribute("aria-pressed", "true");
+  const step = Math.max(1, Math.round(run.frames / 400));
+  playing = setInterval(() => (chosen.frame < run.frames - 1 ? goTo(chosen.frame + step) : stop()), 60);
+  return undefined;
+});
+
+for (const button of document.querySelectorAll("button[data-frame]")) {
+  button.addEventListener("click", () => goTo(Number(button.dataset.frame)));
+}
+
+// What every chart shows at the frame, as a table.
+const table = document.getElementById("values");
+function fill() {
+  if (!table || !table.closest("details").open) return;
+  for (const cell of table.querySelectorAll("td")) {
+    const chart = charts[Number(cell.dataset.chart)];
+    const line = chart.lines.get(cell.dataset.key);
+    cell.textContent = line ? told(line[chosen.frame]) : "";
+  }
+}
+if (table) {
+  table.closest("details").addEventListener("toggle", fill);
+  onFrame.push(fill);
+}
+
+const paths = document.getElementById("path-view");
+if (paths) new PathView(paths);
+document.querySelectorAll(".chart").forEach(place => new TimeChart(place, charts[Number(place.dataset.chart)]));
+const frame = document.getElementById("frame-view");
+if (frame && observations) new FrameView(frame);
+document.documentElement.classList.add("live");
+if (run.jumps.length) goTo(run.jumps[0].frame);
+tellFrame();
