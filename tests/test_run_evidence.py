@@ -146,6 +146,14 @@ def test_innovations_that_were_never_recorded_are_no_figure() -> None:
     assert as_dict(empty)["estimators"]["isam2"]["nis"] is None
 
 
+def test_a_filter_that_is_blind_most_of_the_time_has_its_figure_all_the_same() -> None:
+    problem = plain_problem(scene())
+    innovations = Innovations.none(60)
+    innovations.nis[20:30], innovations.degrees[20:30] = 5.0, 6
+    estimate = answer(problem, "ekf", innovations=innovations)
+    assert "consistency" in figures.draw(run_of(problem, answer(problem, "isam2"), estimate))
+
+
 def test_frames_in_words() -> None:
     assert frames_in_words(np.array([], dtype=np.int64)) == ""
     assert frames_in_words(np.array([4])) == "4"

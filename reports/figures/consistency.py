@@ -87,7 +87,10 @@ def _expected(panel: Axes, name: str, run: Run) -> list[Any]:
         panel.axhline(6.0, **MIDDLE)
     elif name == "NIS per row":
         counts = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
-        rows = float(np.median(np.concatenate(counts)))
+        seen = np.concatenate(counts)
+        if not seen.any():
+            return []
+        rows = float(np.median(seen[seen > 0]))
         low, high = (float(limit) / rows for limit in bounds(rows))
         panel.axhline(1.0, **MIDDLE)
     else:
