@@ -19,6 +19,8 @@ from .schema import Summary
 from .summary import metrics_table, summarise
 from .tables import consistency_series, write_tables
 
+TRUTH_FILE = "truth.tum"
+
 
 def write_run(run: Run, folder: Path) -> Summary:
     """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary."""
@@ -30,6 +32,9 @@ def write_run(run: Run, folder: Path) -> Summary:
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
             write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
+    truth = run.problem.sequence.truth
+    if truth is not None:
+        write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
     write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
     drawn: Mapping[str, Figure] = figures.draw(run)

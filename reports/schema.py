@@ -117,6 +117,7 @@ class SequenceSummary(_Part):
         Number, Field(description="of the truth, else of the reference; null where there is neither")
     ]
     up: Annotated[list[float], Field(description="unit vector that points up in the world of the trajectories")]
+    ahead: Annotated[list[float], Field(description="unit vector, level: where the camera looks at the start")]
     remarks: list[str]
 
 

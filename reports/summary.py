@@ -18,6 +18,7 @@ from fgbaseline.geometry import FloatArray
 
 from .comparison import Result, Run
 from .evidence_summary import evidence_reasons, evidence_summary, held_out_summary
+from .figures.view import TopView
 from .schema import EstimatorSummary, Summary
 
 LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
@@ -39,6 +40,7 @@ def summarise(run: Run) -> Summary:
                     "tracks": sequence.n_landmarks,
                     "path_length_m": path_length(run),
                     "up": sequence.up.tolist(),
+                    "ahead": TopView.of(problem).ahead.tolist(),
                     "remarks": list(sequence.remarks),
                 },
                 "problem": {

@@ -14,6 +14,7 @@ COMMANDS = {
     "compare": "compare",
     "diagnose": "diagnose",
     "export": "export",
+    "figures": "figures",
     "check": "check",
     "simulate": "simulate",
 }

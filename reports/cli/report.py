@@ -16,12 +16,16 @@ UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
+def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
     """Runs, writes the folder and tells of it; gives the exit code: 1 where an estimator failed, else 0."""
     job.check_estimators(settings.estimators)
     sequence = job.read_sequence(settings)
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=job.MARK)
+    if rerun_file is not None:
+        from ..rerun_file import require_rerun
+
+        require_rerun(rerun_file)
 
     kept, held = job.split(sequence, settings)
 
@@ -47,6 +51,10 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool) -> int:
     told.say("writing the report")
     with whole_folder(place, force=force, mark=job.MARK) as folder:
         summary = write_run(run, folder)
+        if rerun_file is not None:
+            from ..rerun_file import write_rerun
+
+            write_rerun(run, rerun_file)
     _print_table(summary)
     for sentence in page.verdict(run):
         click.echo(sentence)

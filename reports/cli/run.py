@@ -78,6 +78,13 @@ class FeatureCount(click.ParamType[int | str]):
     show_default=True,
     help="Of the simulated drive, and of which tracks are held out.",
 )
+@click.option(
+    "--rerun",
+    "rerun_file",
+    metavar="FILE.rrd",
+    type=click.Path(path_type=Path),
+    help="Also write a recording for the viewer Rerun (needs the extra fgbaseline[rerun]).",
+)
 def command(
     sequence: Path | None,
     out: Path | None,
@@ -92,6 +99,7 @@ def command(
     held_out: float,
     repairs: Path | None,
     seed: int,
+    rerun_file: Path | None,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
 
@@ -118,4 +126,4 @@ def command(
         held_out=held_out,
         repairs=repairs,
     )
-    return report(settings, out, force=force)
+    return report(settings, out, force=force, rerun_file=rerun_file)
