@@ -61,9 +61,7 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
     title = f"NEES of the difference from {run.reference}"
     yield _chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
-    rows = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
-    n = float(np.median(np.concatenate(rows))) if rows else 0.0
-    band = tuple(float(limit) / n for limit in bounds(n)) if n > 0 else None
+    band = _innovation_band(run)
     nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
     innovations = "Innovations: NIS per row"
     yield _chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
@@ -72,6 +70,16 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
         ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
         title, hint = f"Sigma of {part} over that of {run.reference}", "a filter's should be above 1"
         yield _chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
+
+
+def _innovation_band(run: Run) -> tuple[float, ...] | None:
+    """For as many rows as the median frame that sees anything has; None where nobody's filter sees anything."""
+    seen = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
+    rows = np.concatenate([degrees[degrees > 0] for degrees in seen]) if seen else np.empty(0)
+    if len(rows) == 0:
+        return None
+    n = float(np.median(rows))
+    return tuple(float(limit) / n for limit in bounds(n))
 
 
 def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
