@@ -12,6 +12,8 @@ from fgbaseline.geometry import FloatArray
 from .journal import IndeterminateSystemError
 from .waiting import Entry
 
+FRAME_LOST = "frame without observations"
+"""the kind of the event that a frame's observations were given up"""
 ATTEMPTS = 20
 """at solving a frame with fewer landmarks, before its observations are given up instead"""
 
@@ -85,7 +87,7 @@ def add_recovering(graph: Graph, arrival: Arrival) -> GivenUp:
         raise GivenUpError(text) from error
     dropped, events = _told(arrival.frame, given_up)
     reason = "its observations left the system indeterminate and were given up"
-    lost = Event(arrival.frame, "frame without observations", reason)
+    lost = Event(arrival.frame, FRAME_LOST, reason)
     return GivenUp(dropped | {entry.landmark for entry in arrival.entries}, (*events, lost))
 
 

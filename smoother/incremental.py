@@ -12,7 +12,7 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .arrival import Arrival, add_recovering
+from .arrival import FRAME_LOST, Arrival, add_recovering
 from .arrivals import Arrivals
 from .convention import reordered
 from .journal import IndeterminateSystemError, RestorableISAM2
@@ -40,6 +40,8 @@ class ISAM2Settings:
     entry: EntryRule = field(default_factory=EntryRule)
     relinearise_at_end: bool = True
     """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
+    careful: bool = False
+    """QR in place of Cholesky: three times slower, and at ease with pivots of very unequal size"""
 
     def params(self) -> gtsam.ISAM2Params:
         """The same in GTSAM's terms."""
@@ -48,7 +50,16 @@ class ISAM2Settings:
             thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark)
         )
         params.relinearizeSkip = 1
+        params.setFactorization("QR" if self.careful else "CHOLESKY")
         return params
+
+
+class FrameLostError(Exception):
+    """A frame's observations would have to be given up, to which QR may be an answer."""
+
+    def __init__(self, frame: int) -> None:
+        super().__init__(f"frame {frame}")
+        self.frame = frame
 
 
 class IncrementalSmoother:
@@ -57,6 +68,7 @@ class IncrementalSmoother:
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
         self.isam = RestorableISAM2(settings.params())
         self.problem = problem
+        self._may_lose_frames = settings.careful or problem.landmark_prior is not None
         self.arrivals = Arrivals(problem, settings.entry)
         self.online_covariance = np.full((problem.n_frames, 6, 6), np.nan)
         self.key: dict[int, int] = {}
@@ -69,7 +81,8 @@ class IncrementalSmoother:
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
-        """All frames; `seconds` (T,) is filled. Raises GivenUpError."""
+        """All frames; `seconds` (T,) is filled. Raises GivenUpError, and FrameLostError unless by QR already (or under
+        landmark priors, whose graph QR has not been seen to rescue)."""
         T = self.problem.n_frames
         for k, observed in enumerate(self.arrivals.observations.by_frame(T)):
             start = time.perf_counter()
@@ -91,6 +104,8 @@ class IncrementalSmoother:
     def _frame(self, k: int, observed: range) -> None:
         arrival = self.arrivals.next(k, observed, self.key, self._dropped)
         landmarks, events = add_recovering(self, arrival)
+        if not self._may_lose_frames and any(event.kind == FRAME_LOST for event in events):
+            raise FrameLostError(k)
         self._n_frames = k + 1
         self._dropped |= landmarks
         self.events += events

@@ -15,11 +15,14 @@ from fgbaseline.geometry import FloatArray
 from .arrival import GivenUpError
 from .convention import reordered
 from .covariances import covariances
-from .incremental import IncrementalSmoother, ISAM2Settings
+from .incremental import FrameLostError, IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
 from .keys import pose_key
 from .relinearised import Relinearised, compact, relinearised
 from .values import landmarks_of, poses_of
+
+NEVER_DETERMINED, BY_QR = "landmark never determined", "solved by QR"
+"""kinds of events that are no trouble"""
 
 
 def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
@@ -50,9 +53,8 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     if len(problem.observations()) == 0:
         return Estimate.failed("isam2", "no observations", T, len(problem.excluded))
     seconds = np.zeros(T)
-    smoother = IncrementalSmoother(problem, settings)
     try:
-        smoother.run(seconds, progress)
+        smoother = _run(problem, settings, seconds, progress)
         smoother.settle()
         graph, values = _final(smoother, settings.relinearise_at_end)
     except (GivenUpError, IndeterminateSystemError) as error:
@@ -88,6 +90,24 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     return _with_by_product(final, online)
 
 
+def _run(
+    problem: Problem, settings: ISAM2Settings, seconds: FloatArray, progress: Progress | None
+) -> IncrementalSmoother:
+    """After the last frame; by QR from the start where Cholesky fails in a way that would cost a frame."""
+    try:
+        smoother = IncrementalSmoother(problem, settings)
+        smoother.run(seconds, progress)
+        return smoother
+    except (FrameLostError, GivenUpError) as error:
+        if settings.careful or problem.landmark_prior is not None:
+            raise
+        where = error.frame if isinstance(error, FrameLostError) else problem.n_frames - 1
+    smoother = IncrementalSmoother(problem, replace(settings, careful=True))
+    smoother.run(seconds, progress)
+    smoother.events.append(Event(where, BY_QR, "Cholesky failed there: pivots of very unequal size"))
+    return smoother
+
+
 def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
     return replace(estimate, by_products={other.name: replace(other, by_products={})})
 
@@ -121,13 +141,13 @@ def _marginals(
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
     return [
-        Event(frame, "landmark never determined", "its observations never fixed its position well enough", landmark)
+        Event(frame, NEVER_DETERMINED, "its observations never fixed its position well enough", landmark)
         for landmark, frame in smoother.arrivals.waiting.last_seen()
     ]
 
 
 def _verdict(events: tuple[Event, ...]) -> tuple[Status, str]:
-    trouble = Counter(event.kind for event in events if event.kind != "landmark never determined")
+    trouble = Counter(event.kind for event in events if event.kind not in (NEVER_DETERMINED, BY_QR))
     if not trouble:
         return Status.OK, ""
     told = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))

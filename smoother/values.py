@@ -6,14 +6,16 @@ import gtsam
 import numpy as np
 
 from fgbaseline.data.estimate import Landmarks
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, so3
 
 from .keys import pose_key
 
 
 def poses_of(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
-    """(n, 4, 4) world_T_imu of the frames."""
-    return np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
+    """(n, 4, 4) world_T_imu of the frames, their rotations exact: GTSAM's lose that by rounding in long descents."""
+    poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
+    poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
+    return poses
 
 
 def landmarks_of(
