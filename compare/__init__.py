@@ -13,6 +13,7 @@ from .innovation import NisSummary, nis_per_degree, nis_summary
 from .interpolation import interpolated
 from .maps import map_by_depth, map_difference
 from .moved import moved_points
+from .over_runs import Consistency, consistency_of, mean_of, nees_over_runs, ranking
 from .pairs import Unit, pose_pairs
 from .pose_difference import Difference, absolute_difference, motion_difference
 from .relative import matched_pairs, relative_errors
@@ -36,6 +37,7 @@ __all__ = [
     "Align",
     "Alignment",
     "Association",
+    "Consistency",
     "CovarianceState",
     "Difference",
     "DifferenceNees",
@@ -58,6 +60,7 @@ __all__ = [
     "body_error",
     "commonly_used",
     "component_summary",
+    "consistency_of",
     "covariance_state",
     "difference_nees",
     "difference_shares",
@@ -74,14 +77,17 @@ __all__ = [
     "map_by_depth",
     "map_difference",
     "matched_pairs",
+    "mean_of",
     "motion_difference",
     "moved_points",
     "nees",
+    "nees_over_runs",
     "nees_table",
     "nis_per_degree",
     "nis_summary",
     "pose_errors",
     "pose_pairs",
+    "ranking",
     "relative_errors",
     "reprojection",
     "reprojection_by",

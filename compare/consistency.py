@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
-from .chi_square import bounds
+from .over_runs import nees_over_runs
 
-POSE_DEGREES = 6
 PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
 HELD = 1e-11
 """m^2 or rad^2: a pose with no variance above it is held, and has no error to speak of"""
@@ -111,20 +110,7 @@ def anees(runs: Iterable[tuple[Estimate, Truth]]) -> pd.DataFrame:
     assume nothing, each row stands alone. Runs may differ in length. The mean of `anees` over frames, whose errors are
     correlated, lies inside the bounds of a single frame with at least about their probability.
     """
-    columns = [nees(estimate, truth) for estimate, truth in runs]
-    frames = max((len(values) for values in columns), default=0)
-    values = np.full((len(columns), frames), np.nan)
-    for row, column in zip(values, columns, strict=True):
-        row[: len(column)] = column
-    n = np.isfinite(values).sum(axis=0)
-    total = np.nansum(values, axis=0)
-    some = np.maximum(n, 1)
-    low, high = bounds(float(POSE_DEGREES), some)
-    table = pd.DataFrame(
-        {"anees": total / some, "runs": n, "low": low, "high": high}, index=pd.RangeIndex(frames, name="frame")
-    )
-    table.loc[n == 0, ["anees", "low", "high"]] = np.nan
-    return table
+    return nees_over_runs([nees(estimate, truth) for estimate, truth in runs])
 
 
 def sigma_ratio(estimate: Estimate, reference: Estimate) -> pd.DataFrame:

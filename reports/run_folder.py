@@ -4,6 +4,7 @@ import csv
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,8 +25,18 @@ TRUTH_FILE = "truth.tum"
 
 def write_run(run: Run, folder: Path) -> Summary:
     """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary."""
+    (folder / "figures").mkdir()
+    drawn: Mapping[str, Figure] = figures.draw(run)
+    figures.save(drawn, folder / "figures")
+    summary = write_numbers(run, folder)
+    write_page(run, summary, folder, drawn)
+    return summary
+
+
+def write_numbers(run: Run, folder: Path) -> Summary:
+    """The same without figures and page."""
     summary = summarise(run)
-    for name in ("trajectories", "landmarks", "series", "tables", "figures"):
+    for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
         series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
@@ -37,12 +48,18 @@ def write_run(run: Run, folder: Path) -> Summary:
         write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
     write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
-    drawn: Mapping[str, Figure] = figures.draw(run)
-    figures.save(drawn, folder / "figures")
-    as_dict = summary.model_dump(mode="json", by_alias=True)
-    (folder / "report.html").write_text(page.render(run, as_dict, drawn), encoding="utf-8")
-    (folder / MARK).write_text(json.dumps(as_dict, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    text = json.dumps(_as_dict(summary), indent=2, allow_nan=False)
+    (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
     return summary
+
+
+def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure]) -> None:
+    """`report.html`, with the figures that were drawn."""
+    (folder / "report.html").write_text(page.render(run, _as_dict(summary), drawn), encoding="utf-8")
+
+
+def _as_dict(summary: Summary) -> dict[str, Any]:
+    return summary.model_dump(mode="json", by_alias=True)
 
 
 def write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:

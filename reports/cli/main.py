@@ -16,6 +16,7 @@ COMMANDS = {
     "export": "export",
     "figures": "figures",
     "check": "check",
+    "bench": "bench",
     "simulate": "simulate",
 }
 """command -> module of this package that holds it under the name `command`"""

@@ -1,8 +1,8 @@
 """The main table as text for papers and pages: Markdown and LaTeX."""
 
-import re
 from itertools import groupby
 
+from ..latex import tex
 from .comparison import Comparison
 from .tables import text_table
 
@@ -20,22 +20,22 @@ def latex(comparison: Comparison) -> str:
     names, lines = text_table(comparison)
     body: list[str] = []
     for group, same in groupby(lines, key=lambda line: line.group):
-        body += [r"\midrule", rf"\multicolumn{{{len(names) + 1}}}{{l}}{{\emph{{{_tex(group)}}}}} \\"]
+        body += [r"\midrule", rf"\multicolumn{{{len(names) + 1}}}{{l}}{{\emph{{{tex(group)}}}}} \\"]
         for line in same:
             cells = [
-                rf"\textbf{{{_tex(cell)}}}" if best else _tex(cell)
+                rf"\textbf{{{tex(cell)}}}" if best else tex(cell)
                 for cell, best in zip(line.cells, line.best, strict=True)
             ]
-            body.append(" & ".join([rf"\quad {_tex(line.heading)}", *cells]) + r" \\")
+            body.append(" & ".join([rf"\quad {tex(line.heading)}", *cells]) + r" \\")
     return "\n".join(
         [
             r"% needs \usepackage{booktabs}",
             r"\begin{table}",
             r"\centering",
-            rf"\caption{{{_tex(comparison.caption)}}}",
+            rf"\caption{{{tex(comparison.caption)}}}",
             rf"\begin{{tabular}}{{l{'r' * len(names)}}}",
             r"\toprule",
-            " & ".join(["", *map(_tex, names)]) + r" \\",
+            " & ".join(["", *map(tex, names)]) + r" \\",
             *body,
             r"\bottomrule",
             r"\end{tabular}",
@@ -43,22 +43,3 @@ def latex(comparison: Comparison) -> str:
             "",
         ]
     )
-
-
-_TEX = {
-    "\\": r"\textbackslash{}",
-    **{c: "\\" + c for c in "&%$#_{}"},
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "°": r"$^\circ$",
-    "×": r"$\times$",
-    "–": "--",
-    "\N{MINUS SIGN}": "$-$",
-    "\N{NARROW NO-BREAK SPACE}": r"\,",
-}
-_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-
-
-def _tex(text: str) -> str:
-    escaped = "".join(_TEX.get(c, c) for c in text)
-    return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda found: f"$^{{{found[0].translate(_RAISED)}}}$", escaped)

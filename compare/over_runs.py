@@ -1,0 +1,104 @@
+"""Figures of several independent runs (other seeds, other noise): their mean, which estimator is best, and how sure.
+
+Intervals are Student's at 95 %: they assume that the runs are independent and the mean nearly Gaussian, which it is
+from some five runs on unless single runs are far off.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.special import stdtrit
+
+from fgbaseline.geometry import FloatArray
+
+from .chi_square import PROBABILITY, bounds
+
+POSE_DEGREES = 6
+
+
+class Mean(NamedTuple):
+    """A mean and its 95 % interval, NaN where one value alone says nothing of it."""
+
+    value: float
+    low: float
+    high: float
+    n: int
+    """finite values it rests on"""
+
+
+def mean_of(values: FloatArray) -> Mean:
+    """The mean over runs of the finite values (n,), with x +- t s / sqrt(n), t of n - 1 degrees of freedom."""
+    known = values[np.isfinite(values)]
+    n = len(known)
+    if n == 0:
+        return Mean(np.nan, np.nan, np.nan, 0)
+    mean = float(np.mean(known))
+    if n == 1:
+        return Mean(mean, np.nan, np.nan, 1)
+    half = float(stdtrit(n - 1, 0.5 + PROBABILITY / 2.0)) * float(np.std(known, ddof=1)) / np.sqrt(n)
+    return Mean(mean, mean - half, mean + half, n)
+
+
+def ranking(errors: pd.DataFrame) -> pd.DataFrame:
+    """Estimators (columns) over runs (rows) by their mean error, smallest first; NaN for a run without an answer.
+
+    `rank`; `runs` that have an answer; `mean`, `low`, `high`; and, paired run by run with the best one, `behind`,
+    `behind_low` and `behind_high`: how much larger the error is on average, over the runs that both answered. `tied`
+    where that interval holds zero: these runs cannot tell the two apart. An estimator with fewer answers ranks behind
+    all with more, whatever its mean: it may have failed where it was hard.
+    """
+    columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
+    values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
+    means = {name: mean_of(value) for name, value in values.items()}
+    order = sorted((name for name in values if means[name].n), key=lambda name: (-means[name].n, means[name].value))
+    rows = []
+    for rank, name in enumerate(order, 1):
+        behind = mean_of(values[name] - values[order[0]])
+        tied = rank == 1 or behind.low <= 0.0 <= behind.high
+        mean = means[name]
+        rows.append((rank, mean.n, mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
+    return pd.DataFrame(rows, columns=columns, index=pd.Index(order, name="estimator"))
+
+
+def nees_over_runs(columns: Sequence[FloatArray]) -> pd.DataFrame:
+    """NEES (T,) of each run, averaged over runs: see `anees`, which this is for estimates."""
+    frames = max((len(values) for values in columns), default=0)
+    values = np.full((len(columns), frames), np.nan)
+    for row, column in zip(values, columns, strict=True):
+        row[: len(column)] = column
+    n = np.isfinite(values).sum(axis=0)
+    total = np.nansum(values, axis=0)
+    some = np.maximum(n, 1)
+    low, high = bounds(float(POSE_DEGREES), some)
+    table = pd.DataFrame(
+        {"anees": total / some, "runs": n, "low": low, "high": high}, index=pd.RangeIndex(frames, name="frame")
+    )
+    table.loc[n == 0, ["anees", "low", "high"]] = np.nan
+    return table
+
+
+class Consistency(NamedTuple):
+    """ANEES over all frames of several runs, against what chi-square allows."""
+
+    anees: float
+    low: float
+    high: float
+    """bounds of a single frame's average over the runs: errors of neighbouring frames are nearly the same, so that the
+    mean over frames scatters as much as one of them at most"""
+    inside: float
+    """share of the frames whose average over the runs lies inside its bounds: 0.95 is expected"""
+    runs: int
+
+
+def consistency_of(columns: Sequence[FloatArray]) -> Consistency:
+    """The consistency of an estimator over runs with NEES (T,) each; NaN where none has any."""
+    known = [values for values in columns if np.isfinite(values).any()]
+    table = nees_over_runs(known)
+    table = table[table["runs"] == len(known)] if known else table
+    if len(table) == 0:
+        return Consistency(np.nan, np.nan, np.nan, np.nan, len(known))
+    inside = (table["anees"] >= table["low"]) & (table["anees"] <= table["high"])
+    low, high = bounds(float(POSE_DEGREES), len(known))
+    return Consistency(float(table["anees"].mean()), float(low), float(high), float(inside.mean()), len(known))

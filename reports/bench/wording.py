@@ -1,0 +1,90 @@
+"""What a bench says, in sentences: what failed first, then who is best and how sure that is, then consistency."""
+
+import pandas as pd
+
+from ..page.numbers import listed, number
+from .figures import judge
+from .grid import interval
+from .results import ANSWERED, Metric, Results
+from .tables import consistency, overall, rankings, records
+
+MOST_CASES = 8
+"""that are told one by one"""
+
+
+def sentences(results: Results) -> list[str]:
+    """The verdict."""
+    return [*_failures(results), *_trust(results), *_best(results), *_overall(results), *_consistency(results)]
+
+
+def _failures(results: Results) -> list[str]:
+    n = len(results.planned)
+    said = []
+    if results.failures:
+        said.append(f"{len(results.failures)} of {n} runs failed altogether; why is said below.")
+    failed = results.runs[
+        ~results.runs["status"].isin(ANSWERED) & ~results.runs["run"].isin(list(results.failures))
+    ].groupby("estimator", sort=False)
+    said += [f"{name} gave no answer in {len(rows)} of {n} runs." for name, rows in failed]
+    return said
+
+
+def _trust(results: Results) -> list[str]:
+    counts = results.runs.drop_duplicates("run")["trust"].value_counts().to_dict()
+    return [
+        f"The reference is {word} in {counts[word]} of {len(results.planned)} runs: {meaning}."
+        for word, meaning in (
+            ("untrusted", "distances from it say how much two answers disagree, and not which one is right"),
+            ("doubtful", "a small distance from it says more than a large one"),
+        )
+        if word in counts
+    ]
+
+
+def _best(results: Results) -> list[str]:
+    metric = judge(results)
+    if metric is None:
+        return ["No run has a truth or held-out tracks, so nothing says which estimator is the most accurate."]
+    ranked = rankings(results)
+    ranked = ranked[ranked["metric"] == metric.name]
+    names = list(dict.fromkeys(ranked["case"]))
+    if len(names) > MOST_CASES:
+        return []
+    return [_winner(case, ranked[ranked["case"] == case], metric) for case in names]
+
+
+def _winner(case: str, ranked: pd.DataFrame, metric: Metric) -> str:
+    first, *others = records(ranked)
+    runs = f" over {first['runs']} runs" if first["runs"] > 1 else ""
+    said = f"{case}: {first['estimator']} has the least {metric.title}, "
+    said += f"{interval(first['mean'], first['low'], first['high'])} {metric.unit}{runs}"
+    tied = [row["estimator"] for row in others if row["tied"]]
+    if tied:
+        return f"{said}; these runs cannot tell {listed(tied)} from it."
+    if not others:
+        return f"{said}."
+    margin = f"{others[0]['estimator']} follows with {number(others[0]['mean'])}"
+    return f"{said}; {margin}."
+
+
+def _overall(results: Results) -> list[str]:
+    metric, table = judge(results), overall(results)
+    if metric is None or table.empty:
+        return []
+    table = table[table["metric"] == metric.name].head(3)
+    places = [f"{row['estimator']} {number(row['mean_rank'])}" for row in records(table)]
+    if not places:
+        return []
+    return [f"Mean rank by {metric.title} over {table['cases'].max()} cases: {listed(places)}."]
+
+
+def _consistency(results: Results) -> list[str]:
+    table = consistency(results)
+    if table.empty:
+        return []
+    said = []
+    for case, of_case in table[table["runs"] > 1].groupby("case", sort=False):
+        told = [f"{row['estimator']} {number(row['anees'])} ({row['verdict']})" for row in records(of_case)]
+        low, high = (number(float(of_case[side].iloc[0])) for side in ("low", "high"))
+        said.append(f"{case}: ANEES {listed(told)}; 95 % bounds {low} to {high}.")
+    return said if len(said) <= MOST_CASES else []

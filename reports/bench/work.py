@@ -1,0 +1,140 @@
+"""What a worker does: a job in, the files of its run out as bytes. Objects of GTSAM live and die in here."""
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock
+
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data import (
+    Calibration,
+    Problem,
+    Reading,
+    Sequence,
+    calibrated,
+    documented,
+    hold_out,
+    read,
+    read_repairs,
+)
+from fgbaseline.data.documented import DEFAULT_FEATURES
+from fgbaseline.data.repairs import Repairs
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.geometry import FgbaselineError
+
+from ..comparison import Run, compare_all
+from ..run_folder import write_numbers, write_page, write_run
+from ..solving import solve_all, told
+from .costs import CostWatch, Tell
+from .identity import code_of, content_of
+from .job import File, Job, Recorded
+
+COSTS = "costs.json"
+Channel = Callable[[str, str, int, int], None]
+"""told of progress: job's key, what is being done, frames done, frames there are"""
+_one_at_a_time = Lock()
+"""memory and BLAS threads are the process's, and GTSAM holds the interpreter: threads would only spoil the figures"""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came out of a job."""
+
+    key: str
+    files: Mapping[str, bytes]
+    """by path within the run's folder; empty where the job failed"""
+    failure: str
+    """why there are none; empty where there are"""
+    seconds: float
+
+
+def work(job: Job, channel: Channel) -> Outcome:
+    """Runs a job; whatever goes wrong is its outcome, and never raised."""
+    key = job.key
+
+    def tell(doing: str, done: int, total: int) -> None:
+        channel(key, doing, done, total)
+
+    with _one_at_a_time, threadpool_limits(limits=1):
+        start = time.perf_counter()
+        try:
+            files, failure = _files(job, tell), ""
+        except Exception as error:  # a job never stops the others
+            files, failure = {}, told(error)
+        seconds = time.perf_counter() - start
+    channel("", "", 0, 0)
+    return Outcome(key, files, failure, seconds)
+
+
+def _files(job: Job, tell: Tell) -> dict[str, bytes]:
+    if code_of(job.estimators, job.page != "none") != job.code:
+        raise FgbaselineError("this worker has another version of fgbaseline or of its libraries; install the same")
+    tell("reading", 0, 0)
+    sequence = _sequence(job)
+    kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
+    problem = _problem(kept, job)
+    watch = CostWatch(tell)
+    run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
+    tell("writing", 0, 0)
+    with TemporaryDirectory(prefix="fgbaseline-") as place:
+        folder = Path(place)
+        _write(run, folder, job)
+        (folder / COSTS).write_text(json.dumps(_costs(run, watch.peak_mb), indent=2))
+        return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def _sequence(job: Job) -> Sequence:
+    if not isinstance(job.source, Recorded):
+        return simulate(Simulation(**job.source.settings, seed=job.seed))
+    for file in (job.source.recording, job.source.truth, job.source.repairs):
+        if file is not None:
+            _require_unchanged(file)
+    truth = job.source.truth
+    return read(job.source.recording.path, None if truth is None else truth.path, job.source.truth_frame)
+
+
+def _require_unchanged(file: File) -> None:
+    path = Path(file.path)
+    if not path.is_file():
+        raise FgbaselineError(f"{path}: there is no such file where this worker runs; put it there")
+    if content_of(path) != file.content:
+        raise FgbaselineError(f"{path}: the file is another than when the bench was planned; run the bench again")
+
+
+def _problem(sequence: Sequence, job: Job) -> Problem:
+    features = None if job.features == "all" else job.features
+    if job.preset == "documented":
+        count = DEFAULT_FEATURES if job.features is None else features
+        return documented(sequence, count, Reading(job.landmarks))
+    if job.noise == "assumed":
+        return calibrated(sequence, features, settings=Calibration())
+    repairs = None
+    if isinstance(job.source, Recorded) and job.source.repairs is not None:
+        repairs = read_repairs(job.source.repairs.path)
+    if isinstance(job.noise, Mapping):
+        repairs = Repairs.model_validate({"sigma": dict(job.noise)})
+    return calibrated(sequence, features, repairs=repairs)
+
+
+def _write(run: Run, folder: Path, job: Job) -> None:
+    if job.page == "figures":
+        write_run(run, folder)
+        return
+    summary = write_numbers(run, folder)
+    if job.page == "tables":
+        write_page(run, summary, folder, {})
+
+
+def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
+    """By estimator; what one run gave along with another has the cost of that run."""
+    source = {by: name for name, r in run.results.items() for by in r.estimate.by_products if by not in peak_mb}
+    return {
+        "estimators": {
+            name: {"seconds": r.estimate.seconds_total, "memory_mb": peak_mb.get(source.get(name, name))}
+            for name, r in run.results.items()
+        }
+    }

@@ -1,0 +1,61 @@
+"""Means, rankings and ANEES over independent runs, against scipy and chi-square itself."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from fgbaseline import compare
+
+
+@pytest.mark.parametrize("n", [2, 3, 30])
+def test_the_interval_of_a_mean_is_students(n: int) -> None:
+    values = np.random.default_rng(n).gamma(2.0, size=n)
+    low, high = stats.t.interval(0.95, n - 1, loc=values.mean(), scale=stats.sem(values))
+    assert compare.mean_of(np.append(values, np.nan)) == pytest.approx((values.mean(), low, high, n))
+
+
+def test_one_value_says_nothing_of_its_mean() -> None:
+    assert compare.mean_of(np.array([0.3])) == pytest.approx((0.3, np.nan, np.nan, 1), nan_ok=True)
+    assert compare.mean_of(np.array([np.nan])).n == 0
+
+
+def test_a_small_difference_that_is_always_there_is_told_and_one_that_varies_is_not() -> None:
+    random = np.random.default_rng(1)
+    hard = random.uniform(0.1, 10.0, 20)  # some drives are harder than others, for all estimators
+    errors = pd.DataFrame({"worse": 1.02 * hard, "best": hard, "like": hard * random.uniform(0.9, 1.15, 20)})
+    table = compare.ranking(errors)
+    assert table.index[0] == "best"
+    assert table["tied"].to_dict() == {"best": True, "like": True, "worse": False}
+    assert table.loc["worse", "behind"] == pytest.approx(0.02 * hard.mean())
+    # Means alone, run by run unpaired, could not tell: their intervals overlap by far.
+    assert table.loc["worse", "low"] < table.loc["best", "mean"]
+
+
+def test_who_failed_ranks_behind_whom_it_did_not_and_who_never_answered_nowhere() -> None:
+    errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2], "gone": [np.nan] * 3})
+    table = compare.ranking(errors)
+    assert list(table.index) == ["sound", "bold"]
+    assert table["runs"].to_list() == [3, 2]
+    assert table.loc["bold", "behind"] == pytest.approx(-0.1)
+
+
+def test_errors_as_claimed_are_inside_the_bounds_and_smaller_claims_are_not() -> None:
+    random = np.random.default_rng(3)
+    honest = [random.chisquare(6, size=400) for _ in range(25)]
+    table = compare.nees_over_runs(honest)
+    assert table["low"].iloc[0] == pytest.approx(stats.chi2.ppf(0.025, 150) / 25)
+    assert table["high"].iloc[0] == pytest.approx(stats.chi2.ppf(0.975, 150) / 25)
+    found = compare.consistency_of(honest)
+    assert found.low < found.anees < found.high
+    assert found.inside == pytest.approx(0.95, abs=0.04)
+    sure = compare.consistency_of([2.0 * values for values in honest])
+    assert sure.anees > sure.high
+    assert sure.inside < 0.01
+
+
+def test_runs_of_other_lengths_are_averaged_where_all_have_a_value() -> None:
+    columns = [np.array([np.nan, 6.0, 7.0]), np.array([np.nan, 4.0]), np.full(3, np.nan)]
+    found = compare.consistency_of(columns)
+    assert (found.anees, found.runs) == (5.0, 2)
+    assert compare.nees_over_runs(columns)["runs"].to_list() == [0, 2, 1]
