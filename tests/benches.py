@@ -8,14 +8,14 @@ estimators = ["dead-reckoning", "joint-ekf", "isam2"]
 
 [[sequence]]
 name = "town"
-simulate = { path = "town", duration = 2.5, features_per_frame = 12 }
-seeds = { count = 3, first = 1 }
+simulate = { path = "town", duration = 2, features_per_frame = 10 }
+seeds = { count = 2, first = 1 }
 
 [[sequence]]
 name = "room"
-simulate = { path = "handheld", duration = 2, features_per_frame = [8, 14] }
+simulate = { path = "handheld", duration = 1.5, features_per_frame = [8, 12] }
 """
-N_RUNS = 5
+N_RUNS = 4
 
 
 def written(folder: Path, text: str = SUITE) -> Path:

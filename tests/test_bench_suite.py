@@ -92,12 +92,11 @@ def test_every_combination_is_a_job_with_a_name_of_its_own(tmp_path: Path) -> No
     assert names == [
         "town seed=1",
         "town seed=2",
-        "town seed=3",
         "room features_per_frame=8",
-        "room features_per_frame=14",
+        "room features_per_frame=12",
     ]
     assert len({job.job.key for job in jobs}) == N_RUNS
-    assert [job.case for job in jobs[:3]] == ["town"] * 3
+    assert [job.case for job in jobs[:2]] == ["town"] * 2
 
 
 def test_a_preset_is_not_multiplied_by_settings_it_has_no_use_for(tmp_path: Path) -> None:

@@ -4,9 +4,11 @@ import contextlib
 import os
 import shutil
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any, Protocol
 from uuid import uuid4
 
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
-SECONDS_TO_CONNECT = 10
+SECONDS_TO_CONNECT = 5
+SECONDS_TO_FOLLOW = 0.5
 PROGRESS = "progress"
 
 
@@ -81,7 +84,9 @@ class Processes:
 
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir()
-        executor = ProcessPoolExecutor(count or self._workers, env=ONE_THREAD, initializer=_leave_interrupts_to_parent)
+        executor = ProcessPoolExecutor(
+            count or self._workers, env=ONE_THREAD, initializer=_follow, initargs=(os.getpid(),)
+        )
         try:
             yield _Processes(executor, FileChannel(self._folder))
         finally:
@@ -89,8 +94,17 @@ class Processes:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def _leave_interrupts_to_parent() -> None:
+def _follow(parent: int) -> None:
+    """Within a worker: leaves interrupts to the parent, and ends when that has been killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(SECONDS_TO_FOLLOW)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 class _Workers:

@@ -43,6 +43,7 @@ def rankings(results: Results) -> pd.DataFrame:
             of_case = results.runs[results.runs["case"] == case]
             ranked = compare.ranking(_wide(of_case, metric.name, results.estimators)).reset_index()
             if len(ranked):
+                ranked["low"] = ranked["low"].clip(lower=0.0)
                 ranked.insert(0, "metric", metric.name)
                 ranked.insert(0, "case", case)
                 parts.append(ranked)

@@ -5,10 +5,10 @@ import pandas as pd
 from ..page.numbers import listed, number
 from .figures import judge
 from .grid import interval
-from .results import ANSWERED, Metric, Results
+from .results import ANSWERED, METRICS, Metric, Results
 from .tables import consistency, overall, rankings, records
 
-MOST_CASES = 8
+MOST_CASES = 10
 """that are told one by one"""
 
 
@@ -42,15 +42,19 @@ def _trust(results: Results) -> list[str]:
 
 
 def _best(results: Results) -> list[str]:
-    metric = judge(results)
-    if metric is None:
-        return ["No run has a truth or held-out tracks, so nothing says which estimator is the most accurate."]
+    """Of each case, by what it has: truth, else held-out tracks."""
     ranked = rankings(results)
-    ranked = ranked[ranked["metric"] == metric.name]
-    names = list(dict.fromkeys(ranked["case"]))
-    if len(names) > MOST_CASES:
+    if ranked.empty:
+        return ["No run has a truth or held-out tracks, so nothing says which estimator is the most accurate."]
+    of_case = {str(case): table for case, table in ranked.groupby("case", sort=False)}
+    if len(of_case) > MOST_CASES:
         return []
-    return [_winner(case, ranked[ranked["case"] == case], metric) for case in names]
+    said = []
+    for case, table in of_case.items():
+        metric = next(metric for metric in METRICS if (table["metric"] == metric.name).any())
+        said.append(_winner(case, table[table["metric"] == metric.name], metric))
+    without = [case for case in results.cases if case not in of_case]
+    return [*said, f"Nothing says who is most accurate in {listed(without)}."] if without else said
 
 
 def _winner(case: str, ranked: pd.DataFrame, metric: Metric) -> str:

@@ -76,6 +76,7 @@ def _files(job: Job, tell: Tell) -> dict[str, bytes]:
     tell("reading", 0, 0)
     sequence = _sequence(job)
     kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
+    tell("posing the problem", 0, 0)
     problem = _problem(kept, job)
     watch = CostWatch(tell)
     run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
