@@ -259,6 +259,11 @@ def test_on_paper_there_are_no_controls(opened: Opened, tmp_path: Path) -> None:
     for selector in ("#controls", ".tools", "nav"):
         assert not opened.page.is_visible(selector)
     assert opened.page.is_visible("#path-view svg")
+    assert not opened.page.is_visible("#behind li")
+    opened.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert opened.page.is_visible("#behind li")
+    opened.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert not opened.page.is_visible("#behind li")
     assert len(opened.page.pdf(format="A4")) > 20_000
 
 

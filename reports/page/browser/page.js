@@ -49,6 +49,14 @@ if (table) {
   onFrame.push(fill);
 }
 
+// Paper cannot be unfolded.
+const folded = [];
+addEventListener("beforeprint", () => {
+  folded.push(...document.querySelectorAll("#behind details:not([open])"));
+  folded.forEach(details => { details.open = true; });
+});
+addEventListener("afterprint", () => folded.splice(0).forEach(details => { details.open = false; }));
+
 const paths = document.getElementById("path-view");
 if (paths) new PathView(paths);
 document.querySelectorAll(".chart").forEach(place => new TimeChart(place, charts[Number(place.dataset.chart)]));
