@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.reports.figures import encoded
 
-LARGEST_SVG = 400_000
+LARGEST_SVG = 200_000
 """bytes, from which on the PNG takes its place"""
 
 CAPTIONS: Mapping[str, str] = {

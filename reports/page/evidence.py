@@ -10,7 +10,7 @@ from fgbaseline.reports.tables import map_by_depth
 from .numbers import number
 from .table import Column, Table, table_of
 
-EVIDENCE = ("held_out", "consistency", "three_sigma_", "reprojection_classes", "map_difference")
+EVIDENCE = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
 """beginnings of the names of the figures that stand here"""
 HELD_OUT, CONSISTENCY, RESIDUALS, MAP = "held-out tracks", "consistency", "tracks", "landmarks"
 NOT_COVARIANCES = Column(CONSISTENCY, "not positive definite", ("covariance", "not_positive_definite"))
