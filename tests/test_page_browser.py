@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fgbaseline.data import Excluded
+from fgbaseline.data import Excluded, Landmarks
 from fgbaseline.reports import page
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.paths import paths_overlaid
 from fgbaseline.reports.figures.style import in_style
 
-from .reported import answer, as_dict, run_of, scene
+from .reported import answer, as_dict, failed, run_of, scene
 from .synthetic import plain_problem
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -265,6 +265,27 @@ def test_on_paper_there_are_no_controls(opened: Opened, tmp_path: Path) -> None:
     opened.page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert not opened.page.is_visible("#behind li")
     assert len(opened.page.pdf(format="A4")) > 20_000
+
+
+def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: Any, tmp_path: Path) -> None:
+    problem = plain_problem(scene(truth=None))
+    alone = answer(problem, "dead-reckoning", covariance=None, seconds=np.empty(0), landmarks=Landmarks.none())
+    gone = alone.world_T_imu.copy()
+    gone[20:] = np.nan
+    run = run_of(problem, failed(problem, "ekf", "no"), replace(alone, world_T_imu=gone))
+    file = tmp_path / "report.html"
+    file.write_text(page.render(run, as_dict(run), {}), encoding="utf-8")
+    opened = Opened(chromium, file.as_uri())
+    opened.page.click('[data-do="ellipses"]')
+    opened.page.click('[data-do="landmarks"]')
+    opened.page.click('[data-do="solid"]')
+    opened.set_frame(30)
+    assert opened.said == []
+    assert opened.count("#path-view .line") == 1
+    assert opened.count("#path-view .here") == 0
+    assert "12 in the problem" in opened.text(".said")
+    assert opened.count('[data-side="left"] .measured') == 12
+    opened.page.context.close()
 
 
 def test_without_a_script_the_still_figures_stand_in(chromium: Any, address: str) -> None:

@@ -99,7 +99,7 @@ class FrameView {
       return errors.length % 2 ? errors[half] : (errors[half - 1] + errors[half]) / 2;
     };
     const parts = [`${seen.length} matches`];
-    const kinds = { used: `used by ${name}`, rejected: `offered to but not used by ${name}`, excluded: "excluded by the mask" };
+    const kinds = { used: `used by ${name}`, rejected: name ? `offered to but not used by ${name}` : "in the problem", excluded: "excluded by the mask" };
     for (const [fate, text] of Object.entries(kinds)) {
       const some = of(fate);
       if (some.length === 0) continue;
