@@ -10,6 +10,7 @@ from fgbaseline.geometry import InputError
 from .by_hand import ASSUMED, mask_settings, overridden, told
 from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair
 from .documented import most_observed
+from .gaps import admit_gaps
 from .motion import Shift, dead_reckoned_path, increments
 from .problem import Excluded, HuberKernel, Problem
 from .repairs import Repairs
@@ -63,7 +64,7 @@ def calibrated(
         diagnosis = diagnosis or diagnose(sequence)
         if diagnosis.sigmas is not None or repairs is not None:
             return _diagnosed(diagnosis, features, repairs or Repairs())
-    problem = _as_recorded(sequence, features, settings or Calibration())
+    problem = admit_gaps(_as_recorded(sequence, features, settings or Calibration()))
     if diagnosis is None or not diagnosis.cannot_tell:
         return problem
     return replace(problem, remarks=(f"not diagnosed: {diagnosis.cannot_tell}", *problem.remarks))
@@ -82,7 +83,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     )
     problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
     return replace(
-        _bridged(problem, diagnosis, noise),
+        admit_gaps(_bridged(problem, diagnosis, noise)),
         diagnosed=not found.cannot_tell,
         findings=findings_of(found),
         repairs=(*told(repairs), *repaired.repairs),

@@ -1,0 +1,79 @@
+"""Over a gap nobody recorded how the velocity changed: what it does elsewhere tells how far it may have strayed.
+
+A velocity that wanders like a random walk of spectral density q (m^2/s^3 or rad^2/s^3) is off by a variance of q t
+after a time t, and what comes of holding it by q t^3 / 3. The structure function of the recorded velocities gives q:
+the mean square of u(s + t) - u(s), less twice the variance of their noise, over t; its largest value counts, since a
+steady acceleration shows only at long lags.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import expm
+
+from fgbaseline.geometry import FloatArray, se3
+
+from .diagnose.tracks import GAP
+from .observations import BoolArray
+from .problem import Problem
+
+SHORTEST_LAG = 1.0
+"""s; over less, noise hides how the velocity changes"""
+LAGS = 12
+MIN_PAIRS = 5
+
+
+def gaps(dt: FloatArray) -> BoolArray:
+    """(T-1,) which intervals are longer than `GAP` times the median."""
+    return np.asarray(dt > GAP * np.median(dt), dtype=np.bool_)
+
+
+def admit_gaps(problem: Problem) -> Problem:
+    """The problem with what the velocity may have done in the gaps of its recording added to the noise there.
+
+    A problem without gaps is given back as it is.
+    """
+    dt = problem.sequence.dt
+    long = gaps(dt)
+    if not long.any() or long.all():
+        return problem
+    density = wandering(problem, long)
+    covariance = problem.increment_covariance.copy()
+    J = np.stack([_right_jacobian(twist) for twist in problem.increment[long]])
+    strayed = (density * dt[long, None] ** 3 / 3.0)[:, :, None] * np.eye(6)
+    covariance[long] += J @ strayed @ np.swapaxes(J, 1, 2)
+    deviation = np.sqrt(np.einsum("nii->ni", covariance[long]))
+    remark = (
+        f"in the gaps between frames ({int(long.sum())}, the longest {dt[long].max():.3g} s) the velocity may have "
+        f"changed as it does elsewhere: up to {np.linalg.norm(deviation[:, :3], axis=1).max():.2g} m and "
+        f"{np.degrees(np.linalg.norm(deviation[:, 3:], axis=1).max()):.2g}° are allowed for"
+    )
+    return replace(problem, increment_covariance=covariance, remarks=(*problem.remarks, remark))
+
+
+def wandering(problem: Problem, long: BoolArray) -> FloatArray:
+    """(6,) q of each component of the velocity [v, w], m^2/s^3 and rad^2/s^3, from between the `long` intervals."""
+    dt = problem.sequence.dt
+    usual = float(np.median(dt))
+    twist = problem.increment[~long] / dt[~long, None]
+    noise = np.einsum("nii->i", problem.increment_covariance[~long] / dt[~long, None, None] ** 2) / len(twist)
+    stretch = np.cumsum(long)[~long]
+    shortest = max(1, round(SHORTEST_LAG / usual))
+    longest = max(shortest, min(round(float(dt.max()) / usual), len(twist) - MIN_PAIRS))
+    density = np.zeros(6)
+    for lag in np.unique(np.geomspace(shortest, longest, LAGS).astype(int)).tolist():
+        together = stretch[lag:] == stretch[:-lag]
+        if together.sum() >= MIN_PAIRS:
+            change = np.mean((twist[lag:] - twist[:-lag])[together] ** 2, axis=0)
+            density = np.maximum(density, (change - 2.0 * noise) / (lag * usual))
+    return density
+
+
+def _right_jacobian(twist: FloatArray) -> FloatArray:
+    """(6, 6) of exp at a twist (6,) of any size: the integral of exp(-s ad) over s from 0 to 1.
+
+    It is the corner of one matrix exponential (Van Loan, 1978); `se3.right_jacobian` is a series for short motions.
+    """
+    block = np.zeros((12, 12))
+    block[:6, :6], block[:6, 6:] = -se3.curly_hat(twist), np.eye(6)
+    return np.asarray(expm(block)[:6, 6:], dtype=np.float64)
