@@ -19,6 +19,10 @@ class Shift(float, Enum):
     BEFORE = -1.0
     """u_(k+1) moves k to k+1"""
 
+    def __format__(self, form: str) -> str:
+        """As any number: an Enum would write its name into sentences and files."""
+        return format(float(self), form)
+
 
 def held_twist(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
     """(T-1, 6) recorded velocity [v, w] of each interval, each sample held for one interval.

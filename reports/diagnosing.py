@@ -9,6 +9,7 @@ import numpy as np
 
 from fgbaseline.data import Diagnosis, diagnose, read, repairs_text
 from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
+from fgbaseline.data.formats.beside import written_beside
 from fgbaseline.geometry import InputError
 
 from .whole_folder import require_free, whole_folder
@@ -36,7 +37,8 @@ def tell(path: Path, out: Path | None, *, as_json: bool, repairs: Path | None, f
         with whole_folder(out, force=force, mark=MARK) as folder:
             write(diagnosis, tracks, report, folder)
     if repairs is not None:
-        repairs.write_text(repairs_text(diagnosis), encoding="utf-8")
+        with written_beside(repairs) as file:
+            file.write(repairs_text(diagnosis).encode())
     if as_json:
         click.echo(text(report), nl=False)
     else:

@@ -3,10 +3,12 @@
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fgbaseline.geometry import InputError
+
+from .exchange_names import exchanged
 
 
 def require_free(place: Path, *, force: bool, mark: str) -> None:
@@ -45,9 +47,9 @@ def whole_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
             building.mkdir(parents=True)
             yield building
             require_free(place, force=force, mark=mark)
-            _replace(place, building)
+            _replace(place, building, mark)
         finally:
-            shutil.rmtree(building, ignore_errors=True)
+            _remove(building, mark)
             _remove_empty(new_parents)
 
 
@@ -59,17 +61,32 @@ def _require_room(place: Path) -> None:
         raise InputError(f"{place}: {parent} may not be written to; choose another --out, or change its permissions")
 
 
-def _replace(place: Path, building: Path) -> None:
-    """`building` in place of the folder `place`, if there is one; that one comes back if it fails or is interrupted."""
+def _replace(place: Path, building: Path, mark: str) -> None:
+    """`building` in place of the folder `place`, if there is one.
+
+    Where the system can exchange two names in one step, `place` is one of both whole folders at every moment, even if
+    the process is killed; elsewhere the old one comes back if the exchange fails or is interrupted.
+    """
+    if not place.exists():
+        building.rename(place)
+        return
+    if exchanged(building, place):  # the old one is where the new one was built, and goes with it
+        return
     old = place.with_name(f".{place.name}.{os.getpid()}.old")
     try:
-        if place.exists():
-            place.rename(old)
+        place.rename(old)
         building.rename(place)
     finally:
         if not place.exists() and old.exists():
             old.rename(place)
-        shutil.rmtree(old, ignore_errors=True)
+        _remove(old, mark)
+
+
+def _remove(folder: Path, mark: str) -> None:
+    """Removes a folder, first of all the file that says that it is whole."""
+    with suppress(OSError):
+        (folder / mark).unlink()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_empty(folders: list[Path]) -> None:
