@@ -8,7 +8,7 @@ QUICK_DRIVE := --path town --duration 10 --features-per-frame 25 --seed 3
 QUICK_ESTIMATORS := dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch
 QUICK_CHECK :=
 
-.PHONY: run test quick lint types arrows install schema wheel clean
+.PHONY: run test quick fuzz lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
@@ -23,6 +23,12 @@ quick: install
 	$(BIN)/fgbaseline simulate out/quick.npz $(QUICK_DRIVE) --force
 	$(BIN)/fgbaseline run out/quick.npz --estimators $(QUICK_ESTIMATORS) --out out/quick --force
 	$(BIN)/fgbaseline check out/quick --limits suites/quick-limits.toml --baseline suites/quick-baseline.json $(QUICK_CHECK)
+
+# Mutated files for every reader, guided by coverage; FUZZ_SECONDS for each of them.
+FUZZ_SECONDS ?= 60
+fuzz: install
+	$(BIN)/pip install --quiet --group fuzz
+	$(BIN)/python -m benchmarks.fuzz --seconds $(FUZZ_SECONDS)
 
 lint: install
 	$(BIN)/ruff check .

@@ -33,7 +33,7 @@ def read_problem(folder: FilePath) -> Problem:
 def _words(path: Path) -> dict[str, Any]:
     try:
         words = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"it is no JSON ({error}); export the problem again") from error
     found = words.get("schema") if isinstance(words, dict) else None
     if found != layout.SCHEMA:

@@ -54,7 +54,7 @@ def read_run_folder(folder: Path) -> RunFolder:
             settings = dict(summary["settings"])
             up = summary["sequence"].get("up")
             up = None if up is None else tuple(map(float, up))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         if reference["name"] not in names:
             raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
