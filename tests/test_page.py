@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from hashlib import sha256
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures, page
 from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures.palette import OWN, REFERENCE, SPARE, TRUTH, on_dark
 from fgbaseline.reports.page.numbers import number
 from fgbaseline.reports.page.table import COLUMNS, main_table
 
@@ -228,3 +230,22 @@ def test_numbers_have_three_digits(value: object, text: str) -> None:
 
 def test_numbers_of_numpy_are_numbers() -> None:
     assert number(np.float64(2.5)) == "2.50"
+
+
+@pytest.mark.parametrize("colour", [*OWN.values(), *SPARE, REFERENCE, TRUTH])
+def test_every_colour_stands_out_on_dark_ground(colour: str) -> None:
+    """By the contrast that the accessibility guidelines (WCAG 2.2, 1.4.11) ask of lines: 3 to 1."""
+    (ground,) = re.findall(r"--card: (#\w+);", standard_style().partition("prefers-color-scheme: dark")[2])[:1]
+    bright, dark = sorted((luminance(on_dark(colour)), luminance(ground)), reverse=True)
+    assert (bright + 0.05) / (dark + 0.05) >= 3.0
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of `#RRGGBB`, 0 to 1."""
+    share = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def standard_style() -> str:
+    return files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")
