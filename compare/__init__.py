@@ -14,6 +14,7 @@ from .interpolation import interpolated
 from .maps import map_by_depth, map_difference
 from .moved import moved_points
 from .over_runs import Consistency, consistency_of, mean_of, nees_over_runs, ranking
+from .paired import RmseDifference, rmse_difference
 from .pairs import Unit, pose_pairs
 from .pose_difference import Difference, absolute_difference, motion_difference
 from .relative import matched_pairs, relative_errors
@@ -26,6 +27,7 @@ from .reprojection import (
 )
 from .residual_patterns import residual_patterns
 from .segments import SegmentErrors, segment_errors
+from .share_intervals import share_intervals
 from .shared_data import DifferenceNees, difference_nees
 from .statistics import summarised
 from .time_offset import TimeOffset, time_offset
@@ -46,6 +48,7 @@ __all__ = [
     "Matched",
     "NisSummary",
     "Passing",
+    "RmseDifference",
     "SegmentErrors",
     "TimeOffset",
     "Trust",
@@ -93,7 +96,9 @@ __all__ = [
     "reprojection_by",
     "reprojection_summary",
     "residual_patterns",
+    "rmse_difference",
     "segment_errors",
+    "share_intervals",
     "sigma_ratio",
     "summarised",
     "time_offset",

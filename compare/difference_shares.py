@@ -10,6 +10,9 @@ from fgbaseline.geometry import FloatArray
 from .alignment import Align
 from .association import Matched
 
+SCALE, WHOLE = 1, 3
+"""how many columns of the basis each step fits"""
+
 
 @dataclass(frozen=True, slots=True)
 class DifferenceShares:
@@ -40,18 +43,10 @@ def difference_shares(matched: Matched, up: ArrayLike = (0.0, 0.0, 1.0)) -> Diff
     which have taken out what fits into them. First order in the angles: above some 20 degrees of heading error part of
     it counts as scale and noise.
     """
-    r = matched.reference.position
-    d = matched.estimate.position - r
-    t = matched.reference.t - matched.reference.t[0]
-    upward = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
-    steps = 0.5 * (t[1:] + t[:-1])[:, None] * np.cross(upward, np.diff(r, axis=0))
-    drifting = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    columns = [r - r[0], np.cross(upward, r - r[0]), drifting]
-    if matched.alignment.kind not in (Align.NONE, Align.FIRST_POSE):
-        columns = [column - column.mean(axis=0) for column in columns]
+    d, columns = difference_basis(matched, up)
     total = float(np.sum(d**2))
-    basis = np.stack([column.ravel() for column in columns], axis=1)
-    (_, after_scale), (fitted, after_heading) = (_fit(basis[:, :m], d.ravel()) for m in (1, 3))
+    basis = columns.reshape(-1, WHOLE)
+    (_, after_scale), (fitted, after_heading) = (_fit(basis[:, :m], d.ravel()) for m in (SCALE, WHOLE))
     if total == 0.0:
         shares = (np.nan, np.nan, np.nan)
     else:
@@ -63,6 +58,20 @@ def difference_shares(matched: Matched, up: ArrayLike = (0.0, 0.0, 1.0)) -> Diff
         heading_deg_per_s=float(np.rad2deg(fitted[2])),
         rms=float(np.sqrt(total / len(d))),
     )
+
+
+def difference_basis(matched: Matched, up: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """The difference d (n, 3), m, and (n, 3, 3) what is fitted to it, a column each: scale, heading, its drift."""
+    r = matched.reference.position
+    d = matched.estimate.position - r
+    t = matched.reference.t - matched.reference.t[0]
+    upward = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
+    steps = 0.5 * (t[1:] + t[:-1])[:, None] * np.cross(upward, np.diff(r, axis=0))
+    drifting = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    columns = [r - r[0], np.cross(upward, r - r[0]), drifting]
+    if matched.alignment.kind not in (Align.NONE, Align.FIRST_POSE):
+        columns = [column - column.mean(axis=0) for column in columns]
+    return d, np.stack(columns, axis=2)
 
 
 def _fit(basis: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:

@@ -63,7 +63,8 @@ def pose_pairs(
 
 def chained_pairs(along: FloatArray, delta: float) -> IntArray:
     """(m, 2) indices into rising `along` (n,): from each end to the first that is a delta further or more."""
-    following = np.searchsorted(along, along + delta * (1.0 - ROUNDING)).tolist()
+    following = np.searchsorted(along, along + delta * (1.0 - ROUNDING))
+    following = np.maximum(following, np.arange(len(along)) + 1).tolist()  # a delta may be below rounding
     chain = [0]
     while (end := following[chain[-1]]) < len(along):
         chain.append(end)

@@ -9,6 +9,7 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError
 
 from .association import Matched
+from .block_bootstrap import error_statistics
 from .pose_difference import Difference, motion_difference
 from .travel import distance_travelled
 
@@ -47,6 +48,12 @@ class SegmentErrors:
     def rotation_deg_per_m(self) -> float:
         """Mean over all segments, deg/m."""
         return float(self.table["rotation_deg_per_m"].mean())
+
+    def intervals(self, seed: int = 0) -> pd.DataFrame:
+        """`value`, `low`, `high` of both means, in the order of the segments' starts: see `error_statistics`."""
+        columns = ["translation_percent", "rotation_deg_per_m"]
+        rows = [error_statistics(self.table[column], seed=seed).loc["mean"] for column in columns]
+        return pd.DataFrame(rows, index=pd.Index(columns))
 
     @property
     def caption(self) -> str:

@@ -11,6 +11,8 @@ from .observations import BoolArray, IntArray
 
 ROTATION_TOLERANCE = 1e-6
 """how far from a rotation the nine numbers of a pose may be"""
+FARTHEST = 1e12
+"""m; positions beyond it have fewer digits than a millimetre needs"""
 EXACT = 1e-12
 """up to here it is rounding, and they stay as they are"""
 
@@ -21,7 +23,8 @@ class Trajectory:
     rotations that are not exact are replaced by the nearest that is.
 
     Raises InputError, naming the pose (and the line it came from, where that is known), for stamps that do not rise or
-    repeat, for poses that are not finite and for rotations that are none (beyond ROTATION_TOLERANCE).
+    repeat, for poses that are not finite or farther than FARTHEST from the origin, and for rotations that are none
+    (beyond ROTATION_TOLERANCE).
     """
 
     t: FloatArray
@@ -108,6 +111,13 @@ def check_trajectory(path: Trajectory) -> FloatArray:
     )
     finite = np.asarray(np.isfinite(poses).all(axis=(1, 2)), dtype=np.bool_)
     _require(finite, path, lambda _: "it is not finite; leave out what is not known")
+    _require(
+        np.asarray((np.abs(poses[:, :3, 3]) <= FARTHEST).all(axis=1), dtype=np.bool_),
+        path,
+        lambda i: (
+            f"its position {poses[i, :3, 3].tolist()} is beyond {FARTHEST:g} m; give metres, of a path that holds"
+        ),
+    )
     with np.errstate(over="ignore", invalid="ignore"):
         last_row = [np.abs(poses[:, 3, i] - float(i == 3)) for i in range(4)]
         defect = np.maximum.reduce([so3.rotation_defect(poses[:, :3, :3]), *last_row])

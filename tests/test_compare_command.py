@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fgbaseline import data
@@ -63,6 +64,10 @@ def test_against_a_run_the_trust_comes_first_and_its_estimators_stand_beside(mad
     assert mine["reprojection"]["n"] == summary["reference"]["reprojection"]["n"]
     up = compare(made / "run", made / "mine.tum").up
     np.testing.assert_array_equal(up, drive(features_per_frame=20.0).up)
+    assert beside["map"]["median"] > 0.01
+    own = pd.read_csv(made / "out/c/maps/mine.csv")
+    assert len(own) == mine["map"]["n"] == sum(of["n"] for of in mine["map"]["by_depth"])
+    assert own["distance"].max() < 1e-6
     page = (made / "out/c/report.html").read_text()
     assert 'class="trust' in page
 

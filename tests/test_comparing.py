@@ -1,6 +1,8 @@
 """A comparison from Python: its tables, captions and sentences, whatever the files are and whoever wrote them."""
 
 import json
+import shutil
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from fgbaseline.reports.comparing.summary import summarise
 from .synthetic import drive, matched
 
 
+@cache
 def truth() -> tuple[FloatArray, FloatArray]:
     """Stamps and poses of a drive of 12 s."""
     sequence = drive(seconds=12.0)
@@ -37,8 +40,15 @@ def astray(poses: FloatArray, size: float, seed: int) -> FloatArray:
 
 
 @pytest.fixture
-def files(tmp_path: Path) -> Path:
+def files(tmp_path: Path, written: Path) -> Path:
+    """A folder with them that a test may write into."""
+    return Path(shutil.copytree(written, tmp_path, dirs_exist_ok=True))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A truth and two estimates, elsewhere in the world, in four forms."""
+    tmp_path = tmp_path_factory.mktemp("written")
     t, poses = truth()
     elsewhere = se3.exp([5.0, -3.0, 1.0, 0.1, 0.2, 2.0])
     data.write_tum(tmp_path / "truth.tum", t, poses)
@@ -208,6 +218,36 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     assert "reprojection" in result.figures()
 
 
+def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
+    """Both share an error that makes their own intervals wide; one adds to it everywhere."""
+    t, poses = truth()
+    shared = se3.compose(se3.exp(np.random.default_rng(0).normal(size=(len(t) - 1, 6)) * 1e-3))
+    for name, more in (("one", 0.0), ("two", 0.01), ("three", 0.0)):
+        moved = poses @ shared
+        moved[:, :3, 3] += (0.02 + more) * np.sin(np.arange(len(t)))[:, None]
+        data.write_tum(files / f"{name}.tum", t, moved)
+    result = compare(files / "truth.tum", *(files / f"{name}.tum" for name in ("two", "one", "three")), align="none")
+    assert result.behind["two"].low > 0.0
+    assert result.behind["three"].value == 0.0
+    said = " ".join(result.verdict)
+    assert "Farther than one, by paired bootstrap of their RMSE: two (" in said
+    assert "does not settle whether one is nearer than three" in said
+    summary = summarise(result).estimates
+    assert summary["one"].behind is None
+    assert summary["two"].behind is not None
+    rmse = {name: summary[name].translation.rmse.value or 0.0 for name in ("one", "two")}
+    assert summary["two"].behind.value == pytest.approx(rmse["two"] - rmse["one"], rel=1e-9)
+
+
+def test_stamps_that_are_no_frames_of_the_recording_are_told(files: Path) -> None:
+    t, poses = truth()
+    data.write_npz(drive(), files / "drive.npz")
+    data.write_tum(files / "later.tum", t + 1e6, poses)
+    data.write_tum(files / "later2.tum", t + 1e6, poses)
+    result = compare(files / "later.tum", files / "later2.tum", sequence=files / "drive.npz")
+    assert any(s.startswith("No pose of later and later2 is at a frame of ") for s in result.verdict)
+
+
 def test_covariances_that_came_along_are_judged_unaligned(files: Path) -> None:
     t, poses = truth()
     deviation = np.repeat([0.1, 0.01], 3)
@@ -218,6 +258,14 @@ def test_covariances_that_came_along_are_judged_unaligned(files: Path) -> None:
     nees = summarise(result).estimates["mine"].nees
     assert nees is not None
     assert nees.mean == pytest.approx(6.0, abs=1.0)
+    assert (nees.frames, nees.not_positive_definite) == (len(t), 0)
+    assert any("mean NEES" in sentence for sentence in result.verdict)
+    figure = result.figures()["three_sigma_mine"]
+    assert all(float(panel.get_title(loc="left").split()[-3]) > 95.0 for panel in figure.axes)
+    covariance[3] = -covariance[3]
+    data.write_trajectory_npz(files / "bad.npz", t, poses @ se3.exp(error), covariance)
+    bad = compare(files / "truth.tum", files / "bad.npz", align="none")
+    assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
     aligned = summarise(compare(files / "truth.tum", files / "mine.npz")).estimates["mine"]
     assert aligned.nees is None
     assert "hides errors" in aligned.notes["nees"]
@@ -238,7 +286,7 @@ def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
     assert "&lt;b&gt;&amp;|%_$" in page
     assert "default-src 'none'" in page
     assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
-    assert r"$<$b" in latex(result) or r"<b>\&|\%\_\$" in latex(result)
+    assert r"\textless{}b\textgreater{}\&\textbar{}\%\_\$" in latex(result)
     aligned = data.read_trajectory(files / "out" / "trajectories" / "near.tum")
     assert np.linalg.norm(aligned.position - truth()[1][:, :3, 3], axis=1).mean() < 0.2
     series = pd.read_csv(files / "out" / "series" / "near.csv")

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
+from fgbaseline.compare.block_draws import draw_blocks
 from fgbaseline.compare.block_length import autocovariance, block_length
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -107,3 +108,50 @@ def test_one_error_has_no_interval_and_none_has_no_value() -> None:
 def test_settings_that_make_no_sense_are_errors(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match="bootstrap:"):
         compare.error_statistics(np.arange(10.0), **wrong)  # type: ignore[arg-type]
+
+
+@given(values=st.lists(st.sampled_from([0.0, 1.0, 1.5, 4.0, 9.0]), min_size=1, max_size=30), block=st.integers(1, 30))
+def test_sums_and_quantiles_are_those_of_the_series_written_out(values: list[float], block: int) -> None:
+    x = np.array(values)
+    n, block = len(x), min(block, len(x))
+    draws = draw_blocks(n, block, 7, seed=3)
+    assert ((draws.start >= 0) & (draws.start <= n - block)).all()
+    series = np.stack(
+        [np.concatenate([x[s : s + m] for s, m in zip(row, draws.length, strict=True)]) for row in draws.start]
+    )
+    assert series.shape == (7, n)
+    np.testing.assert_allclose(draws.sums(x[:, None])[:, 0], series.sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(draws.quantiles(x, (0.1, 0.5, 0.95)), np.quantile(series, (0.1, 0.5, 0.95), axis=1).T)
+
+
+def test_what_both_share_does_not_blur_which_is_better() -> None:
+    """The intervals of the two overlap, and yet one is the better one everywhere."""
+    common = np.abs(autoregressive(1000, 0.8, 0))
+    better, worse = common, common + 0.05
+    low, high = (compare.error_statistics(e).loc["rmse"] for e in (worse, better))
+    assert low["low"] < high["high"]
+    found = compare.rmse_difference(worse, better)
+    assert found.settled
+    assert found.low <= found.value <= found.high
+    rmse = [float(np.sqrt(np.mean(e**2))) for e in (worse, better)]
+    assert found.value == pytest.approx(rmse[0] - rmse[1], rel=1e-12)
+    back = compare.rmse_difference(better, worse)
+    assert (back.value, back.low, back.high) == pytest.approx((-found.value, -found.high, -found.low), rel=1e-12)
+
+
+def test_equals_are_called_different_no_more_often_than_promised() -> None:
+    random = np.random.default_rng(0)
+    settled = 0
+    for seed in range(100):
+        common = autoregressive(600, 0.9, seed)
+        pair = (common + 0.3 * random.normal(size=600) for _ in range(2))
+        settled += compare.rmse_difference(*pair, repetitions=150).settled
+    assert settled <= 15
+
+
+def test_pairs_without_a_difference_settle_nothing() -> None:
+    x = np.arange(20.0)
+    assert not compare.rmse_difference(x, x).settled
+    assert not compare.rmse_difference([np.nan], [1.0]).settled
+    with pytest.raises(InputError, match="same moments"):
+        compare.rmse_difference([1.0, 2.0], [1.0])

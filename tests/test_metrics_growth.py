@@ -138,6 +138,35 @@ def test_shares_are_shares(seed: int, kind: compare.Align) -> None:
     assert min(found.scale, found.heading, found.noise) >= -1e-12
 
 
+@pytest.mark.parametrize(
+    ("wrong", "share"),
+    [({"scale": 1.02}, "scale"), ({"heading_rate": 2e-4}, "heading"), ({"noise": 0.5}, "noise")],
+)
+def test_shares_are_sure_where_there_is_one_kind_of_error(wrong: dict[str, float], share: str) -> None:
+    table = compare.share_intervals(matched(winding(**wrong)), repetitions=100)
+    assert table.loc[share, "low"] > 0.95
+    assert table.loc[share, "value"] == getattr(compare.difference_shares(matched(winding(**wrong))), share)
+
+
+@given(seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(compare.Align))
+def test_intervals_of_shares_are_shares_and_hold_them(seed: int, kind: compare.Align) -> None:
+    random = np.random.default_rng(seed)
+    reference = se3.compose(se3.exp(random.normal(size=(20, 6))))
+    pair = matched(reference @ se3.exp(0.3 * random.normal(size=(21, 6))), reference).aligned(kind)
+    table = compare.share_intervals(pair, repetitions=20)
+    assert (table["low"] <= table["value"]).all()
+    assert (table["value"] <= table["high"]).all()
+    assert table["low"].min() > -1e-9
+    assert table["high"].max() < 1 + 1e-9
+
+
+def test_no_difference_has_no_intervals_either() -> None:
+    table = compare.share_intervals(matched(winding()))
+    assert table.isna().all(axis=None)
+    still = compare.share_intervals(matched(winding(), np.tile(np.eye(4), (N, 1, 1))), repetitions=5)
+    assert still["high"].tolist() == [0.0, 0.0, 1.0]
+
+
 def test_no_difference_has_no_shares_and_a_standing_reference_only_noise() -> None:
     same = compare.difference_shares(matched(winding()))
     assert same.rms == 0.0

@@ -79,6 +79,11 @@ def test_seconds_are_those_of_the_stamps_also_of_large_ones() -> None:
     assert not ((gap[:, 0] < 20) & (gap[:, 1] >= 20)).any()
 
 
+def test_a_delta_below_rounding_still_ends() -> None:
+    poses = straight(np.full(5, 1e11))
+    assert compare.pose_pairs(poses, np.arange(6.0), 1e-9, "m").tolist() == [[i, i + 1] for i in range(5)]
+
+
 def test_all_pairs_by_frames_are_exact_to_the_end() -> None:
     poses = straight(np.ones(19))
     assert compare.pose_pairs(poses, np.arange(20.0), 15, "frames", all_pairs=True).tolist() == [

@@ -27,6 +27,7 @@ def spoiled(i: int, row: int, column: int, value: float) -> FloatArray:
         ([0, 1, np.nan, 2, 3], poses(), r"a.tum: line 12: its time stamp is nan"),
         ([0, 1, 2, 3, np.inf], poses(), r"a.tum: line 14: its time stamp is inf"),
         (range(5), spoiled(3, 0, 3, np.nan), r"a.tum: line 13: it is not finite"),
+        (range(5), spoiled(3, 1, 3, -2e12), r"a.tum: line 13: its position .*-2000000000000.0.* is beyond 1e[+]12 m"),
         (range(5), spoiled(3, 1, 1, 2.0), r"a.tum: line 13: its upper left 3x3 is no rotation"),
         (range(5), spoiled(3, 1, 1, 1e300), r"a.tum: line 13: its upper left 3x3 is no rotation"),
         (range(5), spoiled(4, 3, 0, 1.0), r"a.tum: line 14: .* or its last row not 0 0 0 1"),

@@ -154,6 +154,22 @@ BAD_TEXT = {
 }
 
 
+def test_any_line_ends_are_line_ends(tmp_path):
+    lines = ["# stamps", *(f"{k} {k} 0 0 0 0 0 1" for k in range(6))]
+    (tmp_path / "a.tum").write_bytes(
+        "\ufeff".encode()
+        + "\r\n".join(lines[:3]).encode()
+        + b"\r"
+        + "\r".join(lines[3:5]).encode()
+        + b"\n"
+        + "\n".join(lines[5:]).encode()
+    )
+    read = read_trajectory(tmp_path / "a.tum")
+    assert read.position[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
+    assert read.line is not None
+    assert read.line.tolist() == [2, 3, 4, 5, 6, 7]
+
+
 @pytest.mark.parametrize("case", BAD_TEXT)
 def test_a_bad_text_file_is_told_with_its_line(tmp_path, case):
     text, sentence = BAD_TEXT[case]

@@ -83,7 +83,7 @@ def numbers_of(lines: Lines, counts: dict[int, str], separator: str | None = Non
 def _text(file: Path) -> str:
     content = file.read_bytes()
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"line {line}: it is not text (byte {content[error.start]:#04x}); give a text file") from error

@@ -6,9 +6,10 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import DifferenceShares, Matched, Passing, SegmentErrors, TimeOffset
+from fgbaseline.compare import DifferenceShares, Matched, Passing, RmseDifference, SegmentErrors, TimeOffset
 from fgbaseline.geometry import FloatArray
 
+from .claimed import Claimed
 from .entries import Entry
 from .pixels import Pixels
 from .settings import Settings
@@ -33,6 +34,8 @@ class Result:
     drift: pd.DataFrame | None
     """see `compare.drift`"""
     shares: DifferenceShares
+    share_intervals: pd.DataFrame
+    """see `compare.share_intervals`"""
     bound: float
     """m: 1 % of the path, at most 5 m"""
     passing: Passing | None
@@ -41,9 +44,11 @@ class Result:
     """of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
     relative_statistics: dict[str, dict[str, pd.DataFrame]]
     """by delta, then `translation` and `rotation_deg`"""
-    nees: FloatArray | None
-    """(n,) of each pair, against the truth: see `claimed.nees_of`"""
+    claimed: Claimed | None
+    """its covariances beside its errors against the truth"""
     pixels: Pixels | None
+    map: pd.DataFrame | None
+    """see `compare.map_difference`; the landmarks are aligned as the path is"""
     notes: dict[str, str]
     """why something is missing"""
 
@@ -65,6 +70,8 @@ class Comparison:
     """(3,) in the reference's world"""
     deltas: tuple[str, ...]
     settings: Settings
+    behind: dict[str, RmseDifference]
+    """by how much each estimate is farther from the reference than the nearest rival; that one is missing"""
     held_out: pd.DataFrame | None
     """see `compare.held_out_ranking`: the reference among them"""
     sequence: str | None

@@ -1,6 +1,6 @@
 """From what was read to everything that is compared."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -9,19 +9,22 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Matched, Passing, TimeOffset
+from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
-from .claimed import nees_of
+from .claimed import claimed_by
 from .comparison import Comparison, Result
 from .entries import Entries, Entry
+from .mapping import map_of
 from .pixels import Pixels, held_out_of, paths_of, pixels_of, up_of_problem
+from .ranking import behind_nearest
 from .settings import Delta, Settings
 
 Computed = TypeVar("Computed")
 
 FAR, FAR_SHARE = 5.0, 0.01
 """m, and share of the path: the smaller of both is the bound that says when an estimate has left the reference"""
-AT_MOST = 20_000_000
+AT_MOST = 100_000_000
 """errors that a bootstrap draws"""
 REPETITIONS = 1000
 TILT = 10.0
@@ -41,7 +44,9 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     pixels = pixels_of(entries.problem, everything, paths)
     deltas = settings.deltas or _usual(everything)
     results = {
-        entry.name: _compared(entries.reference, entry, kind, up, deltas, settings, pixels.get(entry.name))
+        entry.name: _compared(
+            entries.reference, entry, kind, up, deltas, settings, entries.problem, paths, pixels.get(entry.name)
+        )
         for entry in entries.estimates
     }
     return Comparison(
@@ -51,6 +56,7 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
         up=up,
         deltas=tuple(delta.text for delta in deltas),
         settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
+        behind=behind_nearest(results, settings.seed),
         held_out=held_out_of(entries.problem, entries.held, paths),
         sequence=None if entries.problem is None else entries.problem.sequence.name,
     )
@@ -95,6 +101,8 @@ def _compared(
     up: FloatArray,
     deltas: tuple[Delta, ...],
     settings: Settings,
+    problem: Problem | None,
+    paths: Mapping[str, FloatArray],
     pixels: Pixels | None,
 ) -> Result:
     notes = {} if pixels is None else dict(pixels.notes)
@@ -113,9 +121,10 @@ def _compared(
         departure=departure,
         relative=tables,
         segments=_or_note("segments", notes, lambda: compare.segment_errors(matched)),
-        nees=_or_note("nees", notes, lambda: nees_of(reference, entry, matched)),
+        claimed=_or_note("nees", notes, lambda: claimed_by(reference, entry, matched)),
         drift=_or_note("drift", notes, lambda: compare.drift(matched, seed=seed)),
         shares=compare.difference_shares(matched, up),
+        share_intervals=compare.share_intervals(matched, up, seed=seed),
         bound=bound,
         passing=_passing(matched, departure, bound, notes),
         statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
@@ -124,6 +133,7 @@ def _compared(
             for delta, table in tables.items()
         },
         pixels=pixels,
+        map=_or_note("map", notes, lambda: map_of(problem, paths, reference, entry, matched)),
         notes=notes,
     )
 

@@ -11,6 +11,8 @@ from matplotlib.lines import Line2D
 from fgbaseline.compare import Align
 from fgbaseline.geometry import FloatArray
 
+from ..figures.beyond import maps_by_depth
+from ..figures.consistency import three_sigma_of
 from ..figures.drawing import lay_out
 from ..figures.frames import fit_log_or_linear
 from ..figures.lettering import plain
@@ -21,7 +23,7 @@ from .comparison import Comparison, Result
 from .lines import colours, line
 from .motion_figures import relative, segments
 from .pixel_figure import reprojection
-from .wording import ranked, rmse
+from .ranking import ranked, rmse
 
 TITLES = {
     "position": "distance, m",
@@ -51,6 +53,8 @@ def draw(comparison: Comparison) -> dict[str, Figure]:
             "relative": relative(comparison),
             "segments": segments(comparison),
             "reprojection": reprojection(comparison),
+            "map": _maps(comparison),
+            **{f"three_sigma_{name}": _three_sigma(comparison, r) for name, r in comparison.results.items()},
         }
         figures |= {name: figure for name, figure in drawn.items() if figure is not None}
         for figure in figures.values():
@@ -122,6 +126,19 @@ def growth(comparison: Comparison) -> Figure:
     axes[-1].set_xlabel("length of the reference's path so far, m")
     head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure
+
+
+def _maps(comparison: Comparison) -> Figure | None:
+    known = {name: r.map for name, r in comparison.results.items() if r.map is not None}
+    return maps_by_depth(known, {name: line(comparison, name) for name in known}, comparison.reference.name)
+
+
+def _three_sigma(comparison: Comparison, result: Result) -> Figure | None:
+    claimed = result.claimed
+    if claimed is None or not np.isfinite(claimed.nees).any():
+        return None
+    t, style = _seconds(comparison, result), line(comparison, result.name)
+    return three_sigma_of(result.name, t, claimed.error, claimed.covariance, style)
 
 
 def _seconds(comparison: Comparison, result: Result) -> FloatArray:

@@ -28,6 +28,11 @@ def write(comparison: Comparison, place: Path, *, force: bool) -> Path:
 def _fill(comparison: Comparison, folder: Path) -> None:
     for name in ("series", "trajectories", "figures"):
         (folder / name).mkdir()
+    maps = {name: result.map for name, result in comparison.results.items() if result.map is not None}
+    if maps:
+        (folder / "maps").mkdir()
+    for name, table in maps.items():
+        table[["landmark", "distance", "seen", "depth"]].to_csv(folder / "maps" / f"{name}.csv", index=False)
     for name, result in comparison.results.items():
         _series(result, folder / "series" / f"{name}.csv")
         aligned = result.matched.estimate
@@ -47,8 +52,8 @@ def _series(result: Result, path: Path) -> None:
     """One row per pair of poses: stamps of both, and every difference."""
     reference, estimate = result.matched.reference, result.matched.estimate
     table = result.departure.drop(columns="t").assign(pose=result.absolute["pose"].to_numpy())
-    if result.nees is not None:
-        table["nees"] = result.nees
+    if result.claimed is not None:
+        table["nees"] = result.claimed.nees
     for column, t in (("t_estimate", estimate.t), ("t", reference.t)):
         table.insert(0, column, [repr(stamp) for stamp in np.asarray(t).tolist()])  # in full
     table.rename_axis("pair").to_csv(path, float_format="%.9g")

@@ -51,10 +51,10 @@ def _boxes(comparison: Comparison, panel: Axes, delta: str, column: str) -> None
 
 
 def segments(comparison: Comparison) -> Figure | None:
-    """KITTI's segment errors by the length of the segments."""
+    """KITTI's segment errors by the length of the segments; None where none has two lengths."""
     known = {n: r.segments for n, r in comparison.results.items() if r.segments is not None}
-    if not known:
-        return None
+    if not any(len(found.by_length) > 1 for found in known.values()):
+        return None  # the table says as much
     figure = Figure(figsize=(WIDTH, 3.4))
     left, right = figure.subplots(1, 2)
     handles: list[Line2D] = []

@@ -22,9 +22,17 @@ CAPTIONS: Mapping[str, str] = {
     "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. No alignment and no early "
     "mistake can hide in these.",
     "segments": "Mean over all segments of a length, per metre.",
+    "map": "Landmarks of the same number. In the world the drift of the paths is in it; as the "
+    "cameras see them it is not.",
+    "three_sigma": "The error of each pose in its own body frame, without any alignment, and the band that its "
+    "covariances claim.",
     "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
     "with it.",
 }
+
+
+def _caption(name: str) -> str:
+    return next((text for beginning, text in CAPTIONS.items() if name.startswith(beginning)), "")
 
 
 def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
@@ -42,6 +50,6 @@ def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
             names=names,
             groups=[(group, list(same)) for group, same in groupby(lines, key=lambda line: line.group)],
             colours=colours_of([comparison.reference.name, *comparison.results], comparison.reference.name),
-            pictures=[replace(picture(n, f), caption=CAPTIONS.get(n, "")) for n, f in figures.items()],
+            pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
         )
     )

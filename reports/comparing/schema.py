@@ -85,6 +85,7 @@ class Segments(Part):
     rotation_deg_per_m: Number
     official: Annotated[bool, Field(description="KITTI's own lengths and step: comparable with published figures")]
     by_length: list[SegmentsOfLength]
+    intervals: Annotated[dict[str, Statistic], Field(description="of both means, by their names")]
 
 
 class Rate(Part):
@@ -104,6 +105,33 @@ class Consistency(Part):
     mean: Number
     median: Number
     frames: int
+    not_positive_definite: Annotated[int, Field(description="covariances that are none; left out")]
+
+
+class Behind(Statistic):
+    """The RMSE of the positions less that of the estimate nearest to the reference, of a paired block bootstrap."""
+
+    block: int
+    reliable: bool
+
+
+class MapOfDepth(Part):
+    """Medians of one class of depth, m."""
+
+    depth: str
+    n: int
+    distance: Number
+    seen: Number
+
+
+class MapDifference(Part):
+    """Landmarks matched by number with the reference's, aligned as the path is."""
+
+    n: int
+    median: Annotated[Number, Field(description="m, in the world")]
+    p95: Number
+    median_seen: Annotated[Number, Field(description="m, each in the frame of its own camera: without drift")]
+    by_depth: list[MapOfDepth]
 
 
 class HeldOutFigures(Part):
@@ -124,6 +152,8 @@ class Shares(Part):
     scale_percent: Number
     heading_deg: Number
     heading_deg_per_s: Annotated[Number, Field(description="per pose without stamps")]
+    intervals: Annotated[dict[str, Statistic], Field(description="of the three shares")]
+    reliable: bool
 
 
 class Passing(Part):
@@ -152,6 +182,7 @@ class EstimateSummary(Part):
         Consistency | None, Field(description="of its own covariances, against a reference taken for the truth")
     ]
     shares: Shares
+    behind: Annotated[Behind | None, Field(description="null for the nearest, and for by-products of the reference")]
     final_m: Number
     passing: Passing
     reprojection: Annotated[Reprojection | None, Field(description="over all observations of the landmarks it gave")]
@@ -161,6 +192,7 @@ class EstimateSummary(Part):
     reprojection_along: Annotated[
         Reprojection | None, Field(description="with landmarks triangulated along its path, the same way for all")
     ]
+    map: MapDifference | None
     held_out: HeldOutFigures | None
     notes: Annotated[dict[str, str], Field(description="why something is null or missing, by key")]
 

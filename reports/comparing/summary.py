@@ -12,8 +12,8 @@ import pandas as pd
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors
 from fgbaseline.compare.travel import distance_travelled
-from fgbaseline.geometry import FloatArray
 
+from .claimed import Claimed
 from .comparison import Comparison, Result
 from .pixels import Pixels
 from .schema import Summary
@@ -82,13 +82,18 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
             delta: {name: _statistics(table) for name, table in tables.items()}
             for delta, tables in result.relative_statistics.items()
         },
-        "segments": None if result.segments is None else _segments(result.segments),
+        "segments": None if result.segments is None else _segments(result.segments, comparison.settings.seed),
         "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
-        "nees": None if result.nees is None else _nees(result.nees),
+        "nees": None if result.claimed is None else _nees(result.claimed),
         "shares": {
             name: getattr(result.shares, name)
             for name in ("scale", "heading", "noise", "scale_percent", "heading_deg", "heading_deg_per_s")
+        }
+        | {
+            "intervals": result.share_intervals.to_dict(orient="index"),
+            "reliable": bool(result.share_intervals.attrs["reliable"]),
         },
+        "behind": _behind(comparison, result.name),
         "final_m": float(result.departure["position"].iloc[-1]),
         "passing": {
             "bound_m": result.bound,
@@ -96,6 +101,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
             "travelled_m": None if result.passing is None else result.passing.travelled,
         },
         **_pixels(result.pixels),
+        "map": None if result.map is None else _map(result.map),
         "held_out": _held_out(comparison, result.name),
         "notes": result.notes,
     }
@@ -112,19 +118,43 @@ def _statistics(table: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _segments(segments: SegmentErrors) -> dict[str, Any]:
+def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
     return {
         "translation_percent": segments.translation_percent,
         "rotation_deg_per_m": segments.rotation_deg_per_m,
+        "intervals": segments.intervals(seed).to_dict(orient="index"),
         "official": segments.official,
         "by_length": segments.by_length.reset_index().to_dict(orient="records"),
     }
 
 
-def _nees(values: FloatArray) -> dict[str, float | int]:
-    known = values[np.isfinite(values)]
+def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:
+    d = comparison.behind.get(name)
+    if d is None:
+        return None
+    return {"value": d.value, "low": d.low, "high": d.high, "block": d.block, "reliable": d.reliable}
+
+
+def _map(table: pd.DataFrame) -> dict[str, Any]:
+    by_depth = compare.map_by_depth(table)[["n", "distance", "seen"]]
+    return {
+        "n": len(table),
+        "median": float(table["distance"].median()),
+        "p95": float(table["distance"].quantile(0.95)),
+        "median_seen": float(table["seen"].median()),
+        "by_depth": by_depth.rename_axis("depth").reset_index().astype({"depth": str}).to_dict(orient="records"),
+    }
+
+
+def _nees(claimed: Claimed) -> dict[str, float | int]:
+    known = claimed.nees[np.isfinite(claimed.nees)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
-    return {"mean": mean, "median": median, "frames": len(known)}
+    return {
+        "mean": mean,
+        "median": median,
+        "frames": len(known),
+        "not_positive_definite": claimed.not_positive_definite,
+    }
 
 
 def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:

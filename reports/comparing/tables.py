@@ -54,6 +54,7 @@ def columns(comparison: Comparison) -> list[Column]:
     """The columns that some estimate has a value for."""
     every = [
         Column("absolute error", "RMSE, m", ("translation", "rmse")),
+        Column("absolute error", "RMSE above the nearest's, m", ("behind",), compared=False),
         Column("absolute error", "largest, m", ("translation", "max")),
         Column("absolute error", "rotation RMSE, °", ("rotation_deg", "rmse")),
     ]
@@ -66,14 +67,16 @@ def columns(comparison: Comparison) -> list[Column]:
     found = [r.segments for r in comparison.results.values() if r.segments is not None]
     segments = "KITTI segments" if all(s.official for s in found) else "segments (KITTI's way, lengths fitted)"
     every += [
-        Column("consistency", "NEES, median", ("nees", "median"), compared=False),
+        Column("consistency", "NEES, mean (6 expected)", ("nees", "mean"), compared=False),
         Column("drift", "%", ("drift", "translation")),
         Column("drift", "°/m", ("drift", "rotation")),
-        Column(segments, "%", ("segments", "translation_percent")),
-        Column(segments, "°/m", ("segments", "rotation_deg_per_m")),
+        Column(segments, "%", ("segments", "intervals", "translation_percent")),
+        Column(segments, "°/m", ("segments", "intervals", "rotation_deg_per_m")),
         Column("reprojection, median px", "its landmarks", ("reprojection", "median")),
         Column("reprojection, median px", "of common", ("reprojection_common", "median")),
         Column("reprojection, median px", "triangulated", ("reprojection_along", "median")),
+        Column("map, median distance of landmarks", "in the world, m", ("map", "median")),
+        Column("map, median distance of landmarks", "as seen, m", ("map", "median_seen")),
         Column("held-out tracks", "median, px", ("held_out", "median")),
     ]
     known = values(comparison)

@@ -7,7 +7,9 @@ import numpy as np
 from fgbaseline.compare import Verdict
 
 from ..page.numbers import listed, number, per_cent
+from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
+from .ranking import ranked, rmse
 
 MEANING = {
     Verdict.DOUBTFUL: "a small distance from it says more than a large one",
@@ -38,20 +40,13 @@ def verdict(comparison: Comparison) -> list[str]:
         _left_out,
         _open,
         _unsure,
-        _pixels,
-        _held_out,
+        claimed_said,
+        unmatched_said,
+        pixels_said,
+        maps_said,
+        held_out_said,
     )
     return [sentence for part in parts for sentence in part(comparison)]
-
-
-def ranked(comparison: Comparison) -> list[Result]:
-    """Nearest to the reference first, by the RMSE of their positions."""
-    return sorted(comparison.results.values(), key=rmse)
-
-
-def rmse(result: Result) -> float:
-    """Of the positions, m."""
-    return float(result.statistics["translation"]["value"]["rmse"])
 
 
 def _interval(result: Result) -> tuple[float, float]:
@@ -85,12 +80,30 @@ def _nearest(comparison: Comparison) -> list[str]:
     if rest:
         text = f"Nearest: {text}; then " + listed(f"{r.name} with {_with_interval(r)}" for r in rest)
     sentences.insert(0, text + ".")
-    if rest and _interval(rest[0])[0] <= _interval(first)[1]:
-        sentences.insert(
-            1,
-            f"The intervals of {first.name} and {rest[0].name} overlap: this recording does not settle their order.",
+    sentences[1:1] = _order(comparison, first)
+    return sentences
+
+
+def _order(comparison: Comparison, first: Result) -> list[str]:
+    """Whether the recording settles who is nearest: by blocks of moments drawn for both."""
+    unsettled: list[str] = []
+    settled: list[str] = []
+    for name, d in comparison.behind.items():
+        said = f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])"
+        (settled if d.settled else unsettled).append(said)
+    sentences = []
+    if settled:
+        sentences.append(f"Farther than {first.name}, by paired bootstrap of their RMSE: {listed(settled)}.")
+    if unsettled:
+        sentences.append(
+            f"This recording does not settle whether {first.name} is nearer than {listed(unsettled)}: the paired "
+            "interval of the difference holds zero."
         )
     return sentences
+
+
+def _signed(metres: float) -> str:
+    return number(metres) if not metres < 0 else f"\N{MINUS SIGN}{number(-metres)}"
 
 
 def _with_interval(result: Result) -> str:
@@ -123,12 +136,19 @@ def _shares(comparison: Comparison) -> list[str]:
         if not np.isfinite(s.noise):
             continue
         long = "long" if s.scale_percent > 0 else "short"
-        heading, scale, rest = (per_cent(max(share, 0.0)) for share in (s.heading, s.scale, s.noise))
+        heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
         sentences.append(
             f"Of {result.name}'s squared distance {heading} is heading, {scale} scale (its path is "
             f"{number(abs(s.scale_percent))} % too {long}) and {rest} the rest."
         )
     return sentences
+
+
+def _share(result: Result, name: str) -> str:
+    value, low, high = (float(x) for x in result.share_intervals.loc[name, ["value", "low", "high"]].to_numpy())
+    if not np.isfinite(low):
+        return per_cent(max(value, 0.0))
+    return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
 
 
 def _offsets(comparison: Comparison) -> list[str]:
@@ -151,8 +171,8 @@ def _left_out(comparison: Comparison) -> list[str]:
         counts = (result.matched.left_out_estimate, result.matched.left_out_reference)
         same.setdefault(counts, []).append(result.name)
     return [
-        f"{number(here)} poses of {listed(names)} and {number(there)} of {comparison.reference.name} have no partner "
-        "and take no part."
+        f"Without a partner, and left out: {number(here)} {'pose' if here == 1 else 'poses'} of {listed(names)}, "
+        f"{number(there)} of {comparison.reference.name}."
         for (here, there), names in same.items()
         if here or there
     ]
@@ -175,33 +195,3 @@ def _unsure(comparison: Comparison) -> list[str]:
         f"The errors of {listed(names)} change so slowly that fewer than ten independent stretches fit into the path: "
         "their intervals are rough."
     ]
-
-
-def _pixels(comparison: Comparison) -> list[str]:
-    every = {comparison.reference.name: comparison.reference_pixels}
-    every |= {name: result.pixels for name, result in comparison.results.items()}
-    medians = {
-        name: float(pixels.along["error"].median())
-        for name, pixels in every.items()
-        if pixels is not None and pixels.along is not None
-    }
-    if len(medians) < 2:
-        return []
-    order = sorted(medians, key=lambda name: medians[name])
-    each = listed(f"{number(medians[name])} px for {name}" for name in order)
-    return [
-        f"With landmarks triangulated along each path in the same way, the median reprojection error is {each}: it "
-        "ranks them locally, by what happens within the life of a track."
-    ]
-
-
-def _held_out(comparison: Comparison) -> list[str]:
-    table = comparison.held_out
-    if table is None or len(table) < 2:
-        return []
-    each = listed(
-        f"{number(float(median))} px for {name}" for name, median in zip(table.index, table["median"], strict=True)
-    )
-    tied = [str(name) for name, low in zip(table.index[1:], table["behind_low"][1:], strict=True) if low <= 0.0]
-    said = f"; {listed(tied)} cannot be told from {table.index[0]}" if tied else ""
-    return [f"On tracks that were held out, one half predicted from the other, the median error is {each}{said}."]

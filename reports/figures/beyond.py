@@ -1,8 +1,10 @@
 """Maps beside the reference's, and paths judged by tracks that none of them has seen."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -21,7 +23,15 @@ FEWEST = 10
 def map_difference(run: Run) -> Figure | None:
     """Median distance of landmarks from the reference's by depth, in metres and sigmas; None where none is shared."""
     maps = {r.name: r.evidence.map for r in run.answered}
-    tables = {name: map_by_depth(m) for name, m in maps.items() if m is not None and len(m)}
+    known = {name: m for name, m in maps.items() if m is not None and len(m)}
+    return maps_by_depth(known, {n: line(run, run.results[n]) for n in known}, run.reference or "")
+
+
+def maps_by_depth(
+    maps: Mapping[str, pd.DataFrame], styles: Mapping[str, Mapping[str, Any]], reference: str
+) -> Figure | None:
+    """The same of tables of `compare.map_difference` by name, with the line of each."""
+    tables = {name: map_by_depth(m) for name, m in maps.items()}
     for table in tables.values():
         table["sigmas"] = table["sigmas"].where(table["with_sigmas"] >= FEWEST)
     if not tables:
@@ -33,14 +43,14 @@ def map_difference(run: Run) -> Figure | None:
     handles: list[Any] = []
     for panel, (column, title) in zip(panels, shown.items(), strict=True):
         for name, table in tables.items():
-            style = {**line(run, run.results[name]), "marker": "o", "markersize": 3.5}
+            style = {**styles[name], "marker": "o", "markersize": 3.5}
             handles += panel.plot(np.arange(len(table)), table[column].to_numpy(), **style)
         labels = [str(of).replace(" m and more", "+").replace(" to ", "–").removesuffix(" m") for of in table.index]
         panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right", fontsize=8)
         log_where_positive(panel)
         panel.set_title(title)
         panel.set_xlabel("depth, m")
-    head(figure, f"Landmarks: median distance from those of {plain(run.reference or '')}, by depth", handles)
+    head(figure, f"Landmarks: median distance from those of {plain(reference)}, by depth", handles)
     return figure
 
 

@@ -1,5 +1,6 @@
 """Whether an estimator knows its errors: beside the reference, in its innovations, and against truth."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -51,27 +52,33 @@ def three_sigma(run: Run, result: Result) -> Figure | None:
     error, covariance = result.evidence.error, result.estimate.covariance
     if error is None or covariance is None or not np.isfinite(error).any() or not np.isfinite(covariance).any():
         return None
+    return three_sigma_of(result.name, seconds(run), error, covariance, line(run, result))
+
+
+def three_sigma_of(
+    name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, style: Mapping[str, Any]
+) -> Figure:
+    """Errors (n, 6) in the body frame at t (n,), s, between three sigmas of their covariances (n, 6, 6)."""
     scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
     with np.errstate(invalid="ignore"):
         sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
     figure = Figure(figsize=(8.0, 5.4))
     panels = figure.subplots(3, 2, sharex=True)
-    t = seconds(run)
     handles: list[Any] = []
-    for i, name in enumerate(AXES):
+    for i, axis in enumerate(AXES):
         panel = panels[i % 3, i // 3]
         e, s = scale[i] * error[:, i], sigma[:, i]
         band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="three sigmas")
-        drawn = panel.plot(t, e, **{**line(run, result), "linewidth": 1.0, "label": "error"})
+        drawn = panel.plot(t, e, **{**style, "linewidth": 1.0, "label": "error"})
         panel.set_ylim(-(reach := _reach(e, s)), reach)
         both = np.isfinite(e) & np.isfinite(s) & (s > 0)
         inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
-        panel.set_title(f"{name}: {100.0 * inside:.1f} % inside")
+        panel.set_title(f"{axis}: {100.0 * inside:.1f} % inside")
         handles = handles or [*drawn, band]
     for panel in panels[-1]:
-        panel.set_xlim(0.0, float(t[-1]))
+        panel.set_xlim(float(t[0]), float(t[-1]))
         panel.set_xlabel("time, s")
-    head(figure, f"{plain(result.name)}: error in its own body frame, and three of its sigmas (99.7 %)", handles)
+    head(figure, f"{plain(name)}: error in its own body frame, and three of its sigmas (99.7 %)", handles)
     return figure
 
 
