@@ -11,7 +11,7 @@ import pytest
 
 from .commands import COMMAND, environment, fgbaseline
 
-COMMANDS = ("run", "compare", "diagnose", "check", "bench", "export", "figures", "simulate")
+COMMANDS = ("run", "compare", "diagnose", "check", "bench", "export", "figures", "reproduce", "simulate")
 HEAVY = ("numpy", "pandas", "scipy", "gtsam", "matplotlib", "pydantic", "jinja2", "rich", "fgbaseline.data")
 
 

@@ -17,6 +17,7 @@ COMMANDS = {
     "figures": "figures",
     "check": "check",
     "bench": "bench",
+    "reproduce": "reproduce",
     "simulate": "simulate",
 }
 """command -> module of this package that holds it under the name `command`"""

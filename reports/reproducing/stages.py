@@ -1,0 +1,105 @@
+"""A recording repaired one cause at a time, so that each shows what it does to the documented filter."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline.data import Diagnosis, Excluded, Observations, Sequence
+from fgbaseline.data.axes import IDENTITY, axes_matrix
+from fgbaseline.data.diagnose import repair
+from fgbaseline.data.diagnose.repair import sure_bias
+from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.track_mask import MaskSettings
+
+from .stand_in import StandIn
+
+AS_RECORDED = "as recorded"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stage:
+    """The recording with everything up to here put right."""
+
+    name: str
+    cause: str
+    """what was wrong until here, in a sentence; empty for the recording as it is"""
+    sequence: Sequence
+
+
+def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
+    """As recorded, then without each fault that the diagnosis is sure of: axes, bias, interval, and the tracks."""
+    recorded = diagnosis.sequence
+    stages = [Stage(AS_RECORDED, "", recorded)]
+    if diagnosis.fit is None:
+        return stages
+    angular, linear, bias = diagnosis.angular, diagnosis.linear, sure_bias(diagnosis)
+    now = recorded
+    if angular.changed or linear.changed:
+        now = _turned(now, angular.name, linear.name)
+        stages.append(Stage("axes agree", _axes(angular.name, linear.name), now))
+    if bias.any():
+        now = replace(now, angular_velocity=now.angular_velocity - bias @ angular.matrix.T)
+        stages.append(Stage("without bias", f"gyroscope bias of {_vector(bias)} rad/s", now))
+    if diagnosis.shift != Shift.AFTER:
+        now = _restamped(now, diagnosis.shift)
+        cause = f"velocities taken for an interval that is not theirs (by {-diagnosis.shift:g})"
+        stages.append(Stage("right interval", cause, now))
+    repaired = repair(diagnosis, MaskSettings())
+    good = repaired.excluded == Excluded.NO
+    if not good.all():
+        tracked = replace(
+            now,
+            imu_T_cam=repaired.sequence.imu_T_cam,
+            observations=repaired.sequence.observations.select(good),
+            n_landmarks=repaired.sequence.n_landmarks,
+            truth=repaired.sequence.truth,
+        )
+        copied = ", copied frames" if (repaired.excluded == Excluded.COPIED).any() else ""
+        cause = f"wrong matches{copied} and what else is unusable ({np.mean(~good):.0%} of the observations)"
+        stages.append(Stage("right matches", cause, tracked))
+    return stages
+
+
+def simulated_stages(simulated: StandIn) -> list[Stage]:
+    """The same for a simulated recording, whose faults are known."""
+    recorded, bias, axes = simulated.sequence, simulated.gyro_bias, simulated.angular_axes
+    now = _turned(recorded, axes, IDENTITY)
+    stages = [Stage(AS_RECORDED, "", recorded), Stage("axes agree", _axes(axes, IDENTITY), now)]
+    if bias.any():
+        now = replace(now, angular_velocity=now.angular_velocity - bias @ axes_matrix(axes).T)
+        stages.append(Stage("without bias", f"gyroscope bias of {_vector(bias)} rad/s", now))
+    if simulated.wrong.any():
+        cause = f"wrong matches ({simulated.wrong.mean():.0%} of the observations)"
+        stages.append(Stage("right matches", cause, _of(now, ~simulated.wrong)))
+    return stages
+
+
+def _of(sequence: Sequence, chosen: BoolArray) -> Sequence:
+    o: Observations = sequence.observations.select(chosen)
+    return replace(sequence, observations=o)
+
+
+def _turned(sequence: Sequence, angular: str, linear: str) -> Sequence:
+    return replace(
+        sequence,
+        angular_velocity=sequence.angular_velocity @ axes_matrix(angular).T,
+        linear_velocity=sequence.linear_velocity @ axes_matrix(linear).T,
+    )
+
+
+def _restamped(sequence: Sequence, shift: float) -> Sequence:
+    """The recording in which sample k is what moved frame k to k + 1."""
+    twist = held_twist(sequence, shift)
+    twist = np.concatenate([twist, twist[-1:]])
+    return replace(sequence, linear_velocity=twist[:, :3], angular_velocity=twist[:, 3:])
+
+
+def _axes(angular: str, linear: str) -> str:
+    every = (("angular", angular), ("linear", linear))
+    wrong = [f"{what} velocity ({name})" for what, name in every if name != IDENTITY]
+    return f"disagreeing axes: {' and '.join(wrong)} against imu_T_cam"
+
+
+def _vector(values: np.ndarray) -> str:
+    return f"({', '.join(f'{value:.4f}' for value in values)})"
