@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from collections.abc import Sequence as Several
-from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from fgbaseline.data import Status
-from fgbaseline.geometry import FloatArray
 
-from .measures import metres, per_cent, plural
+from .claim import Claim, Verdict, causes, claim_on
+from .measures import metres, path_length, per_cent, plural, px
 from .study import Staged, Study
 from .the_report import REPORTED, Reported
 from .trial import Outcome
@@ -23,34 +21,6 @@ SMOOTH = 0.1
 """m and degrees that an update may add to a frame's motion, before the path looks noisy"""
 WELL = 3.0
 """px, median error below which a filter may be said to work"""
-SIGNIFICANT = 1.5
-"""a cause is named where putting it right changes the figure at least by this factor"""
-
-
-class Verdict(StrEnum):
-    """What comes of a claim."""
-
-    HOLDS = "holds"
-    IN_PART = "holds in part"
-    FALSE = "does not hold"
-    CANNOT_TELL = "cannot tell"
-
-
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A claim of the report on one recording, tested."""
-
-    code: str
-    recording: str
-    claim: str
-    verdict: Verdict
-    measured: str
-    cause: str
-    """what the toolkit finds behind the figure"""
-    repaired: str
-    """the same filter on the repaired recording; empty where that has no bearing"""
-    simulated: bool
-    """whether the filter saw simulated features"""
 
 
 def claims_of(study: Study) -> list[Claim]:
@@ -88,7 +58,7 @@ def missing_claims(studies: Several[Study]) -> list[Claim]:
 def _samples(study: Study, told: Reported) -> Claim:
     sequence = study.subject.recorded
     seconds = float(sequence.t[-1] - sequence.t[0])
-    return _claim(
+    return claim_on(
         study,
         "samples",
         f"the data is given over {told.frames} seconds",
@@ -101,7 +71,7 @@ def _samples(study: Study, told: Reported) -> Claim:
 def _features(study: Study, told: Reported) -> Claim:
     claim = f"it has {told.tracks} features"
     if study.subject.stand_in is not None:
-        return _claim(
+        return claim_on(
             study,
             "features",
             claim,
@@ -111,7 +81,7 @@ def _features(study: Study, told: Reported) -> Claim:
         )
     o = study.subject.recorded.observations
     tracks = len(np.unique(o.landmark))
-    return _claim(
+    return claim_on(
         study,
         "features",
         claim,
@@ -126,15 +96,15 @@ def _predicted(study: Study) -> Claim:
     def climb(staged: Staged) -> float:
         return abs(float(staged.predicted[-1, :3, 3] @ staged.stage.sequence.up))
 
-    road, end = length(study.predicted), float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
+    road, end = path_length(study.predicted), float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
     way = "above" if end > 0 else "below"
-    return _claim(
+    return claim_on(
         study,
         "prediction",
         "the predicted trajectory may be assumed to be correct",
         Verdict.FALSE if abs(end) > LEVEL * road else Verdict.HOLDS,
         f"it ends {metres(abs(end))} {way} the start after {metres(road)} on the road, which a view from above hides",
-        _causes(study, climb, metres),
+        causes(study, climb, metres),
         f"{metres(climb(study.staged[-1]))} in height",
     )
 
@@ -143,7 +113,7 @@ def _mapped(study: Study) -> Claim:
     mapped = study.mapped[max(study.mapped)]
     apart = float(np.abs(mapped.estimate.world_T_imu - study.staged[0].predicted).max())
     before, after = mapped.before.reprojection, mapped.after.reprojection
-    return _claim(
+    return claim_on(
         study,
         "mapping",
         "after the landmark update the trajectory is dead reckoning's, which justifies that update",
@@ -166,31 +136,31 @@ def _works(study: Study) -> Claim:
             f"first at {now.first_lost}"
         )
     )
-    return _claim(
+    return claim_on(
         study,
         "works",
         f"SLAM worked perfectly with {features} features",
         Verdict.HOLDS if good else Verdict.FALSE,
-        f"median reprojection error {_px(now.reprojection)}, {per_cent(now.behind)} of the observations of points "
+        f"median reprojection error {px(now.reprojection)}, {per_cent(now.behind)} of the observations of points "
         f"behind the camera{lost}",
-        _causes(study, lambda s: s.outcome.reprojection, _px),
-        f"{_px(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} behind, {_lost(study.repaired)}",
+        causes(study, lambda s: s.outcome.reprojection, px),
+        f"{px(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} behind, {_lost(study.repaired)}",
     )
 
 
 def _like_dead_reckoning(study: Study) -> Claim:
-    now, road = study.recorded, length(study.predicted)
+    now, road = study.recorded, path_length(study.predicted)
     noisy = now.correction_m > SMOOTH or now.correction_deg > SMOOTH
     alike = now.apart_rmse < ALIKE * road
     verdict = Verdict.HOLDS if alike and noisy else Verdict.IN_PART if alike or noisy else Verdict.FALSE
-    return _claim(
+    return claim_on(
         study,
         "like dead reckoning",
         "SLAM looks like dead reckoning, but noisy",
         verdict,
         f"{metres(now.apart_rmse)} (RMS) and up to {metres(now.apart_max)} from dead reckoning, of a path of "
         f"{metres(road)}; an update moves a frame by {_moved(now)}",
-        _causes(study, lambda s: s.outcome.apart_rmse, metres),
+        causes(study, lambda s: s.outcome.apart_rmse, metres),
         f"{metres(study.repaired.apart_rmse)}, up to {metres(study.repaired.apart_max)}; {_moved(study.repaired)}",
     )
 
@@ -201,7 +171,7 @@ def _low_noise(study: Study) -> Claim:
     without = none.status is Status.FAILED
     verdict = Verdict.HOLDS if singular and without else Verdict.IN_PART if singular or without else Verdict.FALSE
     zero = f"with W = 0 it stops ({none.reason})" if without else "with W = 0 it goes through"
-    return _claim(
+    return claim_on(
         study,
         "low noise",
         "low noise gives a singular covariance",
@@ -217,55 +187,23 @@ def _low_noise(study: Study) -> Claim:
 def _every_noise(study: Study) -> Claim:
     runs = [*study.swept, *study.held]
     broken = sum(run.breaks for run in runs)
-    off = sum(not run.breaks and not run.apart_rmse < ALIKE * length(study.predicted) for run in runs)
+    off = sum(not run.breaks and not run.apart_rmse < ALIKE * path_length(study.predicted) for run in runs)
     verdict = Verdict.HOLDS if broken == len(runs) else Verdict.IN_PART if broken else Verdict.FALSE
     repaired = study.swept_repaired
-    return _claim(
+    return claim_on(
         study,
         "every noise",
         "singularity error for different numbers of features and every noise level",
         verdict,
         f"the printed equations break in {broken} of {len(runs)} settings, and in {off} more the path is over "
         f"{per_cent(ALIKE)} of its length from dead reckoning",
-        "landmarks that pass through the camera plane: " + _causes(study, lambda s: s.outcome.apart_rmse, metres),
+        "landmarks that pass through the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, metres),
         f"they break in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
     )
 
 
-def _claim(
-    study: Study, code: str, claim: str, verdict: Verdict, measured: str, cause: str, repaired: str = ""
-) -> Claim:
-    simulated = study.subject.stand_in is not None and code not in ("samples", "prediction")
-    return Claim(code, study.subject.name, claim, verdict, measured, cause, repaired, simulated)
-
-
-def _causes(study: Study, figure: Callable[[Staged], float], told: Callable[[float], str]) -> str:
-    """Which repairs change a figure, each with what it becomes; the others in one word."""
-    before, parts, little = figure(study.staged[0]), [], []
-    for staged in study.staged[1:]:
-        after = figure(staged)
-        changed = not (before / SIGNIFICANT < after < before * SIGNIFICANT)
-        if changed:
-            parts.append(f"{staged.stage.cause}: {told(after)} without")
-        else:
-            little.append(staged.stage.name)
-        before = after
-    if not parts:
-        return "nothing that the diagnosis finds" if not little else "none of what was repaired changes it"
-    return "; ".join(parts)
-
-
-def length(path: FloatArray) -> float:
-    """m: the length of a path (T, 4, 4)."""
-    return float(np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1).sum())
-
-
 def _apart(difference: float) -> str:
     return "the paths are equal to the last bit" if difference == 0.0 else f"the paths differ by up to {difference:.2g}"
-
-
-def _px(value: float) -> str:
-    return f"{value:.3g} px" if np.isfinite(value) else "none"
 
 
 def _moved(outcome: Outcome) -> str:

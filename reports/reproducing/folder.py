@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..figures import save
-from .claims import Claim
+from .claim import Claim
 from .drawing import draw
 from .page import render
 from .study import Study

@@ -1,6 +1,10 @@
-"""How figures stand in the sentences of the claims."""
+"""Figures that several claims ask for, and how they stand in sentences."""
 
 from math import isfinite
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
 
 
 def metres(value: float) -> str:
@@ -21,3 +25,13 @@ def per_cent(share: float) -> str:
 def plural(n: int, one: str) -> str:
     """'1 frame', '5 frames'."""
     return f"{n} {one}{'' if n == 1 else 's'}"
+
+
+def px(value: float) -> str:
+    """'30.6 px', or 'no path'."""
+    return f"{value:.3g} px" if isfinite(value) else "no path"
+
+
+def path_length(path: FloatArray) -> float:
+    """m: the length of a path (T, 4, 4)."""
+    return float(np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1).sum())

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..page.embedding import Picture, picture
 from ..page.numbers import number
-from .claims import Claim, Verdict
+from .claim import Claim, Verdict
 from .measures import metres, per_cent
 from .study import Study
 from .trial import Outcome

@@ -25,14 +25,14 @@ AROUND = 0.25
 
 def numbered(study: Study) -> dict[str, Figure]:
     """The figures of a recording by name, `figure_01` and so on where the report has them under a number."""
-    told, name, label = study.subject.reported, study.subject.name, study.subject.label
+    told, name, label = study.subject.reported, study.subject.name, plain(study.subject.label)
     predicted = study.predicted
     figures = {
         _key(told.path if told else None, name, "path"): plot(
-            f"path of the IMU after prediction, {name}", predicted, told.path if told else None
+            f"path of the IMU after prediction, {plain(name)}", predicted, told.path if told else None
         ),
         _key(told.arrows if told else None, name, "arrows"): plot(
-            f"the same with orientations, {name}", predicted, told.arrows if told else None, arrows=True
+            f"the same with orientations, {plain(name)}", predicted, told.arrows if told else None, arrows=True
         ),
     }
     for features, mapped in study.mapped.items():
@@ -91,7 +91,7 @@ def plot(
 def _headline(title: str, number: int | None) -> str:
     """The number of the report's figure and what it shows, in two lines at most."""
     text = f"{title[0].upper()}{title[1:]}" if number is None else f"Figure {number}: {title}"
-    return "\n".join(plain(part) for part in _halves(text))
+    return "\n".join(_halves(text))
 
 
 def _halves(text: str, most: int = 62) -> Several[str]:

@@ -97,8 +97,8 @@ def _restamped(sequence: Sequence, shift: float) -> Sequence:
 
 def _axes(angular: str, linear: str) -> str:
     every = (("angular", angular), ("linear", linear))
-    wrong = [f"{what} velocity ({name})" for what, name in every if name != IDENTITY]
-    return f"disagreeing axes: {' and '.join(wrong)} against imu_T_cam"
+    wrong = [f"{what} velocity, {name}" for what, name in every if name != IDENTITY]
+    return f"disagreeing axes of the {' and of the '.join(wrong)}"
 
 
 def _vector(values: np.ndarray) -> str:

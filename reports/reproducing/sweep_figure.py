@@ -13,8 +13,7 @@ from fgbaseline.data import Status
 
 from ..figures.lettering import plain
 from ..figures.style import WIDTH, head
-from .claims import length
-from .measures import metres, plural
+from .measures import metres, path_length, plural
 from .study import Study
 from .trial import Outcome
 
@@ -71,7 +70,7 @@ def _map(axes: Axes, study: Study, outcomes: Several[Outcome]) -> None:
     broken = []
     for o in outcomes:
         x, y = features.index(o.settings.features or 0), noises.index(o.settings.pixel_variance)
-        share = o.apart_rmse / length(study.predicted)
+        share = o.apart_rmse / path_length(study.predicted)
         level = 1.0 if not np.isfinite(share) else float(np.log(max(share, 1e-9) / LEAST) / np.log(MOST / LEAST))
         colour = COLOURS(np.clip(level, 0.0, 1.0))
         axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=colour, edgecolor="white", linewidth=0.6))

@@ -10,7 +10,8 @@ from fgbaseline.geometry import InputError
 
 from ..cli.progress import reporter
 from ..whole_folder import require_free, whole_folder
-from .claims import Claim, claims_of, missing_claims
+from .claim import Claim
+from .claims import claims_of, missing_claims
 from .folder import MARK, Reproduction, write
 from .study import SweepSettings, stages_of, study
 from .subjects import read_subjects
