@@ -18,7 +18,8 @@ def draw(studies: Several[Study]) -> dict[str, Figure]:
     with in_style():
         for study in studies:
             figures |= numbered(study)
-        figures = dict(sorted(figures.items(), key=lambda item: (not item[0].startswith("figure_"), item[0])))
+        in_report = sorted(name for name in figures if name.startswith("figure_"))
+        figures = {name: figures[name] for name in [*in_report, *figures]}
         figures["sweep"] = sweep_figure(studies)
         figures |= {f"causes_{study.subject.name}": stages_figure(study) for study in studies}
         for figure in figures.values():

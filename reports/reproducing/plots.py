@@ -32,7 +32,7 @@ def numbered(study: Study) -> dict[str, Figure]:
             f"path of the IMU after prediction, {plain(name)}", predicted, told.path if told else None
         ),
         _key(told.arrows if told else None, name, "arrows"): plot(
-            f"the same with orientations, {plain(name)}", predicted, told.arrows if told else None, arrows=True
+            f"path of the IMU with orientations, {plain(name)}", predicted, told.arrows if told else None, arrows=True
         ),
     }
     for features, mapped in study.mapped.items():
@@ -49,7 +49,7 @@ def numbered(study: Study) -> dict[str, Figure]:
         number,
         landmarks=study.slam.landmarks.position,
     )
-    return dict(sorted(figures.items()))
+    return figures
 
 
 def plot(

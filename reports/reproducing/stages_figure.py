@@ -15,6 +15,8 @@ from .trial import pose
 COLUMNS = 2
 MARGIN = 1.1
 """times the largest box: all panels have one scale"""
+SLIMMEST = 0.3
+"""height over width of a panel, at least"""
 DEAD_RECKONING = "#444444"
 
 
@@ -24,6 +26,7 @@ def stages_figure(study: Study) -> Figure:
     pairs = [tuple(view.plane(poses[:, :3, 3]) for poses in (s.path, s.predicted)) for s in study.staged]
     boxes = [common_window([path], predicted) for path, predicted in pairs]
     width, height = np.max([box.high - box.low for box in boxes], axis=0) * MARGIN
+    height = max(height, SLIMMEST * width)
     columns = min(COLUMNS, len(study.staged))
     rows = -(-len(study.staged) // columns)
     panel = (WIDTH / columns - 0.6) * height / width
