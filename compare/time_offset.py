@@ -1,9 +1,10 @@
 """By how much the clock of an estimate is off that of the reference."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError
@@ -74,11 +75,26 @@ def time_offset(
     best = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-7 * max(1.0, within)})
     seconds, lowest = (float(best.x), float(best.fun)) if best.fun < misfits[k] else (float(grid[k]), float(misfits[k]))
     rounding = 1e-9 * float(np.ptp(coarse.position, axis=0).max())
-    good = np.append(grid[misfits <= AS_GOOD * lowest + rounding], seconds)
-    low, high = float(good.min()), float(good.max())
+    limit = AS_GOOD * lowest + rounding
+    good = np.append(grid[misfits <= limit], seconds)
+    low, high = (_crossing(misfit, limit, float(end), grid, side) for end, side in ((good.min(), -1), (good.max(), 1)))
     edge = 0.5 * float(grid[1] - grid[0])
     determined = low > -within + edge and high < within - edge
     return TimeOffset(seconds, lowest, float(misfits[n]), low, high, determined)
+
+
+def _crossing(misfit: Callable[[float], float], limit: float, good: float, grid: FloatArray, side: int) -> float:
+    """Where the misfit rises to the limit between an offset as good as the best and the next of the grid on that side.
+
+    The offset itself at the end of the grid.
+    """
+    beyond = grid[grid * side > good * side]
+    if len(beyond) == 0:
+        return good
+    worse = float(beyond[np.argmin(np.abs(beyond - good))])
+    if misfit(worse) <= limit or misfit(good) >= limit:
+        return good
+    return float(brentq(lambda seconds: misfit(seconds) - limit, good, worse, xtol=1e-6 * abs(worse - good)))
 
 
 def _rmse(apart: FloatArray) -> float:

@@ -155,6 +155,23 @@ def test_an_offset_in_time_is_found(offset: float, dense: float) -> None:
     assert compare.absolute_errors(moved)["translation"].max() < 0.05
 
 
+def test_the_range_of_an_offset_ends_where_the_error_is_a_twentieth_larger() -> None:
+    reference, exact = path(np.arange(0.0, 30.0, 0.05)), path(np.arange(0.0, 30.0, 0.1))
+    poses = np.array(exact.world_T_body)
+    poses[:, :3, 3] += 0.3 * np.random.default_rng(0).normal(size=(len(exact), 3))
+    estimate = exact.with_poses(poses).later(0.05)
+    found = compare.time_offset(reference, estimate, 1.0)
+    assert found.determined
+    assert found.low < found.seconds < found.high
+    both = (estimate.t - 1.0 >= reference.t[0]) & (estimate.t + 1.0 <= reference.t[-1])
+    inner = estimate.at(np.flatnonzero(both))
+    for end in (found.low, found.high):
+        moved = compare.associate(reference, inner, how="interpolated", offset=end, tolerance=1.0)
+        assert len(moved) == len(inner)
+        rmse = compare.absolute_errors(moved.aligned("se3"))["translation"]
+        assert np.sqrt(np.mean(rmse**2)) == pytest.approx(1.05 * found.rmse, rel=1e-4)
+
+
 def test_an_offset_that_the_path_does_not_tell_is_said_to_be_open() -> None:
     t = np.arange(0.0, 30.0, 0.1)
     steady = Trajectory(t, se3.compose(np.tile(se3.exp([1.0, 0, 0, 0, 0, 0]), (len(t) - 1, 1, 1))))
