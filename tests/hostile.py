@@ -1,14 +1,21 @@
 """Recordings that no estimator was made for, with known truth, and what is asked of every estimator on them."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
+from fgbaseline import data
 from fgbaseline.data import Observations, Sequence, Truth
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.reports.comparison import Result, Run, compare_all
+from fgbaseline.reports.solving import solve_all
 
 from .synthetic import Scene, drive, with_pixels
 
@@ -17,7 +24,7 @@ PIXEL = 0.5
 """px, noise of the observations made here"""
 HALF = 30
 """frame at which something happens, of 60"""
-CROWD, CROWD_FRAMES = 2000, 6
+CROWD, CROWD_FRAMES = 2000, 3
 
 
 def base() -> Sequence:
@@ -137,7 +144,7 @@ def one_landmark() -> Sequence:
 
 
 def crowd() -> Sequence:
-    """Two thousand more tracks over six frames."""
+    """Two thousand more tracks over three frames."""
     sequence = base()
     assert sequence.truth is not None
     assert sequence.truth.landmarks is not None
@@ -165,3 +172,109 @@ def crowd() -> Sequence:
             sequence.truth.world_T_imu.copy(), np.concatenate([sequence.truth.landmarks, points]), sequence.truth.source
         ),
     )
+
+
+POSE_DEGREES = 6
+ESTIMATORS = ("dead-reckoning", "ekf", "joint-ekf", "isam2", "isam2-online", "batch", "fixed-lag")
+ADMITS = 3.5
+"""sigmas, root mean square over frames and degrees of freedom: an answer that is no further off admits its errors"""
+
+
+class Cell(StrEnum):
+    """What an estimator made of a recording."""
+
+    ADMITS = "admits"
+    OVERCONFIDENT = "overconfident"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, eq=False)
+class Hostile:
+    """A recording, and which estimators are known to claim more than they know on it."""
+
+    name: str
+    make: Callable[[], Sequence]
+    overconfident: tuple[str, ...] = ("ekf",)
+    """`ekf` keeps no covariance between pose and landmarks, so it is on every drive that goes well"""
+    fails: tuple[str, ...] = ()
+    note: str = ""
+
+
+BLIND = tuple(name for name in ESTIMATORS if name != "dead-reckoning")
+RECORDINGS = (
+    Hostile("nothing is wrong", base),
+    Hostile("every observation wrong from half of it on", wrong_from_half, note="the mask takes them out"),
+    Hostile("no features for 5 s", blind),
+    Hostile("a standing start of 3 s", standing_start),
+    Hostile("all landmarks behind the camera", behind, overconfident=(), fails=BLIND, note="no observation is left"),
+    Hostile("all landmarks at infinity", at_infinity, overconfident=()),
+    Hostile("zero and negative disparities only", no_positive_disparity, overconfident=(), fails=BLIND),
+    Hostile("a gap of 10 s", gap, note="what the velocity may have done meanwhile is allowed for"),
+    Hostile(
+        "50 m cut out, stamps as if nothing was",
+        cut,
+        overconfident=ESTIMATORS,
+        note="nothing in the recording tells of it but that all tracks end at once",
+    ),
+    Hostile(
+        "one velocity sample of 500 m/s",
+        velocity_jump,
+        overconfident=ESTIMATORS,
+        note="the diagnosis takes it for noise and a turned camera; the reference is said to be untrusted",
+    ),
+    Hostile("one landmark only", one_landmark, overconfident=()),
+)
+CROWDED = Hostile("2000 features in a frame", crowd)
+
+
+def solved(recording: Hostile) -> Run:
+    """Every estimator on the problem that `fgbaseline run` makes of it, compared."""
+    problem = data.calibrated(recording.make())
+    return compare_all(problem, solve_all(problem, ESTIMATORS), {})
+
+
+def sigmas(result: Result) -> float:
+    """How many of its own sigmas an answer is off: root of the mean NEES per degree of freedom."""
+    assert result.nees is not None
+    return float(np.sqrt(np.nanmean(result.nees) / POSE_DEGREES))
+
+
+def error(result: Result) -> float:
+    """The largest error in position, m."""
+    assert result.truth is not None
+    return float(result.truth["position"].max())
+
+
+def cell(result: Result) -> Cell:
+    """What the estimator made of it."""
+    if not result.answered:
+        return Cell.FAILED
+    return Cell.ADMITS if sigmas(result) <= ADMITS else Cell.OVERCONFIDENT
+
+
+def nan_velocity() -> dict[str, Any]:
+    """The arrays of a file with NaN in one velocity sample."""
+    arrays = recorded(base())
+    arrays["linear_velocity"][1, 33] = np.nan
+    return arrays
+
+
+def duplicated_stamps() -> dict[str, Any]:
+    """The arrays of a file in which two frames have one stamp."""
+    arrays = recorded(base())
+    arrays["time_stamps"][0, 41] = arrays["time_stamps"][0, 40]
+    return arrays
+
+
+def recorded(sequence: Sequence) -> dict[str, Any]:
+    """The arrays that the file of a recording has."""
+    with TemporaryDirectory() as folder:
+        data.write_npz(sequence, Path(folder) / "a.npz")
+        with np.load(Path(folder) / "a.npz") as arrays:
+            return {key: arrays[key] for key in arrays.files}
+
+
+REFUSED = {
+    "NaN in one velocity sample": (nan_velocity, "linear_velocity: frame 33 has"),
+    "duplicated stamps": (duplicated_stamps, "time_stamps: stamps must rise, but frame 41"),
+}

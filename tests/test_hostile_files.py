@@ -143,3 +143,11 @@ def test_words_that_are_no_words_are_refused(tmp_path: Path) -> None:
         for value in (None, 3, [], {}, [[]], "x", 1e308, True):
             words[key] = value
             fed(READERS["problem JSON"], json.dumps(words).encode())
+
+
+def test_a_run_whose_reference_has_no_name_is_refused(tmp_path: Path) -> None:
+    words = json.loads(seeds("run folder")[0])
+    del words["reference"]["name"]
+    (tmp_path / "summary.json").write_text(json.dumps(words))
+    with pytest.raises(InputError, match="it is not the summary of a run"):
+        read_run_folder(tmp_path)

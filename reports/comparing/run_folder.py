@@ -49,6 +49,7 @@ def read_run_folder(folder: Path) -> RunFolder:
         try:
             summary = json.loads(regular_file(path).read_text(encoding="utf-8"))
             reference, estimators = summary["reference"], summary["estimators"]
+            chosen = str(reference["name"])
             trust = Trust(Verdict[str(reference["trust"]).upper()], tuple(map(str, reference["reasons"])))
             names = tuple(str(name) for name, e in estimators.items() if e["status"] != "failed")
             settings = dict(summary["settings"])
@@ -56,6 +57,6 @@ def read_run_folder(folder: Path) -> RunFolder:
             up = None if up is None else tuple(map(float, up))
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
-        if reference["name"] not in names:
+        if chosen not in names:
             raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
-    return RunFolder(folder, str(reference["name"]), trust, names, settings, up)
+    return RunFolder(folder, chosen, trust, names, settings, up)

@@ -1,0 +1,61 @@
+"""Every estimator on recordings that none was made for, `python -m benchmarks.reliability`: writes docs/reliability.md.
+
+The recordings, and what is promised of each cell, are those of tests/test_hostile.py. The last of them, 2000 features
+in a frame, takes many minutes and is in no test.
+"""
+
+# ruff: noqa: E402
+
+import os
+
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+import time
+from pathlib import Path
+
+import click
+
+from fgbaseline.reports.comparison import Result, Run
+from tests.hostile import CROWDED, ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
+
+PLACE = Path("docs/reliability.md")
+MARK = "<!-- python -m benchmarks.reliability -->"
+
+
+def told(result: Result) -> str:
+    """A cell of the table."""
+    kind = cell(result)
+    if kind is Cell.FAILED:
+        return f"failed: {result.estimate.reason}"
+    off = sigmas(result)
+    metres = f"{error(result):.2g}" if error(result) < 100 else f"{error(result):.0f}"
+    figures = f"{metres} m, {off:.1f} σ" if off < 100 else f"{metres} m, {off:.0f} σ"
+    return f"**{figures}**" if kind is Cell.OVERCONFIDENT else figures
+
+
+def row(recording: Hostile, run: Run) -> str:
+    """A line of the table."""
+    cells = [recording.name, *(told(run.results[name]) for name in ESTIMATORS), run.trust.verdict.name.lower()]
+    return f"| {' | '.join(cells)} |"
+
+
+@click.command()
+@click.option("--without-crowd", is_flag=True, help="Leave out the recording with 2000 features in a frame.")
+def main(without_crowd: bool) -> None:
+    """Solve every recording and write the table."""
+    lines = [MARK, "", f"| recording | {' | '.join(ESTIMATORS)} | reference |", "|" + "---|" * (len(ESTIMATORS) + 2)]
+    for recording in (*RECORDINGS, *(() if without_crowd else (CROWDED,))):
+        start = time.monotonic()
+        lines.append(row(recording, solved(recording)))
+        click.echo(f"{recording.name}: {time.monotonic() - start:.0f} s", err=True)
+    lines += [f"| {name} | {' | '.join(['refused'] * len(ESTIMATORS))} | |" for name in REFUSED]
+    notes = [f"- **{recording.name}**: {recording.note}." for recording in RECORDINGS if recording.note]
+    text = PLACE.read_text(encoding="utf-8")
+    before, _, behind = text.partition(MARK)
+    _, end, behind = behind.partition("<!-- end -->")
+    PLACE.write_text("\n".join([before + lines[0], *lines[1:], "", *notes, "", end + behind]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
