@@ -1,6 +1,7 @@
 """The installed command `fgbaseline`, started as a user starts it."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +29,11 @@ def fgbaseline(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.Comp
     )
 
 
+def heeding_interrupts() -> None:
+    """For a child before it starts: a shell's background jobs, and so all they start, ignore interrupts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def started(*arguments: str | Path, cwd: Path) -> subprocess.Popen[str]:
     """The command, running; its standard error can be read line by line."""
     return subprocess.Popen(
@@ -38,6 +44,7 @@ def started(*arguments: str | Path, cwd: Path) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=heeding_interrupts,
     )
 
 

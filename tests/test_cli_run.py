@@ -20,7 +20,7 @@ from fgbaseline.reports.job import RunSettings
 from fgbaseline.reports.run_folder import write_run
 from fgbaseline.reports.summary import summarise
 
-from .commands import COMMAND, environment, everything_in, fgbaseline, started
+from .commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
 ESTIMATORS = ("dead-reckoning", "ekf", "isam2")
 
@@ -303,6 +303,7 @@ def test_on_a_terminal_progress_is_a_bar_with_frames_per_second(recording: Path,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=theirs,
+        preexec_fn=heeding_interrupts,
     )
     os.close(theirs)
     text = ""
