@@ -58,6 +58,11 @@ class Observations:
         """The observations where `chosen` (n,) is true, or those at the increasing indices `chosen`."""
         return Observations(self.frame[chosen], self.landmark[chosen], self.pixel[chosen])
 
+    def of_frames(self, first: int, last: int) -> "Observations":
+        """The observations of the frames first to last, both included."""
+        start, stop = np.searchsorted(self.frame, [first, last + 1])
+        return Observations(self.frame[start:stop], self.landmark[start:stop], self.pixel[start:stop])
+
     def frame_starts(self, n_frames: int) -> IntArray:
         """(n_frames + 1,): the observations of frame k are those from `[k]` up to `[k + 1]`."""
         return np.searchsorted(self.frame, np.arange(n_frames + 1)).astype(np.int64)

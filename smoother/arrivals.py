@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 
+import gtsam
 import numpy as np
 
 from fgbaseline.data.observations import IntArray
@@ -24,8 +25,10 @@ class Arrivals:
     def __init__(self, problem: Problem, rule: EntryRule) -> None:
         self.problem = problem
         self.observations = problem.observations()
+        self._frame, self._pixel = self.observations.frame.tolist(), list(self.observations.pixel)
         self.factors = Factors(problem)
         self.waiting = WaitingLandmarks(problem, self.observations, rule)
+        self._information = np.linalg.inv(problem.increment_covariance)
         self.path = np.full((problem.n_frames, 4, 4), np.nan)
         """world_T_imu as known online; whoever solves fills it, and `position`"""
         self.position: dict[int, FloatArray] = {}
@@ -41,8 +44,9 @@ class Arrivals:
         for landmark, i in waiting:
             self.waiting.add(landmark, i)
         self.path[k] = self._guess(k, seen)
-        path = self.path if seen else self._anew(k, since)
-        entries = self.waiting.enter([landmark for landmark, _ in waiting], path, since)
+        candidates = self.waiting.candidates([landmark for landmark, _ in waiting], since)
+        path = self._anew(k, since) if candidates and not seen else self.path
+        entries = self.waiting.enter(candidates, path)
         motion = self.factors.first_pose() if k == 0 else self.factors.motion(k - 1)
         return Arrival(k, path[k], motion, tuple(entries), seen)
 
@@ -53,10 +57,12 @@ class Arrivals:
         if not seen:
             return pose
         points = np.array([self.position[j] for j in seen])
-        return corrected(self.problem, k, pose, points, self.observations.pixel[list(seen.values())])
+        pixel = self.observations.pixel[list(seen.values())]
+        return corrected(self.problem, self._information[k - 1], pose, points, pixel)
 
     def _anew(self, k: int, since: int) -> FloatArray:
-        """The path (T, 4, 4) where frame k sees no landmark that is known: its last frames fitted to the images alone.
+        """The path (T, 4, 4) where frame k sees no landmark that is known and some may enter: its last frames fitted to
+        the images alone.
 
         At the start, or after a gap, nothing corrects where the velocities lead. Landmarks triangulated along it would
         start so far off, all at once, that the first step throws some behind the cameras and bends the path.
@@ -65,8 +71,12 @@ class Arrivals:
         if self.problem.landmark_prior is not None or k - first < LAST_FRAMES:
             return self.path
         path = self.path.copy()
-        path[first : k + 1] = solved(self.factors, self.path, first, k)
+        path[first : k + 1] = solved(self.factors, self.observations, self.path, first, k)
         return path
+
+    def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
+        """The factor of one observation of the landmark `key`."""
+        return self.factors.stereo(self._frame[observation], key, self._pixel[observation])
 
     def landmarks_seen(self, observed: range) -> IntArray:
         """The landmarks of a frame's observations."""

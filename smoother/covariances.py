@@ -21,7 +21,7 @@ from fgbaseline.geometry import FloatArray
 class _Joint(NamedTuple):
     """Some variables and their joint covariance."""
 
-    columns: dict[int, slice]
+    columns: dict[int, range]
     """of each variable, by its key"""
     covariance: FloatArray
 
@@ -46,31 +46,42 @@ def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict
     while waiting:
         # Depth first: only the joint covariances on the way to the root are held.
         i, parent = waiting.pop()
-        joint = _joint(keys[i], conditionals[i].R(), conditionals[i].S(), parent)
-        own = joint.columns[keys[i][0]]
-        found[keys[i][0]] = joint.covariance[own, own].copy()
-        waiting.extend((child, joint) for child in children[i])
+        own = _Own.of(keys[i][1:], conditionals[i].R(), conditionals[i].S(), parent)
+        found[keys[i][0]] = own.covariance
+        if children[i]:
+            joint = _joint(keys[i], own, parent)
+            waiting.extend((child, joint) for child in children[i])
     return found
 
 
-def _joint(keys: list[int], R: FloatArray, S: FloatArray, parent: _Joint) -> _Joint:
-    """The joint covariance of a variable and its later neighbours, which are among the variables of `parent`."""
-    d = len(R)
-    columns, end = {keys[0]: slice(0, d)}, d
-    for key in keys[1:]:
-        width = parent.columns[key].stop - parent.columns[key].start
-        columns[key] = slice(end, end + width)
-        end += width
-    R_inverse = np.linalg.inv(R)
-    covariance = np.empty((end, end))
-    covariance[:d, :d] = R_inverse @ R_inverse.T
-    if end > d:
-        among = np.concatenate([np.arange(c.start, c.stop) for c in (parent.columns[key] for key in keys[1:])])
-        later = parent.covariance[np.ix_(among, among)]
+class _Own(NamedTuple):
+    """A variable's covariance, and what it took."""
+
+    covariance: FloatArray
+    cross: FloatArray
+    """-cov(x_i, x_S)"""
+    later: FloatArray
+    """cov(x_S)"""
+
+    @staticmethod
+    def of(later_keys: list[int], R: FloatArray, S: FloatArray, parent: _Joint) -> "_Own":
+        """Of the variable with this conditional, whose later neighbours are among the variables of `parent`."""
+        R_inverse = np.linalg.inv(R)
+        covariance = R_inverse @ R_inverse.T
+        if not later_keys:
+            return _Own(covariance, np.empty((len(R), 0)), np.empty((0, 0)))
+        among = [i for columns in map(parent.columns.__getitem__, later_keys) for i in columns]
+        later = parent.covariance[among][:, among]
         gain = R_inverse @ S
         cross = gain @ later
-        covariance[:d, :d] += cross @ gain.T
-        covariance[:d, d:] = -cross
-        covariance[d:, :d] = -cross.T
-        covariance[d:, d:] = later
-    return _Joint(columns, covariance)
+        return _Own(covariance + cross @ gain.T, cross, later)
+
+
+def _joint(keys: list[int], own: _Own, parent: _Joint) -> _Joint:
+    """The joint covariance of a variable and its later neighbours."""
+    d = len(own.covariance)
+    columns, end = {keys[0]: range(d)}, d
+    for key in keys[1:]:
+        columns[key] = range(end, end + len(parent.columns[key]))
+        end = columns[key].stop
+    return _Joint(columns, np.block([[own.covariance, -own.cross], [-own.cross.T, own.later]]))

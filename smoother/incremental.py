@@ -131,19 +131,15 @@ class IncrementalSmoother:
                 graph.push_back(factors.landmark_prior(j, key))
                 owner.append((j, PRIOR))
             for i in entry.observation:
-                graph.push_back(self._stereo(key, i))
+                graph.push_back(self.arrivals.stereo(i, key))
                 owner.append((j, i))
         for j, i in arrival.seen.items():
-            graph.push_back(self._stereo(self.key[j], i))
+            graph.push_back(self.arrivals.stereo(i, self.key[j]))
             owner.append((j, i))
         result = self._update(graph, values, given_up)
         self.key |= new
         for (j, i), slot in zip(owner, list(result.getNewFactorsIndices())[1:], strict=True):
             self._slots.setdefault(j, {})[i] = int(slot)
-
-    def _stereo(self, key: int, observation: int) -> gtsam.NonlinearFactor:
-        o = self.arrivals.observations
-        return self.arrivals.factors.stereo(int(o.frame[observation]), key, o.pixel[observation])
 
     def _update(
         self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, given_up: Collection[int]

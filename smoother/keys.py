@@ -6,6 +6,8 @@ the letter tells the distance. With one threshold for all, far landmarks are rel
 hangs on them.
 """
 
+import math
+
 import gtsam
 import numpy as np
 
@@ -17,26 +19,30 @@ NEAREST, RATIO = 5.0, 1.6
 """m; a class reaches RATIO times as far as the one before it"""
 
 
+_LETTER_AT = 56
+"""the bit of a key from which on it holds its letter, as in `gtsam.symbol`, which costs ten times as much"""
+_POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
+
+
 def pose_key(frame: int) -> int:
     """The key of the pose of a frame."""
-    return int(gtsam.symbol(POSE, frame))
+    return _POSES | frame
 
 
 def landmark_key(landmark: int) -> int:
     """The key of a landmark, by its index in the sequence, in a graph that is solved as a whole."""
-    return int(gtsam.symbol(LANDMARK, landmark))
+    return _LANDMARKS | landmark
 
 
 def distance_key(landmark: int, distance: float) -> int:
     """The key of a landmark that enters an incremental graph when it is `distance` (m) away."""
-    steps = np.log(max(distance, NEAREST) / NEAREST) / np.log(RATIO)
-    return int(gtsam.symbol(LETTERS[min(int(steps), len(LETTERS) - 1)], landmark))
+    steps = math.log(max(distance, NEAREST) / NEAREST) / math.log(RATIO)
+    return (ord(LETTERS[min(int(steps), len(LETTERS) - 1)]) << _LETTER_AT) | landmark
 
 
 def landmark_of(key: int) -> int | None:
     """The landmark that a key stands for; None for a pose."""
-    symbol = gtsam.Symbol(key)
-    return None if chr(symbol.chr()) == POSE else int(symbol.index())
+    return None if key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
 
 
 def thresholds(position: float, rotation: float, landmark: float) -> gtsam.ISAM2ThresholdMap:

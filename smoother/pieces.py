@@ -8,6 +8,7 @@ each is solved on its own and put back together, then longer ones along what cam
 import gtsam
 import numpy as np
 
+from fgbaseline.data.observations import Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
@@ -24,18 +25,18 @@ MAX_STEPS, RELATIVE_DECREASE = 15, 1e-3
 
 def piecewise(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
     """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
-    factors, T = Factors(problem), problem.n_frames
+    factors, observations, T = Factors(problem), problem.observations(), problem.n_frames
     for length in LENGTHS:
-        pieces = [solved(factors, world_T_imu, a, min(a + length, T - 1)) for a in range(0, T - 1, length)]
+        starts = range(0, T - 1, length)
+        pieces = [solved(factors, observations, world_T_imu, a, min(a + length, T - 1)) for a in starts]
         steps = np.concatenate([se3.relative(piece) for piece in pieces])
         world_T_imu = se3.compose(steps, world_T_imu[0])
     return world_T_imu
 
 
-def solved(factors: Factors, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
+def solved(factors: Factors, observations: Observations, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
     """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
-    everything = factors.problem.observations()
-    o = everything.select((everything.frame >= first) & (everything.frame <= last))
+    o = observations.of_frames(first, last)
     often = np.bincount(o.landmark) >= MIN_OBSERVATIONS
     landmarks = triangulated(factors.problem, o.select(often[o.landmark]), world_T_imu)
     o = o.select(np.isin(o.landmark, landmarks.index))

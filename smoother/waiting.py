@@ -51,20 +51,23 @@ class WaitingLandmarks:
         frame = self._observations.frame
         return [(landmark, int(frame[observed[-1]])) for landmark, observed in sorted(self._observed.items())]
 
-    def enter(self, seen: list[int], world_T_imu: FloatArray, since: int = 0) -> list[Entry]:
-        """Those of the landmarks `seen` in this frame that are determined along the poses (T, 4, 4); they wait no more.
-
-        Observations before the frame `since` are forgotten.
-
-        The landmark must be in front of every camera that saw it, and its triangulation, with the poses held, must
-        leave no direction less certain than the rule allows.
-        """
+    def candidates(self, seen: list[int], since: int = 0) -> list[int]:
+        """Those of the landmarks `seen` in this frame with observations enough; those before `since` are forgotten."""
         if since > 0:
             for j in seen:
                 self._observed[j] = [i for i in self._observed[j] if self._observations.frame[i] >= since]
         if self._problem.landmark_prior is not None:
-            return [self._enter_at_prior(landmark) for landmark in seen]
-        candidates = [j for j in seen if len(self._observed[j]) >= self._rule.min_observations]
+            return seen
+        return [j for j in seen if len(self._observed[j]) >= self._rule.min_observations]
+
+    def enter(self, candidates: list[int], world_T_imu: FloatArray) -> list[Entry]:
+        """Those of the candidates that are determined along the poses (T, 4, 4); they wait no more.
+
+        The landmark must be in front of every camera that saw it, and its triangulation, with the poses held, must
+        leave no direction less certain than the rule allows.
+        """
+        if self._problem.landmark_prior is not None:
+            return [self._enter_at_prior(landmark) for landmark in candidates]
         if not candidates:
             return []
         lengths = [len(self._observed[j]) for j in candidates]

@@ -61,9 +61,9 @@ class Window:
             if self._problem.landmark_prior is not None:
                 graph.push_back(self._arrivals.factors.landmark_prior(j, new[j]))
             for i in entry.observation:
-                graph.push_back(self._stereo(new[j], i))
+                graph.push_back(self._arrivals.stereo(i, new[j]))
         for j, i in arrival.seen.items():
-            graph.push_back(self._stereo(self.key[j], i))
+            graph.push_back(self._arrivals.stereo(i, self.key[j]))
         seen = new | {j: self.key[j] for j in arrival.seen}
         times = {pose_key(k): now} | dict.fromkeys(seen.values(), now)
         forgotten = {self.key[j] for j in given_up if j in self.key}
@@ -99,10 +99,6 @@ class Window:
     def _leave(self, landmark: int) -> None:
         for known in (self.key, self._seen_at, self._observed):
             known.pop(landmark, None)
-
-    def _stereo(self, key: int, observation: int) -> gtsam.NonlinearFactor:
-        o = self._arrivals.observations
-        return self._arrivals.factors.stereo(int(o.frame[observation]), key, o.pixel[observation])
 
     def suspects(self, error: IndeterminateSystemError, given_up: Collection[int]) -> dict[int, str]:
         """See `arrival.Graph`; as in `IncrementalSmoother`."""
