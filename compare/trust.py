@@ -42,6 +42,8 @@ class TrustLimits:
     weak_frames: tuple[float, float] = (0.05, 0.25)
     """share of frames with fewer than `weak_below` used observations"""
     weak_below: int = 6
+    untied_intervals: tuple[float, float] = (0.25, 0.6)
+    """share of the intervals that no used landmark is seen on both sides of"""
     given_up_frames: tuple[float, float] = (0.0, 0.05)
     """share of frames whose observations had to be given up"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
@@ -78,6 +80,14 @@ def trust(
         (_above(weak, limit.weak_frames), f"{weak:.1%} of the frames have fewer than {limit.weak_below} observations"),
         (_above(given_up, limit.given_up_frames), f"the observations of {given_up:.1%} of the frames were given up"),
     ]
+    untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
+    if untied:
+        share = untied / (problem.n_frames - 1)
+        text = (
+            f"over {untied:,} of {problem.n_frames - 1:,} intervals no landmark ties what lies on both sides: only the "
+            "velocities tell the motion there, and a jump would not show"
+        )
+        findings.append((_above(share, limit.untied_intervals), text))
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
     findings.append(_beside_batch(problem, reference, batch, limit))

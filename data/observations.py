@@ -73,6 +73,16 @@ class Observations:
         for k in range(n_frames):
             yield slice(int(starts[k]), int(starts[k + 1]))
 
+    def ties(self, n_frames: int) -> IntArray:
+        """(n_frames - 1,) how many landmarks are seen both up to frame k and from frame k + 1 on."""
+        change = np.zeros(n_frames + 1, dtype=np.int64)
+        if len(self) > 0:
+            order = self.by_track()
+            ends = np.flatnonzero(np.diff(self.landmark[order])) + 1
+            np.add.at(change, self.frame[order[np.append(0, ends)]], 1)
+            np.add.at(change, self.frame[order[np.append(ends, len(order)) - 1]], -1)
+        return np.cumsum(change)[: n_frames - 1]
+
     def counts(self, n_landmarks: int) -> IntArray:
         """(n_landmarks,) how many observations each landmark has."""
         return np.bincount(self.landmark, minlength=n_landmarks).astype(np.int64)

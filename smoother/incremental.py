@@ -23,6 +23,11 @@ from .waiting import EntryRule
 
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
+CROWD = 200
+"""landmarks of a frame, above which they are eliminated before its pose. By default GTSAM keeps all that a frame sees
+for the end, which costs the next frame least, as long as so many dense columns do not cost more themselves"""
+UNSETTLED = 4
+"""updates that all relinearise, from one on whose landmarks are all new: they and the last poses start far off"""
 SETTLING_UPDATES = 8
 """at most; three to five are usual"""
 
@@ -37,6 +42,8 @@ class ISAM2Settings:
     """rad, of a pose"""
     relinearize_landmark: float = 0.002
     """as a share of its distance"""
+    relinearize_skip: int = 3
+    """updates from one that relinearises what is beyond its threshold to the next; a fixed-lag smoother does at each"""
     entry: EntryRule = field(default_factory=EntryRule)
     relinearise_at_end: bool = True
     """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
@@ -49,7 +56,7 @@ class ISAM2Settings:
         params.setRelinearizeThreshold(
             thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark)
         )
-        params.relinearizeSkip = 1
+        params.relinearizeSkip = self.relinearize_skip
         params.setFactorization("QR" if self.careful else "CHOLESKY")
         return params
 
@@ -78,6 +85,8 @@ class IncrementalSmoother:
         self._dropped: set[int] = set()
         self._n_frames = 0
         """in the graph"""
+        self._unsettled = 0
+        """frames for which every update relinearises"""
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
@@ -95,7 +104,7 @@ class IncrementalSmoother:
         """After the last frame: updates without anything new, until every variable is within its threshold."""
         for _ in range(SETTLING_UPDATES):
             try:
-                result = self._update(gtsam.NonlinearFactorGraph(), gtsam.Values(), ())
+                result = self.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
             except IndeterminateSystemError:  # the tree is as it was, and so good enough
                 return
             if result.getVariablesRelinearized() == 0:
@@ -136,16 +145,27 @@ class IncrementalSmoother:
         for j, i in arrival.seen.items():
             graph.push_back(self.arrivals.stereo(i, self.key[j]))
             owner.append((j, i))
-        result = self._update(graph, values, given_up)
+        if arrival.entries and not arrival.seen:
+            self._unsettled = UNSETTLED
+        crowded = len(arrival.entries) + len(arrival.seen) > CROWD
+        result = self._update(graph, values, given_up, pose_key(k) if crowded else None, self._unsettled > 0)
+        self._unsettled = max(0, self._unsettled - 1)
         self.key |= new
         for (j, i), slot in zip(owner, list(result.getNewFactorsIndices())[1:], strict=True):
             self._slots.setdefault(j, {})[i] = int(slot)
 
     def _update(
-        self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, given_up: Collection[int]
+        self,
+        graph: gtsam.NonlinearFactorGraph,
+        values: gtsam.Values,
+        given_up: Collection[int],
+        last: int | None = None,
+        relinearise: bool = False,
     ) -> gtsam.ISAM2Result:
         there = [j for j in given_up if j in self.key]
-        result = self.isam.update(graph, values, [slot for j in there for slot in self._slots[j].values()])
+        result = self.isam.update(
+            graph, values, [slot for j in there for slot in self._slots[j].values()], last, relinearise
+        )
         for j in there:
             del self.key[j], self._slots[j]
         return result

@@ -13,6 +13,10 @@ class Update(NamedTuple):
     factors: gtsam.NonlinearFactorGraph
     values: gtsam.Values
     removed: tuple[int, ...] = ()
+    last: int | None = None
+    """the key of a variable that is to be eliminated after all others"""
+    relinearise: bool = False
+    """at this update, whichever the next one is that would"""
 
 
 class IndeterminateSystemError(Exception):
@@ -37,10 +41,18 @@ class RestorableISAM2:
         self._since_copy: list[Update] = []
 
     def update(
-        self, factors: gtsam.NonlinearFactorGraph, values: gtsam.Values, removed: Listing[int] = ()
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        values: gtsam.Values,
+        removed: Listing[int] = (),
+        last: int | None = None,
+        relinearise: bool = False,
     ) -> gtsam.ISAM2Result:
-        """One update; raises IndeterminateSystemError, the tree being restored, where GTSAM fails."""
-        step = Update(factors, values, tuple(removed))
+        """One update; raises IndeterminateSystemError, the tree being restored, where GTSAM fails.
+
+        GTSAM eliminates all variables of the new factors last, unless `last` names the only one that is to be.
+        """
+        step = Update(factors, values, tuple(removed), last, relinearise)
         if len(self._since_copy) >= self._interval:
             self._copy = gtsam.ISAM2(self.tree)
             self._since_copy = []
@@ -56,7 +68,17 @@ class RestorableISAM2:
 
 
 def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
-    return tree.update(step.factors, step.values, list(step.removed))
+    groups = None
+    if step.last is not None:
+        groups = gtsam.KeyGroupMap()
+        groups.insert2(step.last, 1)
+    return tree.update(
+        step.factors,
+        step.values,
+        list(step.removed),
+        constrainedKeys=groups,
+        force_relinearize=step.relinearise,
+    )
 
 
 def named_variable(text: str) -> int | None:

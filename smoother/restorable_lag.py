@@ -27,7 +27,7 @@ class Snapshot(NamedTuple):
     """All that a smoother knows: one that is built from it is equal to it, to rounding."""
 
     factors: gtsam.NonlinearFactorGraph
-    """marginals among them: linear, at the linearisation point, which GTSAM keeps fixed for them"""
+    """marginals among them: linear, at the linearisation point, which GTSAM keeps fixed for them; with empty slots"""
     linearization_point: gtsam.Values
     times: dict[int, float]
 
@@ -111,19 +111,22 @@ class RestorableLag:
     def _taken(self) -> Snapshot:
         # GTSAM gives references, which the next update changes.
         s = self.smoother
-        return Snapshot(compact(s.getFactors()), gtsam.Values(s.getLinearizationPoint()), s.timestamps())
+        return Snapshot(
+            gtsam.NonlinearFactorGraph(s.getFactors()), gtsam.Values(s.getLinearizationPoint()), s.timestamps()
+        )
 
     def _new(self, *, careful: bool) -> gtsam.IncrementalFixedLagSmoother:
         params = self._settings.params()
         params.findUnusedFactorSlots = True
+        params.relinearizeSkip = 1  # what leaves the window has no later chance, and most of the time goes elsewhere
         if careful:
             params.setFactorization("QR")
         return gtsam.IncrementalFixedLagSmoother(self._lag, params)
 
     def _built(self, snapshot: Snapshot, *, careful: bool) -> gtsam.IncrementalFixedLagSmoother:
-        graph = gtsam.NonlinearFactorGraph()
-        for i in range(snapshot.factors.size()):
-            factor = snapshot.factors.at(i)
+        graph, factors = gtsam.NonlinearFactorGraph(), compact(snapshot.factors)
+        for i in range(factors.size()):
+            factor = factors.at(i)
             if isinstance(factor, gtsam.LinearContainerFactor):
                 # Nothing keeps the point fixed in the new one: the marginal must know it.
                 point = snapshot.linearization_point
@@ -141,9 +144,9 @@ def _plain(times: Mapping[int, float]) -> Mapping[SupportsInt | SupportsIndex, S
 
 
 def _without(snapshot: Snapshot, forgotten: Collection[int]) -> Snapshot:
-    graph, in_marginals = gtsam.NonlinearFactorGraph(), set[int]()
-    for i in range(snapshot.factors.size()):
-        factor = snapshot.factors.at(i)
+    graph, factors, in_marginals = gtsam.NonlinearFactorGraph(), compact(snapshot.factors), set[int]()
+    for i in range(factors.size()):
+        factor = factors.at(i)
         if isinstance(factor, gtsam.LinearContainerFactor):
             in_marginals |= {key for key in factor.keys() if key in forgotten}  # noqa: SIM118
         elif any(key in forgotten for key in factor.keys()):  # noqa: SIM118

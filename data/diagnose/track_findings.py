@@ -15,7 +15,7 @@ MIN_DEPTHLESS, MIN_TINY, MIN_ROWS, MIN_MOVING = 0.0075, 0.02, 0.01, 0.01
 
 
 def track_findings(sequence: Sequence, repeated: BoolArray, tracks: Tracks) -> tuple[Finding, ...]:
-    """Copied frames, wrong matches, moving things, unusable observations, and times without images."""
+    """Copied frames, wrong matches, moving things, unusable observations, cuts, and times without images."""
     counts = (
         _copies(repeated, tracks),
         _wrong_matches(tracks),
@@ -24,6 +24,7 @@ def track_findings(sequence: Sequence, repeated: BoolArray, tracks: Tracks) -> t
         _disparities(sequence, tracks),
         _rows(sequence, tracks),
         _few_features(tracks),
+        _cuts(sequence, tracks),
         _gaps(sequence, tracks),
     )
     return tuple(finding for found in counts for finding in found)
@@ -117,6 +118,20 @@ def _few_features(tracks: Tracks) -> list[Finding]:
         f"({spans(frames)}): only the velocities tell the motion there."
     )
     return [_counted("few_features", text, len(frames), len(frames), "frames")]
+
+
+def _cuts(sequence: Sequence, tracks: Tracks) -> list[Finding]:
+    """Intervals that no track spans, though both frames have some."""
+    usable = tracks.usable >= MIN_USABLE
+    untied = sequence.observations.ties(sequence.n_frames) == 0
+    cuts = np.flatnonzero(untied & usable[:-1] & usable[1:])
+    if len(cuts) == 0:
+        return []
+    text = (
+        f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
+        "tracker started anew, or the recording is cut there. Only the velocities tell the motion."
+    )
+    return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
 
 
 def _gaps(sequence: Sequence, tracks: Tracks) -> list[Finding]:
