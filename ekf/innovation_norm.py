@@ -6,25 +6,10 @@ filter that knows its errors it is chi-square with 3n degrees of freedom (Bar-Sh
 """
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dtrtrs
 
 from fgbaseline.geometry import FloatArray
 
 from .pose_update import PoseInnovation
-
-
-def squared_norm(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> float:
-    """nu^T (H P H^T + R)^-1 nu of residuals (n, 3) with R = diag(variance (3,)) for each, px^2.
-
-    `HPHt` (3n, 3n) is left as it is. NaN where S has no Cholesky factor.
-    """
-    S = HPHt.copy()
-    S.reshape(-1)[:: len(S) + 1] += np.tile(variance, len(residual))
-    L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
-    if failed:
-        return float("nan")
-    whitened, _ = dtrtrs(L, residual.reshape(-1), lower=1)
-    return float(whitened @ whitened)
 
 
 def squared_norm_of_known(innovation: PoseInnovation, covariance: FloatArray, pixel_variance: float) -> float:

@@ -43,6 +43,11 @@ class Screened:
     rejection: Rejection | None = None
     """why the others are not taken"""
 
+    @property
+    def plain(self) -> bool:
+        """Whether all are taken with their full weight."""
+        return bool(self.taken.all() and (self.weight == 1.0).all())
+
 
 def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: JointSettings) -> Screened:
     """The verdict on observations whose innovations have squared norms (n,), whitened by their own covariance.
