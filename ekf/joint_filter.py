@@ -9,6 +9,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
+from .admission import admitted
 from .joint_settings import JointSettings, Linearisation
 from .joint_state import ABSENT, POSE, JointState
 from .joint_update import Factor, Innovation, NotPositiveDefiniteError, StackedJacobian, correct
@@ -58,6 +59,10 @@ class JointFilter:
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.position = np.full((m, 3), np.nan)
         self.covariance = np.full((m, 3, 3), np.nan)
+        self.waited = 0
+        """how many observations were not used because the state was full"""
+        self.turned_away: BoolArray = np.zeros(m, dtype=np.bool_)
+        """(m,) which landmarks some of these are of"""
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
@@ -67,18 +72,35 @@ class JointFilter:
             self._predict(k)
         index = np.arange(seen.start, seen.stop)
         row = self.row[index]
-        if self.problem.landmark_prior is not None:
-            self._enter_at_prior(row[self.state.slot_of[row] == ABSENT])
         known = self.state.slot_of[row] != ABSENT
-        believed = self._update(k, index[known])
-        enters = ~known & believed
-        if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
-            enters &= self.measured[index, 0] > self.measured[index, 1]
-        if enters.any():
-            self._enter_at_first_sight(index[enters])
-        if not np.array_equal(enters, ~known):
-            self._reject(k, Rejection.ENTRY, ~enters[~known])
+        if self.problem.landmark_prior is not None:
+            enters = self._admitted(k, index, ~known)
+            self._enter_at_prior(row[enters])
+            self._update(k, index[known | enters])
+        else:
+            wanted = ~known & self._update(k, index[known])
+            if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
+                wanted &= self.measured[index, 0] > self.measured[index, 1]
+            if not np.array_equal(wanted, ~known):
+                self._reject(k, Rejection.ENTRY, ~wanted[~known])
+            enters = self._admitted(k, index, wanted)
+            if enters.any():
+                self._enter_at_first_sight(index[enters])
         self._leave(k, row[self.last_frame[row] == k])
+
+    def _admitted(self, k: int, index: IntArray, wanted: BoolArray) -> BoolArray:
+        """Those of the observations `index` (n,) with `wanted` (n,) whose landmarks the state has places for."""
+        places = self.settings.max_landmarks - self.state.count
+        if np.count_nonzero(wanted) <= places:
+            return wanted
+        active = self.state.slot_of[self.row[index]] != ABSENT
+        enters = wanted.copy()
+        enters[wanted] = admitted(self.measured[index[wanted]], self.measured[index[active]], places)
+        waiting = wanted & ~enters
+        self.waited += np.count_nonzero(waiting)
+        self.turned_away[self.row[index[waiting]]] = True
+        self._reject(k, Rejection.FULL, waiting)
+        return enters
 
     def _predict(self, k: int) -> None:
         state, dt, prior = self.state, float(self.dt[k - 1]), self.settings.gyro_bias
@@ -151,7 +173,7 @@ class JointFilter:
     def _apply(self, delta: FloatArray) -> None:
         """Moves the state by delta (size,), and P along with it where the settings say so.
 
-        N = [Ad(T^-1); nu], nu how it moves landmarks (`landmark_chart.moved_by`). With - before and + after the move, B takes N- to N+:
+        N = [Ad(T^-1); nu], nu being `moved_by` of the landmarks. With - before and + after the move, B takes N- to N+:
         [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]]. A bias is not changed by a rigid motion: its rows of N are 0.
         """
         state = self.state
@@ -195,7 +217,10 @@ class JointFilter:
         active = self.state.slot_of[row] != ABSENT
         leaving = row[active]
         if len(leaving) < len(row):
-            self._undetermined(k, row[~active], "no frame that was believed saw it")
+            out = row[~active]
+            turned_away = self.turned_away[out]
+            self._undetermined(k, out[turned_away], "the state was full while it was seen")
+            self._undetermined(k, out[~turned_away], "no frame that was believed saw it")
         if len(leaving) == 0:
             return
         points = self.state.world_points(leaving)

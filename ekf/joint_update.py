@@ -104,8 +104,9 @@ class Innovation:
         of freedom, where all is as assumed."""
         # S = L D L^T written out: a third of the time of LAPACK, which is called for each.
         rows = 3 * len(self)
-        start = np.arange(0, rows * rows, 3 * rows + 3)  # of each block on the diagonal
-        a, b, c, d, e, f = self.HPHt.reshape(-1)[start + [[0], [1], [2], [rows + 1], [rows + 2], [2 * rows + 2]]]
+        block = np.arange(0, rows * rows, 3 * rows + 3)  # where each begins on the diagonal
+        upper = np.array([0, 1, 2, rows + 1, rows + 2, 2 * rows + 2])
+        a, b, c, d, e, f = self.HPHt.reshape(-1)[upper[:, None] + block]
         a, d, f = a + variance[0], d + variance[1], f + variance[2]
         x, y, z = self.residual.T
         by_a, to_e = b / a, e - c * b / a

@@ -48,7 +48,7 @@ def coordinates_of(charts: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def generators(charts: FloatArray) -> FloatArray:
-    """Z (..., 6, 4, 4) = M^-1 hat(e_i) M: the six small rigid motions of the world as charts M (..., 4, 4) have them."""
+    """Z (..., 6, 4, 4) = M^-1 hat(e_i) M: the six small motions of the world as charts M (..., 4, 4) have them."""
     return np.asarray(np.linalg.inv(charts)[..., None, :, :] @ _SMALL_MOTIONS @ charts[..., None, :, :])
 
 

@@ -30,6 +30,8 @@ class Rejection(StrEnum):
     SINGULAR = "covariance lost"
     ENTRY = "entry put off"
     """the first sight of a landmark: in a frame that is not believed, or at infinity in world coordinates"""
+    FULL = "state full"
+    """of landmarks that wait outside until others have left"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -332,7 +332,9 @@ def test_what_is_not_finite_fails_with_its_frame() -> None:
     assert not estimate.used[SCENE.observations.frame >= 5].any()
 
 
-@pytest.mark.parametrize("wrong", [{"gate": 0.0}, {"gate": 1.0}, {"gate": 99.0}, {"disagreeing_share": 0.0}])
+@pytest.mark.parametrize(
+    "wrong", [{"gate": 0.0}, {"gate": 1.0}, {"gate": 99.0}, {"disagreeing_share": 0.0}, {"max_landmarks": 0}]
+)
 def test_settings_that_cannot_be_are_named(wrong: dict[str, float]) -> None:
     (name,) = wrong
     with pytest.raises(FgbaselineError, match=f"^{name}: .*{wrong[name]}"):
