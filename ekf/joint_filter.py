@@ -78,11 +78,12 @@ class JointFilter:
             self._enter_at_prior(row[enters])
             self._update(k, index[known | enters])
         else:
-            wanted = ~known & self._update(k, index[known])
+            new = ~known
+            wanted = new & self._update(k, index[known])
             if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
                 wanted &= self.measured[index, 0] > self.measured[index, 1]
-            if not np.array_equal(wanted, ~known):
-                self._reject(k, Rejection.ENTRY, ~wanted[~known])
+            if (wanted != new).any():
+                self._reject(k, Rejection.ENTRY, ~wanted[new])
             enters = self._admitted(k, index, wanted)
             if enters.any():
                 self._enter_at_first_sight(index[enters])
@@ -97,7 +98,7 @@ class JointFilter:
         enters = wanted.copy()
         enters[wanted] = admitted(self.measured[index[wanted]], self.measured[index[active]], places)
         waiting = wanted & ~enters
-        self.waited += np.count_nonzero(waiting)
+        self.waited += int(np.count_nonzero(waiting))
         self.turned_away[self.row[index[waiting]]] = True
         self._reject(k, Rejection.FULL, waiting)
         return enters
@@ -203,11 +204,10 @@ class JointFilter:
         world_T_cam = state.pose @ self.imu_T_cam
         points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
         shared = chart(self.settings.coordinates, world_T_cam)
-        charts = np.broadcast_to(shared, (n, 4, 4))
         xi = coordinates_of(shared, points)
         at = state.predicted_pose if first_estimate else state.pose
-        seen = sight(self.camera, self.cam_T_imu, at, homogeneous(charts, xi))
-        inverse = np.linalg.inv(seen.by_point @ charts[:, :, :3])
+        seen = sight(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
+        inverse = np.linalg.inv((seen.by_point.reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
         covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
         state.enter(self.row[index], shared, xi, -inverse @ seen.by_pose, covariance)
         self.used[index] = True

@@ -153,9 +153,9 @@ class JointState:
         P[old:new, :old] = cross
         P[:old, old:new] = cross.T
         own = cross[:, :POSE] @ G.T
+        each = np.arange(n)
+        own.reshape(n, 3, n, 3)[each, :, each, :] += covariance
         P[old:new, old:new] = 0.5 * (own + own.T)
-        index = old + np.arange(3 * n).reshape(n, 3)
-        P[index[:, :, None], index[:, None, :]] += 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
         self.count += n
 
     def leave(self, row: IntArray) -> None:

@@ -43,7 +43,8 @@ def homogeneous(charts: FloatArray, xi: FloatArray) -> FloatArray:
 
 def coordinates_of(charts: FloatArray, points: FloatArray) -> FloatArray:
     """The coordinates xi (n, 3) in charts M (n, 4, 4), or in one (4, 4), of homogeneous world points (n, 4)."""
-    xi = (np.linalg.inv(charts) @ points[:, :, None])[:, :, 0]
+    inverse = np.linalg.inv(charts)
+    xi = points @ inverse.T if inverse.ndim == 2 else (inverse @ points[:, :, None])[:, :, 0]
     return np.asarray(xi[:, :3] / xi[:, 3:], dtype=np.float64)
 
 
@@ -77,11 +78,10 @@ class WorldPoints(NamedTuple):
 def world_points(charts: FloatArray, xi: FloatArray, covariance: FloatArray) -> WorldPoints:
     """Positions, and to first order their covariances, of coordinates (n, 3) with covariances (n, 3, 3).
 
-    Not finite at infinity.
+    Not finite at infinity, of which numpy warns.
     """
     X = homogeneous(charts, xi)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        position = X[:, :3] / X[:, 3:]
-        J = (charts[:, :3, :3] - position[:, :, None] * charts[:, 3:, :3]) / X[:, 3, None, None]
-        spread = J @ covariance @ np.swapaxes(J, 1, 2)
+    position = X[:, :3] / X[:, 3:]
+    J = (charts[:, :3, :3] - position[:, :, None] * charts[:, 3:, :3]) / X[:, 3, None, None]
+    spread = J @ covariance @ np.swapaxes(J, 1, 2)
     return WorldPoints(position, 0.5 * (spread + np.swapaxes(spread, 1, 2)), X[:, 3] > 0.0)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 
 import numpy as np
 from scipy.special import chdtri
@@ -71,6 +72,7 @@ def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: Joi
     return Screened(np.ones(n, dtype=np.bool_), weight)
 
 
+@cache
 def quantile(probability: float) -> float:
     """The chi-square quantile with the degrees of freedom of one observation."""
     return float(chdtri(ROWS, 1.0 - probability))

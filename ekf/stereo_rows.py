@@ -22,9 +22,11 @@ def measured_rows(pixel: FloatArray) -> FloatArray:
 
 def back_projected(camera: StereoCamera, rows: FloatArray) -> FloatArray:
     """Homogeneous points (n, 4) in the left camera's frame, [x/z, y/z, 1, 1/z], of rows (n, 3): exact at infinity."""
-    one = np.ones(len(rows))
-    x, y = (rows[:, 0] - camera.cu) / camera.fu, (rows[:, 2] - camera.cv) / camera.fv
-    return np.stack([x, y, one, (rows[:, 0] - rows[:, 1]) / (camera.fu * camera.baseline)], axis=1)
+    points = np.ones((len(rows), 4))
+    points[:, 0] = (rows[:, 0] - camera.cu) / camera.fu
+    points[:, 1] = (rows[:, 2] - camera.cv) / camera.fv
+    points[:, 3] = (rows[:, 0] - rows[:, 1]) / (camera.fu * camera.baseline)
+    return points
 
 
 class Sight(NamedTuple):
@@ -69,5 +71,5 @@ def sight(camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray, 
     by_pose = np.empty((n, 3, 6))
     by_pose[:, :, :3] = -s[:, 3, None, None] * by_s
     np.matmul(by_s, so3.hat3(s[:, :3]), out=by_pose[:, :, 3:])
-    length = np.sqrt(np.einsum("ni,ni->n", q[:, :3], q[:, :3]))
-    return Sight(predicted, by_pose, (stacked @ (cam_T_imu @ imu_T_world)).reshape(n, 3, 4), q[:, 2] / length)
+    cosine = np.copysign(1.0 / np.sqrt(x * x + y * y + 1.0), q[:, 2])
+    return Sight(predicted, by_pose, (stacked @ (cam_T_imu @ imu_T_world)).reshape(n, 3, 4), cosine)
