@@ -182,9 +182,11 @@ class JointFilter:
         step = se3.exp_one(delta[:POSE])
         state.pose = before @ step
         state.bias[: state.body - POSE] += delta[POSE : state.body]
-        change = state.move_landmarks(delta[state.body :].reshape(-1, 3))
-        if self.settings.linearisation is Linearisation.INVARIANT:
-            by_pose = change.reshape(-1, POSE) @ se3.adjoint(before)
+        by = delta[state.body :].reshape(-1, 3)
+        if self.settings.linearisation is not Linearisation.INVARIANT:
+            state.xi[:] += by
+        else:
+            by_pose = state.move_landmarks(by).reshape(-1, POSE) @ se3.adjoint(before)
             state.transport(se3.adjoint(se3.inverse(step)), by_pose)
 
     def _enter_at_prior(self, row: IntArray) -> None:
