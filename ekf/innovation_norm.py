@@ -6,41 +6,29 @@ filter that knows its errors it is chi-square with 3n degrees of freedom (Bar-Sh
 """
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dtrtrs
 
 from fgbaseline.geometry import FloatArray
 
-from .pose_update import PoseInnovation
-
-
-def squared_norm(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> float:
-    """nu^T (H P H^T + R)^-1 nu of residuals (n, 3) with R = diag(variance (3,)) for each, px^2.
-
-    `HPHt` (3n, 3n) is left as it is. NaN where S has no Cholesky factor.
-    """
-    S = HPHt.copy()
-    S.reshape(-1)[:: len(S) + 1] += np.tile(variance, len(residual))
-    L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
-    if failed:
-        return float("nan")
-    whitened, _ = dtrtrs(L, residual.reshape(-1), lower=1)
-    return float(whitened @ whitened)
+from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 
 
 def squared_norm_of_known(innovation: PoseInnovation, covariance: FloatArray, pixel_variance: float) -> float:
     """The same of landmarks that count as known, as in the documented filter: S = H Sigma H^T + R, Sigma the pose's.
 
-    It is the least value of |B x - y|^2 + |x|^2 with Sigma = L L^T, B = R^-1/2 H L and y = R^-1/2 nu, which stays
-    accurate where a landmark near the camera plane makes S numerically singular. NaN where it is not finite.
+    NaN where it is not finite.
     """
-    H, nu = innovation.jacobian, innovation.residual
-    both = np.sqrt(0.5)  # of vL and vR, for which H is the same: their sum over sqrt 2 has the variance of one row
-    rows = np.stack([H[:, 0], H[:, 2], both * (H[:, 1] + H[:, 3])], axis=1).reshape(-1, 6)
-    seen = np.stack([nu[:, 0], nu[:, 2], both * (nu[:, 1] + nu[:, 3])], axis=1).reshape(-1)
+    weight = np.full(len(innovation.residual), 1.0 / pixel_variance)
     try:
-        B = rows @ np.linalg.cholesky(covariance) / np.sqrt(pixel_variance)
-        A, y = np.vstack([B, np.eye(6)]), np.concatenate([seen / np.sqrt(pixel_variance), np.zeros(6)])
-        left = y - A @ np.linalg.lstsq(A, y, rcond=0.0)[0]
+        posterior = pose_posterior(covariance, innovation, weight)
     except np.linalg.LinAlgError:
         return float("nan")
-    return float(left @ left)
+    return over_three_rows(posterior, innovation, pixel_variance)
+
+
+def over_three_rows(posterior: PosePosterior, innovation: PoseInnovation, pixel_variance: float) -> float:
+    """That of a pose update in which every observation had its full weight.
+
+    The camera predicts one v for both images: of the four rows' squared norm, (vL - vR)^2 / (2 V) tells nothing.
+    """
+    apart = innovation.residual[:, 1] - innovation.residual[:, 3]
+    return posterior.squared_norm - 0.5 * float(apart @ apart) / pixel_variance

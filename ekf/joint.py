@@ -54,7 +54,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
             progress(k + 1, T)
     if settings.gyro_bias is not None:
         joint.events += _told(bias)
-    status, reason = _verdict(failure, joint.events, T)
+    status, reason = _verdict(failure, joint, T)
     known = np.isfinite(joint.position).all(axis=1)
     return Estimate(
         name="joint-ekf",
@@ -83,16 +83,17 @@ def _told(bias: GyroBias) -> list[Event]:
     return [Event(k, "gyroscope bias", f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
 
 
-def _verdict(failure: str, events: list[Event], n_frames: int) -> tuple[Status, str]:
+def _verdict(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:
     if failure:
         return Status.FAILED, failure
     trouble = {
         Rejection.FRAME: "most observations disagreed with the prediction, which took no part",
         Rejection.SINGULAR: "the joint covariance was no longer positive definite",
+        Rejection.FULL: f"the state was full: {joint.waited} observations were not used",
     }
     told = []
     for kind, what in trouble.items():
-        frames = sorted({event.frame for event in events if event.kind == kind})
+        frames = sorted({event.frame for event in joint.events if event.kind == kind})
         if frames:
             told.append(f"at {len(frames)} of {n_frames} frames, first at frame {frames[0]}, {what}")
     return (Status.RECOVERED, "; ".join(told)) if told else (Status.OK, "")

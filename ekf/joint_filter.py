@@ -9,11 +9,11 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
-from .innovation_norm import squared_norm
+from .admission import admitted
 from .joint_settings import JointSettings, Linearisation
 from .joint_state import ABSENT, POSE, JointState
-from .joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
-from .landmark_chart import Coordinates, chart, coordinates_of, homogeneous, rigid_motion
+from .joint_update import Factor, Innovation, NotPositiveDefiniteError, StackedJacobian, correct
+from .landmark_chart import Coordinates, chart, coordinates_of, homogeneous
 from .screening import Rejection, screened
 from .stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
 
@@ -51,12 +51,18 @@ class JointFilter:
         self.last_frame = np.full(m, -1, dtype=np.int64)
         self.last_frame[self.row] = o.frame  # sorted by frame: the last one stays
         self.dt = problem.sequence.dt
+        self.step = se3.exp(problem.increment)
+        self.transition = se3.adjoint(se3.inverse(self.step))
         prior = settings.gyro_bias
         bias_covariance = None if prior is None else prior.covariance()
         self.state = JointState(problem.initial_pose, problem.initial_covariance, m, bias_covariance)
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.position = np.full((m, 3), np.nan)
         self.covariance = np.full((m, 3, 3), np.nan)
+        self.waited = 0
+        """how many observations were not used because the state was full"""
+        self.turned_away: BoolArray = np.zeros(m, dtype=np.bool_)
+        """(m,) which landmarks some of these are of"""
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
@@ -66,26 +72,47 @@ class JointFilter:
             self._predict(k)
         index = np.arange(seen.start, seen.stop)
         row = self.row[index]
-        if self.problem.landmark_prior is not None:
-            self._enter_at_prior(row[self.state.slot_of[row] == ABSENT])
         known = self.state.slot_of[row] != ABSENT
-        believed = self._update(k, index[known])
-        enters = ~known & believed
-        if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
-            enters &= self.measured[index, 0] > self.measured[index, 1]
-        if enters.any():
-            self._enter_at_first_sight(index[enters])
-        if not np.array_equal(enters, ~known):
-            self._reject(k, Rejection.ENTRY, ~enters[~known])
+        if self.problem.landmark_prior is not None:
+            enters = self._admitted(k, index, ~known)
+            self._enter_at_prior(row[enters])
+            self._update(k, index[known | enters])
+        else:
+            new = ~known
+            wanted = new & self._update(k, index[known])
+            if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
+                wanted &= self.measured[index, 0] > self.measured[index, 1]
+            if (wanted != new).any():
+                self._reject(k, Rejection.ENTRY, ~wanted[new])
+            enters = self._admitted(k, index, wanted)
+            if enters.any():
+                self._enter_at_first_sight(index[enters])
         self._leave(k, row[self.last_frame[row] == k])
+
+    def _admitted(self, k: int, index: IntArray, wanted: BoolArray) -> BoolArray:
+        """Those of the observations `index` (n,) with `wanted` (n,) whose landmarks the state has places for."""
+        places = self.settings.max_landmarks - self.state.count
+        if np.count_nonzero(wanted) <= places:
+            return wanted
+        active = self.state.slot_of[self.row[index]] != ABSENT
+        enters = wanted.copy()
+        enters[wanted] = admitted(self.measured[index[wanted]], self.measured[index[active]], places)
+        waiting = wanted & ~enters
+        self.waited += int(np.count_nonzero(waiting))
+        self.turned_away[self.row[index[waiting]]] = True
+        self._reject(k, Rejection.FULL, waiting)
+        return enters
 
     def _predict(self, k: int) -> None:
         state, dt, prior = self.state, float(self.dt[k - 1]), self.settings.gyro_bias
-        twist, Q = self.problem.increment[k - 1].copy(), self.problem.increment_covariance[k - 1]
-        twist[3:] -= dt * state.bias
-        step = se3.exp(twist)
-        first_estimate = self.settings.linearisation is Linearisation.FIRST_ESTIMATE
-        F = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose if first_estimate else se3.inverse(step))
+        step, F, Q = self.step[k - 1], self.transition[k - 1], self.problem.increment_covariance[k - 1]
+        if prior is not None:
+            twist = self.problem.increment[k - 1].copy()
+            twist[3:] -= dt * state.bias
+            step = se3.exp_one(twist)
+            F = se3.adjoint(se3.inverse(step))
+        if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
+            F = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose)
         if prior is not None:
             F, Q = prior.along(twist, dt, F, Q)
         state.predict(step, F, Q)
@@ -99,23 +126,34 @@ class JointFilter:
             return True
         state = self.state
         innovation = Innovation.of(seen.H, seen.residual, state.P)
-        self.innovations.nis[k] = squared_norm(innovation.HPHt, innovation.residual, self.row_variance)
-        self.innovations.degrees[k] = innovation.residual.size
+        factor = self._as_expected(k, innovation)
         verdict = screened(innovation.squared_norm(self.row_variance), self.problem.kernel, self.settings)
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.taken)
             if not verdict.taken.any():
                 return verdict.rejection is not Rejection.FRAME
-        variance = self.row_variance / verdict.weight[verdict.taken, None]
         try:
-            self._apply(correct(innovation.select(verdict.taken), variance, state.P))
+            if factor is None or not verdict.plain:
+                innovation = innovation.select(verdict.taken)
+                factor = innovation.factorised(self.row_variance / verdict.weight[verdict.taken, None])
+            self._apply(correct(innovation, factor, state.P))
         except NotPositiveDefiniteError:
             self._reject(k, Rejection.SINGULAR, verdict.taken)
             return False
         self.used[seen.observed[verdict.taken]] = True
-        if not np.all(np.diagonal(state.P) >= 0.0):
+        if not state.P.diagonal().min() >= 0.0:
             self.events.append(Event(k, Rejection.SINGULAR, "P - W^T W has a negative variance after the update"))
         return True
+
+    def _as_expected(self, k: int, innovation: Innovation) -> Factor | None:
+        """Notes how large the innovation is beside what was expected; S as it is before kernel and gates."""
+        self.innovations.degrees[k] = innovation.residual.size
+        try:
+            factor = innovation.factorised(self.row_variance)
+        except NotPositiveDefiniteError:
+            return None
+        self.innovations.nis[k] = factor.squared_norm
+        return factor
 
     def _linearised(self, index: IntArray) -> _Seen:
         state, slot = self.state, self.state.slot_of[self.row[index]]
@@ -136,25 +174,26 @@ class JointFilter:
     def _apply(self, delta: FloatArray) -> None:
         """Moves the state by delta (size,), and P along with it where the settings say so.
 
-        N = [Ad(T^-1); nu], nu the landmarks' `rigid_motion`. With - before and + after the move, B takes N- to N+:
+        N = [Ad(T^-1); nu], nu being `moved_by` of the landmarks. With - before and + after the move, B takes N- to N+:
         [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]]. A bias is not changed by a rigid motion: its rows of N are 0.
         """
         state = self.state
         before = state.pose
-        invariant = self.settings.linearisation is Linearisation.INVARIANT
-        nu = rigid_motion(state.charts, state.xi) if invariant else None
-        state.pose = before @ se3.exp(delta[:POSE])
+        step = se3.exp_one(delta[:POSE])
+        state.pose = before @ step
         state.bias[: state.body - POSE] += delta[POSE : state.body]
-        state.xi[:] += delta[state.body :].reshape(-1, 3)
-        if nu is not None:
-            by_pose = (rigid_motion(state.charts, state.xi) - nu) @ se3.adjoint(before)
-            state.transport(se3.adjoint(se3.exp(-delta[:POSE])), by_pose)
+        by = delta[state.body :].reshape(-1, 3)
+        if self.settings.linearisation is not Linearisation.INVARIANT:
+            state.xi[:] += by
+        else:
+            by_pose = state.move_landmarks(by).reshape(-1, POSE) @ se3.adjoint(before)
+            state.transport(se3.adjoint(se3.inverse(step)), by_pose)
 
     def _enter_at_prior(self, row: IntArray) -> None:
         prior, n = self.problem.landmark_prior, len(row)
         assert prior is not None
-        charts, covariance = np.broadcast_to(np.eye(4), (n, 4, 4)), np.broadcast_to(prior.covariance, (n, 3, 3))
-        self.state.enter(row, charts, prior.mean[row], np.zeros((n, 3, POSE)), covariance)
+        covariance = np.broadcast_to(prior.covariance, (n, 3, 3))
+        self.state.enter(row, np.eye(4), prior.mean[row], np.zeros((n, 3, POSE)), covariance)
 
     def _enter_at_first_sight(self, index: IntArray) -> None:
         """Landmarks start where one observation each puts them, seen from the pose as it is known now.
@@ -166,30 +205,36 @@ class JointFilter:
         first_estimate = self.settings.linearisation is Linearisation.FIRST_ESTIMATE
         world_T_cam = state.pose @ self.imu_T_cam
         points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
-        charts = np.broadcast_to(chart(self.settings.coordinates, world_T_cam), (n, 4, 4))
-        xi = coordinates_of(charts, points)
+        shared = chart(self.settings.coordinates, world_T_cam)
+        xi = coordinates_of(shared, points)
         at = state.predicted_pose if first_estimate else state.pose
-        seen = sight(self.camera, self.cam_T_imu, at, homogeneous(charts, xi))
-        inverse = np.linalg.inv(seen.by_point @ charts[:, :, :3])
+        seen = sight(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
+        inverse = np.linalg.inv((seen.by_point.reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
         covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
-        state.enter(self.row[index], charts, xi, -inverse @ seen.by_pose, covariance)
+        state.enter(self.row[index], shared, xi, -inverse @ seen.by_pose, covariance)
         self.used[index] = True
 
     def _leave(self, k: int, row: IntArray) -> None:
         """Landmarks (n,) that no later frame sees leave with what is known of them now."""
         active = self.state.slot_of[row] != ABSENT
-        for j in self.problem.features[row[~active]].tolist():
-            self.events.append(Event(k, UNDETERMINED, "no frame that was believed saw it", j))
         leaving = row[active]
+        if len(leaving) < len(row):
+            out = row[~active]
+            turned_away = self.turned_away[out]
+            self._undetermined(k, out[turned_away], "the state was full while it was seen")
+            self._undetermined(k, out[~turned_away], "no frame that was believed saw it")
         if len(leaving) == 0:
             return
         points = self.state.world_points(leaving)
         finite = points.in_sight & np.isfinite(points.position).all(axis=1)
+        if not finite.all():
+            self._undetermined(k, leaving[~finite], "its sights put it at infinity or beyond")
         self.position[leaving[finite]] = points.position[finite]
         self.covariance[leaving[finite]] = points.covariance[finite]
-        for j in self.problem.features[leaving[~finite]].tolist():
-            self.events.append(Event(k, UNDETERMINED, "its sights put it at infinity or beyond", j))
         self.state.leave(leaving)
+
+    def _undetermined(self, k: int, row: IntArray, why: str) -> None:
+        self.events.extend(Event(k, UNDETERMINED, why, j) for j in self.problem.features[row].tolist())
 
     def _reject(self, k: int, why: Rejection, rejected: BoolArray) -> None:
         n = int(np.count_nonzero(rejected))

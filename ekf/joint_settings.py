@@ -40,6 +40,8 @@ class JointSettings:
     """a frame takes no part where more than this share of its observations is beyond 5.5 sigma; None: it always does"""
     gyro_bias: GyroBiasPrior | None = None
     """estimate a gyroscope bias along with the pose; None: the angular velocities have none"""
+    max_landmarks: int = 512
+    """in the state at once; where a frame shows more, they wait outside (`admission`), and that is told"""
 
     def __post_init__(self) -> None:
         if self.gate is not None and not 0.0 < self.gate < 1.0:
@@ -48,6 +50,9 @@ class JointSettings:
             raise FgbaselineError(
                 f"disagreeing_share: expected a share above 0 and at most 1, or None, got {self.disagreeing_share!r}"
             )
+
+        if self.max_landmarks < 1:
+            raise FgbaselineError(f"max_landmarks: expected at least 1, got {self.max_landmarks!r}")
 
     @staticmethod
     def textbook() -> "JointSettings":

@@ -6,12 +6,15 @@ covariance lives in one square array that grows by doubling; a landmark that lea
 that the active part is always the upper left square.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 
-from .landmark_chart import WorldPoints, world_points
+from .landmark_chart import WorldPoints, generators, moved_by, world_points
 
 POSE, BIAS = 6, 3
 ABSENT = -1
@@ -45,15 +48,20 @@ class JointState:
         self._row = np.zeros(capacity, dtype=np.int64)
         self._xi, self._first = np.zeros((capacity, 3)), np.zeros((capacity, 3))
         self._charts = np.zeros((capacity, 4, 4))
+        self._generators = np.zeros((capacity, POSE, 4, 4))
+        self._motion = np.zeros((capacity, 3, POSE))
 
     def _double(self) -> None:
         P = np.zeros((2 * len(self._P), 2 * len(self._P)))
         P[: self.size, : self.size] = self.P
         self._P = P
-        self._row = np.concatenate([self._row, np.zeros_like(self._row)])
-        self._xi = np.concatenate([self._xi, np.zeros_like(self._xi)])
-        self._first = np.concatenate([self._first, np.zeros_like(self._first)])
-        self._charts = np.concatenate([self._charts, np.zeros_like(self._charts)])
+        self._row, self._xi, self._first, self._charts, self._generators, self._motion = (
+            np.concatenate([array, np.zeros_like(array)]) for array in self._of_slots()
+        )
+
+    def _of_slots(self) -> tuple[NDArray[Any], ...]:
+        """What is kept of each landmark beside its rows of P."""
+        return self._row, self._xi, self._first, self._charts, self._generators, self._motion
 
     @property
     def size(self) -> int:
@@ -85,6 +93,17 @@ class JointState:
         """(count, 4, 4) the landmarks' charts, a view."""
         return self._charts[: self.count]
 
+    def move_landmarks(self, by: FloatArray) -> FloatArray:
+        """Adds `by` (count, 3) to their coordinates, and says what that changes in how they move with the world
+        (`landmark_chart.moved_by`): (count, 3, 6).
+        """
+        self.xi[:] += by
+        before = self._motion[: self.count]
+        now = moved_by(self._generators[: self.count], self.xi)
+        change = now - before
+        before[:] = now
+        return change
+
     def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
         """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them.
 
@@ -99,12 +118,13 @@ class JointState:
         self.pose = self.predicted_pose = self.pose @ step
 
     def transport(self, turn: FloatArray, by_pose: FloatArray) -> None:
-        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (count, 3, 6).
+        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (3 count, 6).
 
         The bias stays as it is: its rows of `by_pose` would be zero.
         """
-        P, G = self.P, np.zeros((self.size - POSE, POSE))
-        G[self.body - POSE :] = by_pose.reshape(3 * self.count, POSE)
+        P, G = self.P, by_pose
+        if self.body > POSE:
+            G = np.concatenate([np.zeros((self.body - POSE, POSE)), by_pose])
         own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
         half = G @ (cross + 0.5 * own @ G.T)
         P[POSE:, POSE:] += half + half.T
@@ -114,9 +134,9 @@ class JointState:
         P[:POSE, :POSE] = 0.5 * (turned + turned.T)
 
     def enter(
-        self, row: IntArray, charts: FloatArray, xi: FloatArray, by_pose: FloatArray, covariance: FloatArray
+        self, row: IntArray, chart: FloatArray, xi: FloatArray, by_pose: FloatArray, covariance: FloatArray
     ) -> None:
-        """n landmarks become active, with an error of G delta + e each.
+        """n landmarks become active in one chart (4, 4), with an error of G delta + e each.
 
         G = `by_pose` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
         """
@@ -124,16 +144,18 @@ class JointState:
         while self.count + n > len(self._row):
             self._double()
         slots = slice(self.count, self.count + n)
-        self._row[slots], self._charts[slots], self._xi[slots], self._first[slots] = row, charts, xi, xi
+        Z = np.broadcast_to(generators(chart), (n, POSE, 4, 4))
+        for array, value in zip(self._of_slots(), (row, xi, xi, chart, Z, moved_by(Z, xi)), strict=True):
+            array[slots] = value
         self.slot_of[row] = np.arange(self.count, self.count + n)
         P, G = self._P, by_pose.reshape(3 * n, POSE)
         cross = G @ P[:POSE, :old]
         P[old:new, :old] = cross
         P[:old, old:new] = cross.T
         own = cross[:, :POSE] @ G.T
+        each = np.arange(n)
+        own.reshape(n, 3, n, 3)[each, :, each, :] += covariance
         P[old:new, old:new] = 0.5 * (own + own.T)
-        index = old + np.arange(3 * n).reshape(n, 3)
-        P[index[:, :, None], index[:, None, :]] += 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
         self.count += n
 
     def leave(self, row: IntArray) -> None:
@@ -144,7 +166,7 @@ class JointState:
         goes[leaving] = True
         holes = np.flatnonzero(goes[:left])
         movers = left + np.flatnonzero(~goes[left:])
-        for array in (self._row, self._xi, self._first, self._charts):
+        for array in self._of_slots():
             array[holes] = array[movers]
         to, source = self._indices(holes), self._indices(movers)
         P = self.P

@@ -9,7 +9,7 @@ which is K = P H^T S^-1 and (I - K H) P with every product formed once, symmetri
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dtrsm, dtrsv
@@ -46,6 +46,38 @@ class StackedJacobian:
         return StackedJacobian(self.slot[chosen], self.by_pose[chosen], self.by_landmark[chosen], self.body)
 
 
+class NotPositiveDefiniteError(Exception):
+    """H P H^T + R has no Cholesky factor: P is no covariance any more."""
+
+
+class Factor(NamedTuple):
+    """S = H P H^T + R = L L^T."""
+
+    L: FloatArray
+    """(3n, 3n), lower"""
+    whitened: FloatArray
+    """(3n,) L^-1 nu"""
+
+    @staticmethod
+    def of(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> "Factor":
+        """Of H P H^T (3n, 3n), left as it is, residuals nu (n, 3) and the diagonal of R (n, 3), or (3,) for each, px^2.
+
+        Raises NotPositiveDefiniteError.
+        """
+        S = HPHt.copy()
+        diagonal = S.reshape(-1)[:: len(S) + 1].reshape(-1, 3)
+        diagonal += variance
+        L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
+        if failed or not np.isfinite(L[-1, -1]):
+            raise NotPositiveDefiniteError
+        return Factor(L, dtrsv(L, residual.reshape(-1), lower=1))
+
+    @property
+    def squared_norm(self) -> float:
+        """nu^T S^-1 nu: the normalised innovation squared of all observations at once."""
+        return float(self.whitened @ self.whitened)
+
+
 @dataclass(frozen=True, eq=False)
 class Innovation:
     """What n observations say beyond the prediction, and how sure the prediction was of them."""
@@ -67,19 +99,26 @@ class Innovation:
     def __len__(self) -> int:
         return len(self.residual)
 
-    @cached_property
-    def blocks(self) -> FloatArray:
-        """(n, 3, 3) H P H^T of each observation alone."""
-        n = len(self)
-        index = np.arange(n)
-        return self.HPHt.reshape(n, 3, n, 3)[index, :, index, :]
-
     def squared_norm(self, variance: FloatArray) -> FloatArray:
         """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,)): chi-square with 3 degrees
         of freedom, where all is as assumed."""
-        whitened = np.linalg.solve(self.blocks + np.diag(variance), self.residual[:, :, None])[:, :, 0]
-        norm: FloatArray = np.einsum("ni,ni->n", self.residual, whitened)
+        # S = L D L^T written out: a third of the time of LAPACK, which is called for each.
+        rows = 3 * len(self)
+        block = np.arange(0, rows * rows, 3 * rows + 3)  # where each begins on the diagonal
+        upper = np.array([0, 1, 2, rows + 1, rows + 2, 2 * rows + 2])
+        a, b, c, d, e, f = self.HPHt.reshape(-1)[upper[:, None] + block]
+        a, d, f = a + variance[0], d + variance[1], f + variance[2]
+        x, y, z = self.residual.T
+        by_a, to_e = b / a, e - c * b / a
+        d1, y1 = d - by_a * b, y - by_a * x
+        by_c, by_e = c / a, to_e / d1
+        d2, y2 = f - by_c * c - by_e * to_e, z - by_c * x - by_e * y1
+        norm: FloatArray = x * x / a + y1 * y1 / d1 + y2 * y2 / d2
         return norm
+
+    def factorised(self, variance: FloatArray) -> Factor:
+        """S = L L^T with R = diag(variance (n, 3)), or (3,) for each. Raises NotPositiveDefiniteError."""
+        return Factor.of(self.HPHt, self.residual, variance)
 
     def select(self, chosen: BoolArray) -> "Innovation":
         """Only the chosen observations."""
@@ -91,29 +130,12 @@ class Innovation:
         )
 
 
-class NotPositiveDefiniteError(Exception):
-    """H P H^T + R has no Cholesky factor: P is no covariance any more."""
-
-
-def correct(innovation: Innovation, variance: FloatArray, P: FloatArray) -> FloatArray:
+def correct(innovation: Innovation, factor: Factor, P: FloatArray) -> FloatArray:
     """The correction delta (size,) of the error state; P (size, size) is updated in place.
 
-    `variance` (n, 3) is the diagonal of R, px^2. Uses the innovation up. Raises NotPositiveDefiniteError, P being
-    untouched.
+    `factor` is the innovation's with the R that it is to be weighted by. Uses the innovation up.
     """
-    L = _cholesky(innovation, variance)
-    W_transposed = dtrsm(1.0, L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-    delta: FloatArray = W_transposed @ dtrsv(L, innovation.residual.reshape(-1), lower=1)
+    W_transposed = dtrsm(1.0, factor.L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    delta: FloatArray = W_transposed @ factor.whitened
     P -= W_transposed @ W_transposed.T
     return delta
-
-
-def _cholesky(innovation: Innovation, variance: FloatArray) -> FloatArray:
-    """L (3n, 3n), lower, with L L^T = H P H^T + R."""
-    S = innovation.HPHt
-    S.reshape(-1)[:: len(S) + 1] += variance.reshape(-1)
-    L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
-    if failed or not np.isfinite(L[-1, -1]):
-        raise NotPositiveDefiniteError
-    factor: FloatArray = L
-    return factor

@@ -16,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.geometry import FloatArray, so3
+from fgbaseline.geometry import FloatArray, se3
 
 _INVERSE_DEPTH = np.eye(4)[:, [0, 1, 3, 2]]
+_SMALL_MOTIONS = se3.hat(np.eye(6))
 
 
 class Coordinates(StrEnum):
@@ -41,22 +42,26 @@ def homogeneous(charts: FloatArray, xi: FloatArray) -> FloatArray:
 
 
 def coordinates_of(charts: FloatArray, points: FloatArray) -> FloatArray:
-    """The coordinates xi (n, 3) in charts M (n, 4, 4) of homogeneous world points (n, 4)."""
-    xi = np.linalg.solve(charts, points[:, :, None])[:, :, 0]
+    """The coordinates xi (n, 3) in charts M (n, 4, 4), or in one (4, 4), of homogeneous world points (n, 4)."""
+    inverse = np.linalg.inv(charts)
+    xi = points @ inverse.T if inverse.ndim == 2 else (inverse @ points[:, :, None])[:, :, 0]
     return np.asarray(xi[:, :3] / xi[:, 3:], dtype=np.float64)
 
 
-def rigid_motion(charts: FloatArray, xi: FloatArray) -> FloatArray:
+def generators(charts: FloatArray) -> FloatArray:
+    """Z (..., 6, 4, 4) = M^-1 hat(e_i) M: the six small motions of the world as charts M (..., 4, 4) have them."""
+    return np.asarray(np.linalg.inv(charts)[..., None, :, :] @ _SMALL_MOTIONS @ charts[..., None, :, :])
+
+
+def moved_by(generators: FloatArray, xi: FloatArray) -> FloatArray:
     """(n, 3, 6) how coordinates (n, 3) change when the whole world moves by exp(g), g = [v, w] small.
 
-    hat(g) X = [[X4 I, -hat(X)], [0, 0]] g in the world, and d xi = Y_123 - xi Y_4 with Y = M^-1 hat(g) X in the chart.
+    d xi = Y_123 - xi Y_4 with Y = sum of g_i Z_i [xi; 1], Z (n, 6, 4, 4) the `generators` of the charts.
     """
-    X = homogeneous(charts, xi)
-    moved = np.zeros((len(X), 4, 6))
-    moved[:, :3, :3] = X[:, 3, None, None] * np.eye(3)
-    moved[:, :3, 3:] = -so3.hat3(X[:, :3])
-    Y = np.linalg.solve(charts, moved)
-    return np.asarray(Y[:, :3] - xi[:, :, None] * Y[:, 3:], dtype=np.float64)
+    n = len(xi)
+    stacked = generators.reshape(n, 24, 4)
+    Y = ((stacked[:, :, :3] @ xi[:, :, None])[:, :, 0] + stacked[:, :, 3]).reshape(n, 6, 4)
+    return np.asarray(np.swapaxes(Y[:, :, :3] - Y[:, :, 3:] * xi[:, None, :], 1, 2), dtype=np.float64)
 
 
 class WorldPoints(NamedTuple):
@@ -73,11 +78,10 @@ class WorldPoints(NamedTuple):
 def world_points(charts: FloatArray, xi: FloatArray, covariance: FloatArray) -> WorldPoints:
     """Positions, and to first order their covariances, of coordinates (n, 3) with covariances (n, 3, 3).
 
-    Not finite at infinity.
+    Not finite at infinity, of which numpy warns.
     """
     X = homogeneous(charts, xi)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        position = X[:, :3] / X[:, 3:]
-        J = (charts[:, :3, :3] - position[:, :, None] * charts[:, 3:, :3]) / X[:, 3, None, None]
-        spread = J @ covariance @ np.swapaxes(J, 1, 2)
+    position = X[:, :3] / X[:, 3:]
+    J = (charts[:, :3, :3] - position[:, :, None] * charts[:, 3:, :3]) / X[:, 3, None, None]
+    spread = J @ covariance @ np.swapaxes(J, 1, 2)
     return WorldPoints(position, 0.5 * (spread + np.swapaxes(spread, 1, 2)), X[:, 3] > 0.0)

@@ -47,12 +47,15 @@ class LandmarkBlocks:
             self.mean[row[fresh]] = se3.transform(world_T_cam, self.camera.triangulate(pixel[fresh]))
             self.known[row[fresh]] = True
         p_cam = se3.transform(cam_T_world, self.mean[row])
-        whiten = np.sqrt(weight)[:, None, None]
-        H = whiten * self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
-        innovation = whiten * (pixel - self.camera.project(p_cam))[:, :, None]
-        Q, R = np.linalg.qr(np.concatenate([H, self.root_information[row]], axis=1))
-        self.mean[row] += np.linalg.solve(R, np.swapaxes(Q[:, :4], 1, 2) @ innovation)[:, :, 0]
-        self.root_information[row] = R
+        whiten = np.sqrt(weight)[:, None]
+        # The right-hand side as a fourth column: its first three rows in R are Q^T times it, and Q is never formed.
+        stacked = np.zeros((len(row), 7, 4))
+        stacked[:, :4, :3] = whiten[:, :, None] * self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
+        stacked[:, :4, 3] = whiten * (pixel - self.camera.project(p_cam))
+        stacked[:, 4:, :3] = self.root_information[row]
+        R: FloatArray = np.asarray(np.linalg.qr(stacked, mode="r"))
+        self.mean[row] += _solved(R)
+        self.root_information[row] = R[:, :3, :3]
 
     def covariance(self) -> FloatArray:
         """(m, 3, 3) m^2; NaN for landmarks that were never seen."""
@@ -60,3 +63,12 @@ class LandmarkBlocks:
         half = np.linalg.inv(self.root_information[self.known])
         covariance[self.known] = half @ np.swapaxes(half, 1, 2)
         return 0.5 * (covariance + np.swapaxes(covariance, 1, 2))
+
+
+def _solved(R: FloatArray) -> FloatArray:
+    """x (n, 3) with T x = c of upper triangles [T, c] (n, 3 or more, 4)."""
+    x = np.empty((len(R), 3))
+    x[:, 2] = R[:, 2, 3] / R[:, 2, 2]
+    x[:, 1] = (R[:, 1, 3] - R[:, 1, 2] * x[:, 2]) / R[:, 1, 1]
+    x[:, 0] = (R[:, 0, 3] - R[:, 0, 1] * x[:, 1] - R[:, 0, 2] * x[:, 2]) / R[:, 0, 0]
+    return x

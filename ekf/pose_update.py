@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
+from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
 from fgbaseline.data.problem import HuberKernel
 from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
@@ -41,6 +41,8 @@ class PosePosterior(NamedTuple):
     """(6, 6) (I - K H) Sigma"""
     innovation_condition: float
     """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
+    squared_norm: float
+    """(z - z~)^T (H Sigma H^T + V)^-1 (z - z~), over all four rows of each observation"""
 
 
 def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
@@ -50,7 +52,8 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
     squares solution of [B; I] x = [V^-1/2 (z - z~); 0]. The QR decomposition [B; I] = Q R gives both without forming
     B^T B, which a landmark near the camera plane would leave with no correct digit; rows by size and column pivoting
     make it accurate row by row (Cox and Higham, 1998). The eigenvalues of R^T R, none below 1, are those of
-    (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance.
+    (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance. What is
+    left of the least squares, its residual, has the squared norm of the innovation.
 
     `weight` (n,) is 1 / V of each observation. Raises numpy's LinAlgError where `covariance` is not positive definite
     or the innovation not finite.
@@ -62,10 +65,13 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
     stacked = np.vstack([(root[:, None] * innovation.jacobian.reshape(-1, 6)) @ L, np.eye(6)])
     right = np.concatenate([root * innovation.residual.reshape(-1), np.zeros(6)])
     by_size = np.argsort(-np.abs(stacked).max(axis=1), kind="stable")
-    Q, R, pivot = qr(stacked[by_size], mode="economic", pivoting=True)
-    half = solve_triangular(R, L[:, pivot].T, trans="T").T
-    correction: FloatArray = half @ (Q.T @ right[by_size])
-    return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2)
+    reflections, pivot, tau, _, _ = dgeqp3(np.asfortranarray(stacked[by_size]), overwrite_a=1)
+    turned, _, _ = dormqr("L", "T", reflections, tau, right[by_size, None], lwork=len(right), overwrite_c=1)
+    R = np.triu(reflections[:6])
+    half = dtrtrs(R, L[:, pivot - 1].T, trans=1)[0].T
+    correction: FloatArray = half @ turned[:6, 0]
+    left = turned[6:, 0]
+    return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2, float(left @ left))
 
 
 def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:

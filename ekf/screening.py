@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 
 import numpy as np
 from scipy.special import chdtri
@@ -30,6 +31,8 @@ class Rejection(StrEnum):
     SINGULAR = "covariance lost"
     ENTRY = "entry put off"
     """the first sight of a landmark: in a frame that is not believed, or at infinity in world coordinates"""
+    FULL = "state full"
+    """of landmarks that wait outside until others have left"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,6 +45,11 @@ class Screened:
     """(n,) the kernel's, by which the inverse of each one's noise is multiplied"""
     rejection: Rejection | None = None
     """why the others are not taken"""
+
+    @property
+    def plain(self) -> bool:
+        """Whether all are taken with their full weight."""
+        return bool(self.taken.all() and (self.weight == 1.0).all())
 
 
 def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: JointSettings) -> Screened:
@@ -64,6 +72,7 @@ def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: Joi
     return Screened(np.ones(n, dtype=np.bool_), weight)
 
 
+@cache
 def quantile(probability: float) -> float:
     """The chi-square quantile with the degrees of freedom of one observation."""
     return float(chdtri(ROWS, 1.0 - probability))

@@ -10,7 +10,7 @@ from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem, Reading
 from fgbaseline.geometry import FloatArray, se3
 
-from .innovation_norm import squared_norm_of_known
+from .innovation_norm import over_three_rows, squared_norm_of_known
 from .landmark_update import LandmarkBlocks
 from .mapping import map_along
 from .pose_update import (
@@ -59,18 +59,17 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     events: list[Event] = []
     innovations = Innovations.none(T)
     pose, covariance = problem.initial_pose, problem.initial_covariance
-    failure = ""
+    failure, full_weight = "", 1.0 / problem.pixel_variance
     for k, seen in enumerate(o.by_frame(T)):
         frame_start = time.perf_counter()
         row, pixel = rows[seen], o.pixel[seen]
-        weight = np.full(len(row), 1.0 / problem.pixel_variance)
+        weight = np.full(len(row), full_weight)
         if k > 0:
             pose = pose @ steps[k - 1]
             covariance = predicted_covariance(covariance, steps[k - 1], problem.increment_covariance[k - 1])
             known = blocks.known[row]
             if known.any():
                 innovation = pose_innovation(camera, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
-                innovations.nis[k] = squared_norm_of_known(innovation, covariance, problem.pixel_variance)
                 innovations.degrees[k] = 3 * len(innovation.residual)
                 weight[known] = robust_weight(innovation, covariance, problem.pixel_variance, problem.kernel)
                 try:
@@ -79,7 +78,12 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                     failure = f"the pose cannot be updated at frame {k}: {error}"
                     break
                 predicted = covariance
-                pose, covariance = pose @ se3.exp(posterior.correction), posterior.covariance
+                innovations.nis[k] = (
+                    over_three_rows(posterior, innovation, problem.pixel_variance)
+                    if np.all(weight[known] == full_weight)
+                    else squared_norm_of_known(innovation, predicted, problem.pixel_variance)
+                )
+                pose, covariance = pose @ se3.exp_one(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:
                     lost = _loss_as_printed(predicted, innovation, weight[known])
                     if lost:

@@ -5,10 +5,12 @@ before rotation (rad), in the body frame. Perturbations are on the right, `T = m
 and 13 of the report. The leading axes of every array are a batch.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .so3 import FloatArray, angle_coefficients, exp_so3, hat3, log_so3
+from .so3 import SMALL_ANGLE, FloatArray, angle_coefficients, hat3, log_so3
 
 _TERMS = 24
 """of the series of the right Jacobian: pi^25 / 26! is 1e-14"""
@@ -38,12 +40,41 @@ def exp(twist: ArrayLike) -> FloatArray:
     v, w = xi[..., :3], xi[..., 3:]
     c = angle_coefficients(np.linalg.norm(w, axis=-1))
     skew = hat3(w)
-    left_jacobian = np.eye(3) + c.cosine[..., None, None] * skew + c.cubic[..., None, None] * (skew @ skew)
+    square = skew @ skew
+    cosine = c.cosine[..., None, None]
+    left_jacobian = np.eye(3) + cosine * skew + c.cubic[..., None, None] * square
     pose = np.zeros((*xi.shape[:-1], 4, 4))
-    pose[..., :3, :3] = exp_so3(w)
+    pose[..., :3, :3] = np.eye(3) + c.sine[..., None, None] * skew + cosine * square  # Rodrigues, as exp_so3
     pose[..., :3, 3] = (left_jacobian @ v[..., None])[..., 0]
     pose[..., 3, 3] = 1.0
     return pose
+
+
+def exp_one(twist: FloatArray) -> FloatArray:
+    """`exp` of one twist (6,), for loops: in plain numbers, a tenth of the time of arrays of one element each."""
+    v0, v1, v2, x, y, z = map(float, twist)
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if not math.isfinite(angle):
+        return np.full((4, 4), np.nan)
+    if angle < SMALL_ANGLE:
+        sine, cosine, cubic = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    else:
+        sine, cosine = math.sin(angle) / angle, 2.0 * math.sin(0.5 * angle) ** 2 / square
+        cubic = (angle - math.sin(angle)) / (square * angle)
+    # hat3(w)^2 = w w^T - |w|^2 I
+    along = cubic * (x * v0 + y * v1 + z * v2)
+    across = 1.0 - cubic * square
+    bx, by, bz, kept = cosine * x, cosine * y, cosine * z, 1.0 - cosine * square
+    sx, sy, sz = sine * x, sine * y, sine * z
+    return np.array(
+        [
+            [kept + bx * x, bx * y - sz, bx * z + sy, across * v0 + by * v2 - bz * v1 + along * x],
+            [bx * y + sz, kept + by * y, by * z - sx, across * v1 + bz * v0 - bx * v2 + along * y],
+            [bx * z - sy, by * z + sx, kept + bz * z, across * v2 + bx * v1 - by * v0 + along * z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def log(pose: ArrayLike) -> FloatArray:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
-_SMALL_ANGLE = 1e-4
+SMALL_ANGLE = 1e-4
 
 
 def hat3(vector: ArrayLike) -> FloatArray:
@@ -39,7 +39,7 @@ class AngleCoefficients(NamedTuple):
 
 def angle_coefficients(angle: FloatArray) -> AngleCoefficients:
     """The coefficients of angles (...,) in radians, each (...,)."""
-    small = angle < _SMALL_ANGLE
+    small = angle < SMALL_ANGLE
     x = np.where(small, 1.0, angle)
     x2 = angle * angle
     return AngleCoefficients(

@@ -8,7 +8,8 @@ from scipy.stats import chi2
 
 from fgbaseline.data import HuberKernel
 from fgbaseline.ekf import ekf, joint_ekf
-from fgbaseline.ekf.innovation_norm import squared_norm, squared_norm_of_known
+from fgbaseline.ekf.innovation_norm import squared_norm_of_known
+from fgbaseline.ekf.joint_update import Factor, NotPositiveDefiniteError
 from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
 
@@ -22,9 +23,10 @@ def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
     HPHt = A @ A.T
     before = HPHt.copy()
     expected = residual.reshape(-1) @ np.linalg.solve(HPHt + np.diag(np.tile(variance, 4)), residual.reshape(-1))
-    assert squared_norm(HPHt, residual, variance) == pytest.approx(expected, rel=1e-12)
+    assert Factor.of(HPHt, residual, variance).squared_norm == pytest.approx(expected, rel=1e-12)
     np.testing.assert_array_equal(HPHt, before)
-    assert np.isnan(squared_norm(-HPHt, residual, variance))
+    with pytest.raises(NotPositiveDefiniteError):
+        Factor.of(-HPHt, residual, variance)
 
 
 def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:

@@ -12,7 +12,7 @@ from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
 from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
-from fgbaseline.ekf.landmark_chart import chart, coordinates_of, homogeneous, rigid_motion, world_points
+from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
 from fgbaseline.ekf.stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
@@ -81,7 +81,7 @@ def test_three_rows_say_what_four_say(seed: int) -> None:
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V * np.eye(4 * n))
     updated = P.copy()
     innovation = Innovation.of(three, measured_rows(residual), updated)
-    delta = correct(innovation, np.tile(V * ROW_VARIANCE, (n, 1)), updated)
+    delta = correct(innovation, innovation.factorised(V * ROW_VARIANCE), updated)
     np.testing.assert_allclose(delta, K @ residual.reshape(-1), rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(updated, (np.eye(size) - K @ H) @ P, rtol=1e-6, atol=1e-9 * np.abs(P).max())
     np.testing.assert_array_equal(updated, updated.T)
@@ -91,8 +91,9 @@ def test_an_update_with_what_is_no_covariance_is_refused_and_changes_nothing() -
     P = -np.eye(9)
     before = P.copy()
     H = StackedJacobian(np.array([0]), np.ones((1, 3, 6)), np.eye(3)[None])
+    innovation = Innovation.of(H, np.ones((1, 3)), P)
     with pytest.raises(NotPositiveDefiniteError):
-        correct(Innovation.of(H, np.ones((1, 3)), P), np.ones((1, 3)), P)
+        correct(innovation, innovation.factorised(np.ones((1, 3))), P)
     np.testing.assert_array_equal(P, before)
 
 
@@ -105,7 +106,7 @@ def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: 
     charts = np.tile(chart(coordinates, world_T_cam @ se3.exp(0.1 * random.normal(size=6))), (6, 1, 1))
     xi = coordinates_of(charts, points @ world_T_cam.T)
     seen = sight(SCENE.camera, se3.inverse(SCENE.imu_T_cam), T, homogeneous(charts, xi))
-    nu = rigid_motion(charts, xi)
+    nu = moved_by(generators(charts), xi)
     moved = seen.by_pose @ se3.adjoint(se3.inverse(T)) + seen.by_point @ charts[:, :, :3] @ nu
     assert np.abs(moved).max() < 1e-9 * np.abs(seen.by_pose).max()
     # and nu is what the name says
@@ -331,7 +332,9 @@ def test_what_is_not_finite_fails_with_its_frame() -> None:
     assert not estimate.used[SCENE.observations.frame >= 5].any()
 
 
-@pytest.mark.parametrize("wrong", [{"gate": 0.0}, {"gate": 1.0}, {"gate": 99.0}, {"disagreeing_share": 0.0}])
+@pytest.mark.parametrize(
+    "wrong", [{"gate": 0.0}, {"gate": 1.0}, {"gate": 99.0}, {"disagreeing_share": 0.0}, {"max_landmarks": 0}]
+)
 def test_settings_that_cannot_be_are_named(wrong: dict[str, float]) -> None:
     (name,) = wrong
     with pytest.raises(FgbaselineError, match=f"^{name}: .*{wrong[name]}"):
