@@ -3,6 +3,7 @@
 `pymdownx.arithmatex` finds the formulas, `latex2mathml` converts them; this puts the one in the place of the other.
 """
 
+from html import unescape
 from xml.etree.ElementTree import Element
 
 from latex2mathml.converter import convert_to_element
@@ -18,7 +19,7 @@ class _Formulas(Treeprocessor):
     def run(self, root: Element) -> None:
         for holder in root.iter():
             if "arithmatex" in holder.get("class", "").split():
-                text = (holder.text or "").strip()
+                text = unescape(holder.text or "").strip()
                 if not (text.startswith(OPENING) and text.endswith(CLOSING)):
                     raise ValueError(f"no formula: {text}")
                 holder.text = None
