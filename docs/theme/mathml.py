@@ -31,10 +31,10 @@ class _Formulas(Treeprocessor):
 
 
 class _MathML(Extension):
-    def extendMarkdown(self, md: Markdown) -> None:
+    def extendMarkdown(self, md: Markdown) -> None:  # noqa: N802
         md.treeprocessors.register(_Formulas(md), "mathml", AFTER_INLINE_PATTERNS)
 
 
-def makeExtension(**options: object) -> Extension:
+def makeExtension(**options: object) -> Extension:  # noqa: N802
     """For Python-Markdown, which looks for this name in `docs.theme.mathml`."""
     return _MathML(**options)
