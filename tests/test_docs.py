@@ -54,8 +54,8 @@ ELSEWHERE = {
 NOT_RUN = {"pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet"}
 """command -> why no test can run it"""
 SHORTER = {
-    "--duration 10 ": "--duration 3 ",
-    "--seeds 50": "--seeds 2 --duration 4 --features 20",
+    "--duration 10 ": "--duration 2 ",
+    "--seeds 50": "--seeds 2 --duration 2 --features 20",
 }
 """what is put in the place of what would take minutes"""
 WRITING = {"run", "compare", "export", "diagnose", "bench"}
@@ -78,7 +78,7 @@ class Place:
         self.namespaces: dict[str, dict[str, object]] = {}
         for below in ("accuracy", "suites", "docs/images", "out/simulated"):
             (folder / below).mkdir(parents=True)
-        sequence = simulate(Simulation(duration=3.0, features_per_frame=15.0, seed=3, wrong_share=0.0))
+        sequence = simulate(Simulation(duration=2.0, features_per_frame=15.0, seed=3, wrong_share=0.0))
         data.write_npz(sequence, folder / "drive.npz")
         assert sequence.truth is not None
         poses, extrinsic = sequence.truth.world_T_imu, sequence.imu_T_cam
@@ -117,10 +117,10 @@ class Place:
     def _ours(self, arguments: list[str]) -> None:
         verb = arguments[0]
         if verb in WRITING:  # where it would refuse to replace what an earlier command left
-            place = (
-                arguments[arguments.index("--out") + 1] if "--out" in arguments else f"out/{Path(arguments[1]).stem}"
-            )
-            shutil.rmtree(self.folder / place, ignore_errors=True)
+            default = [f"out/{Path(arguments[1]).stem}"] if verb == "run" else []
+            after = arguments[arguments.index("--out") + 1 :] if "--out" in arguments else default
+            for place in after[:1]:
+                shutil.rmtree(self.folder / place, ignore_errors=True)
         result = group.main(arguments, standalone_mode=False)
         allowed = (None, 0, 1) if verb == "diagnose" else (None, 0)  # 1: it found something
         assert result in allowed, f"exit code {result}"
