@@ -87,7 +87,7 @@ def test_formulas_are_mathml_without_leftovers(site: Path) -> None:
 
 def test_the_example_ran(site: Path) -> None:
     text = (site / "examples" / "my-filter.html").read_text()
-    assert text.count('<table border="0" class="dataframe">') == 1
+    assert text.count('class="dataframe"') == 1
     assert '<div class="figure"><svg' in text
     assert "The reference is trusted" in text
     assert "Traceback" not in text
@@ -109,7 +109,7 @@ def test_from_a_folder_it_is_searched_and_asks_nobody(site: Path, width: int, sc
             assert page.evaluate("document.documentElement.scrollWidth") <= width, name
         page.goto((site / "index.html").as_uri())
         page.locator("label[for=__search]").first.evaluate("label => label.click()")
-        page.locator("input.md-search__input").fill("perturbation")
+        page.locator("input.md-search__input").press_sequentially("perturbation")
         page.locator(".md-search-result__link").first.wait_for(timeout=60_000)
         assert "filter" in " ".join(page.locator(".md-search-result__link").evaluate_all("all => all.map(a => a.href)"))
         browser.close()
