@@ -54,7 +54,7 @@ ELSEWHERE = {
 NOT_RUN = {"pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet"}
 """command -> why no test can run it"""
 SHORTER = {
-    "--duration 10 ": "--duration 2 ",
+    "--duration 10 ": "--duration 3 ",
     "--seeds 50": "--seeds 2 --duration 2 --features 20",
 }
 """what is put in the place of what would take minutes"""
@@ -78,7 +78,7 @@ class Place:
         self.namespaces: dict[str, dict[str, object]] = {}
         for below in ("accuracy", "suites", "docs/images", "out/simulated"):
             (folder / below).mkdir(parents=True)
-        sequence = simulate(Simulation(duration=2.0, features_per_frame=15.0, seed=3, wrong_share=0.0))
+        sequence = simulate(Simulation(duration=3.0, features_per_frame=15.0, seed=3, wrong_share=0.0))
         data.write_npz(sequence, folder / "drive.npz")
         assert sequence.truth is not None
         poses, extrinsic = sequence.truth.world_T_imu, sequence.imu_T_cam
