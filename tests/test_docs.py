@@ -137,10 +137,23 @@ class Place:
         )
         assert result.returncode == 0, result.stderr
 
-    def execute(self, block: Block, namespace: dict[str, object]) -> None:
-        """A snippet of Python, after those before it in its document."""
-        shutil.rmtree(self.folder / "out" / "comparison", ignore_errors=True)  # which several write
-        exec(compile(block.text, "snippet", "exec"), namespace)
+    def follow(self, document: Path) -> dict[str, object]:
+        """All that a document shows, in its order, once; the names that its snippets have left."""
+        if name(document) in self.namespaces:
+            return self.namespaces[name(document)]
+        namespace: dict[str, object] = {}
+        for block in blocks(document.read_text()):
+            file = file_name(block)
+            if file is not None:
+                (self.folder / file).write_text(block.text)
+            elif block.language == "python":
+                shutil.rmtree(self.folder / "out" / "comparison", ignore_errors=True)  # which several write
+                exec(compile(block.text, name(document), "exec"), namespace)
+            for command in commands(block):
+                if command not in ELSEWHERE and command not in NOT_RUN:
+                    self.run(command)
+        self.namespaces[name(document)] = namespace
+        return namespace
 
 
 @pytest.fixture(scope="module")
@@ -180,23 +193,15 @@ SHOWING = [d for d in DOCUMENTS if any(commands(b) or b.language == "python" for
 @pytest.mark.slow
 @pytest.mark.parametrize("document", SHOWING, ids=_ids(SHOWING))
 def test_every_command_and_snippet_runs(document: Path, place: Place) -> None:
-    namespace = place.namespaces.setdefault(name(document), {})
-    for block in blocks(document.read_text()):
-        file = file_name(block)
-        if file is not None:
-            Path(file).write_text(block.text)
-        elif block.language == "python":
-            place.execute(block, namespace)
-        for command in commands(block):
-            if command not in ELSEWHERE and command not in NOT_RUN:
-                place.run(command)
+    place.follow(document)
 
 
-def test_the_example_compares_a_filter_of_ten_lines(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
-    example = (ROOT / "docs" / "examples" / "my-filter.md").read_text()
-    loop = example.partition("for k, frame in")[2].partition("    index = ")[0]
+@pytest.mark.slow
+def test_the_example_compares_a_filter_of_ten_lines(place: Place) -> None:
+    document = ROOT / "docs" / "examples" / "my-filter.md"
+    loop = document.read_text().partition("for k, frame in")[2].partition("    index = ")[0]
     assert len(loop.strip().splitlines()[1:]) == 10
-    namespace = place.namespaces["docs/examples/my-filter.md"]
+    namespace = place.follow(document)
     error = namespace["table"]["error to truth RMSE, m"]  # type: ignore[index]
     assert error["isam2"] < error["my-filter"] < error["dead-reckoning"]
     assert str(namespace["svg"]).count("my-filter") == 1
