@@ -8,7 +8,7 @@ QUICK_DRIVE := --path town --duration 10 --features-per-frame 25 --seed 3
 QUICK_ESTIMATORS := dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch
 QUICK_CHECK :=
 
-.PHONY: run test quick fuzz lint types arrows install schema wheel clean
+.PHONY: run test quick docs figures fuzz lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
@@ -23,6 +23,16 @@ quick: install
 	$(BIN)/fgbaseline simulate out/quick.npz $(QUICK_DRIVE) --force
 	$(BIN)/fgbaseline run out/quick.npz --estimators $(QUICK_ESTIMATORS) --out out/quick --force
 	$(BIN)/fgbaseline check out/quick --limits suites/quick-limits.toml --baseline suites/quick-baseline.json $(QUICK_CHECK)
+
+# The site, to be read from its folder: out/docs/index.html. A warning is an error. The variable turns off an advertisement.
+docs: install
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "The site is in out/docs/index.html"
+
+# The pictures that are in docs/images, by the commands that stand beside them. Five minutes, and a Chromium.
+figures: run
+	$(BIN)/python benchmarks/report_image.py $(OUT) docs/images/report.png
+	$(BIN)/python benchmarks/consistency.py --seeds 50 --figure docs/images/consistency.png
 
 # Mutated files for every reader, guided by coverage; FUZZ_SECONDS for each of them.
 FUZZ_SECONDS ?= 60

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+"""Arrays of doubles, of any shape."""
 
 SMALL_ANGLE = 1e-4
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from .style import in_style
 
 FORMATS: Final = ("pdf", "svg", "png")
+"""what figures can be written as"""
 CAPTIONS: Final = "captions.json"
 DPI = 300
 UNDATED: Mapping[str, Mapping[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}
