@@ -1,6 +1,6 @@
 """What a function takes in a process of its own: seconds and memory, with nothing of the caller's in them.
 
-`python -m benchmarks.apart MODULE FUNCTION ARGUMENTS` is that process; it answers in one line of JSON.
+`python -m benchmarks.apart MODULE FUNCTION JSON` is that process; it answers in one line of JSON.
 """
 
 # ruff: noqa: E402
@@ -13,6 +13,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 import importlib
 import json
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -35,28 +36,28 @@ class Taken:
     answer: Any
     seconds: float
     """by the clock on the wall"""
+    processor: float
+    """s of processor time, imports included"""
     peak: float
     """MB, of the whole process, imports included"""
 
 
-def apart(function: str, *arguments: Any, limit: float | None = None) -> Taken:
+def apart(function: str, *arguments: Any, limit: int | None = None) -> Taken:
     """The call of a function, named as `module:name`, of arguments and with an answer that JSON can write.
 
-    Raises StoppedError after `limit` seconds, and RuntimeError where the process fails.
+    Raises StoppedError after `limit` processor seconds, and RuntimeError where the process fails.
     """
-    command = [sys.executable, "-m", "benchmarks.apart", *function.split(":"), json.dumps(arguments)]
-    try:
-        ended = subprocess.run(
-            command,
-            cwd=Path(__file__).parents[1],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            text=True,
-            timeout=limit,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise StoppedError(f"{function} was stopped after {limit:.0f} s") from None
+    arguments_told = json.dumps({"arguments": arguments, "limit": limit})
+    ended = subprocess.run(
+        [sys.executable, "-m", "benchmarks.apart", *function.split(":"), arguments_told],
+        cwd=Path(__file__).parents[1],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    if ended.returncode == -signal.SIGXCPU:
+        raise StoppedError(f"{function} was stopped after {limit:.0f} s")
     if ended.returncode != 0:
         raise RuntimeError(f"{function} ended with {ended.returncode}")
     return Taken(**json.loads(ended.stdout))
@@ -96,12 +97,15 @@ def _status(field: str) -> float | None:
 
 def main() -> None:
     """Calls the function and tells what that took."""
-    module, name, arguments = sys.argv[1:]
+    module, name, told = sys.argv[1:]
+    asked = json.loads(told)
+    if asked["limit"] is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (asked["limit"], resource.RLIM_INFINITY))
     function = getattr(importlib.import_module(module), name)
     start = time.perf_counter()
-    answer = function(*json.loads(arguments))
+    answer = function(*asked["arguments"])
     seconds = time.perf_counter() - start
-    print(json.dumps({"answer": answer, "seconds": seconds, "peak": peak_memory()}))
+    print(json.dumps({"answer": answer, "seconds": seconds, "processor": time.process_time(), "peak": peak_memory()}))
 
 
 if __name__ == "__main__":
