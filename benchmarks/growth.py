@@ -21,9 +21,9 @@ from fgbaseline.data.simulate import Simulation, simulate
 from .apart import StoppedError, apart, forget_peak, memory, peak_memory
 
 ESTIMATORS = ("dead-reckoning", "ekf", "joint-ekf", "isam2", "fixed-lag", "batch")
-PATIENCE = 60.0
+PATIENCE = 100.0
 """processor seconds: a size that would take longer is left out"""
-LAST_STRAW = 150
+LAST_STRAW = 250
 """processor seconds, after which a process is stopped that takes longer than was expected"""
 WARM_FRAMES = 12
 LEAST_SECONDS, LEAST_MB = 0.02, 2.0
@@ -58,17 +58,17 @@ class Point:
 
 def axes(quick: bool = False) -> tuple[Axis, ...]:
     """The three, from small to large. `quick` for trying."""
-    frames = (100, 200, 400) if quick else (300, 1000, 3000, 10_000)
-    features = (20, 40, 80) if quick else (20, 40, 80, 160, 300)
+    frames = (50, 100, 200) if quick else (300, 1000, 3000, 10_000)
+    features = (10, 20, 40) if quick else (20, 40, 80, 160, 300)
     lengths = (28.0, 14.0, 7.0) if quick else (56.0, 28.0, 14.0, 7.0, 3.5)
-    few, some = (60, 100) if quick else (150, 300)
+    few, some = (60, 100) if quick else (150, 200)
     return (
         Axis("frames", "20 features a frame", tuple(_drive(n, 20.0) for n in frames)),
         Axis("features a frame", f"{few} frames", tuple(_drive(few, float(n)) for n in features)),
         Axis(
             "landmarks",
-            f"{some} frames with 40 features, tracks ever shorter",
-            tuple(replace(_drive(some, 40.0), track_length=length) for length in lengths),
+            f"{some} frames with 30 features, tracks ever shorter",
+            tuple(replace(_drive(some, 30.0), track_length=length) for length in lengths),
         ),
     )
 

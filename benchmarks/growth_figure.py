@@ -1,19 +1,21 @@
 """The figure of benchmarks.growth: time above, memory below, against frames, features a frame and landmarks."""
 
+from io import BytesIO
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from fgbaseline.reports.figures.drawing import lay_out
 from fgbaseline.reports.figures.palette import OWN
-from fgbaseline.reports.figures.saving import encoded
 from fgbaseline.reports.figures.style import WIDTH, head, in_style
 
 from .growth import ESTIMATORS, LEAST_MB, LEAST_SECONDS, Point, exponents, of
 
 ROWS = (("seconds", "processor time, s", LEAST_SECONDS), ("megabytes", "memory beyond the start, MB", LEAST_MB))
+DPI = 125
 MARKS = dict(zip(ESTIMATORS, "osD^vP", strict=True))
 
 
@@ -31,7 +33,9 @@ def drawn(points: list[Point]) -> bytes:
             panels[-1, column].set_xlabel(name)
         head(figure, "What it costs as the problem grows, with fitted powers", [_handle(name) for name in ESTIMATORS])
         lay_out(figure)
-    return encoded(figure, "png")
+        stream = BytesIO()
+        figure.savefig(stream, format="png", dpi=DPI)
+    return stream.getvalue()
 
 
 def _handle(name: str) -> Line2D:
@@ -55,8 +59,15 @@ def _panel(axes: Axes, points: list[Point], axis: str, unit: str, least: float) 
     for which in (axes.xaxis, axes.yaxis):
         which.set_minor_formatter(NullFormatter())
         which.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_locator(FixedLocator(sorted({_round(p.size) for p in points if p.axis == axis})))
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.set_xmargin(0.12)
+
+
+def _round(size: float) -> float:
+    """To two digits, as a tick has them."""
+    return float(f"{size:.2g}")
 
 
 def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
