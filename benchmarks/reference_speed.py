@@ -77,7 +77,7 @@ def late_against_early(runs: int, frames: int = DRIVE_FRAMES) -> Row:
         seconds = solved(long_drive(frames, seed)).seconds
         early = seconds[EARLY - WINDOW // 2 : EARLY + WINDOW // 2]
         ratios.append(float(np.median(seconds[-WINDOW:]) / np.median(early)))
-    what = f"isam2, a frame at the end of {frames} against frame {EARLY}, no loop closures, {FEATURES:.0f} features a frame"
+    what = f"isam2, a frame at the end of {frames} against frame {EARLY} ({FEATURES:.0f} features a frame, no loops)"
     return _row(what, f"at most {MOST_GROWTH:g}", ratios, ".2f", MOST_GROWTH)
 
 
