@@ -11,7 +11,7 @@ from pathlib import Path
 
 import click
 
-from .apart import MB
+from .apart import MB, apart
 from .measured import Row, table
 
 FRAMES, FEATURES = 10_000, 20
@@ -22,12 +22,7 @@ MOST_MEMORY = 2000.0
 
 def rows(frames: int = FRAMES) -> list[Row]:
     """Memory and page of one run; it is long, so it is made once."""
-    with tempfile.TemporaryDirectory() as folder:
-        recording, out = Path(folder) / "long.npz", Path(folder) / "out"
-        drive = ("--path", "town", "--duration", str(frames / 10.0), "--features-per-frame", str(FEATURES))
-        peak_of("simulate", recording, *drive, "--seed", "1")
-        peak = peak_of("run", recording, "--estimators", ESTIMATORS, "--out", out)
-        page = (out / "report.html").stat().st_size / MB
+    peak, page = apart("benchmarks.long_run:run", frames).answer
     what = f"`fgbaseline run` on {frames:,} simulated frames, {FEATURES} features a frame ({ESTIMATORS})"
     wanted = f"below {MOST_MEMORY:.0f} MB"
     return [
@@ -36,10 +31,20 @@ def rows(frames: int = FRAMES) -> list[Row]:
     ]
 
 
+def run(frames: int) -> tuple[float, float]:
+    """What a process of its own does: MB that the run held at most, and MB of its page."""
+    with tempfile.TemporaryDirectory() as folder:
+        recording, out = Path(folder) / "long.npz", Path(folder) / "out"
+        drive = ("--path", "town", "--duration", str(frames / 10.0), "--features-per-frame", str(FEATURES))
+        peak_of("simulate", recording, *drive, "--seed", "1")
+        peak = peak_of("run", recording, "--estimators", ESTIMATORS, "--out", out)
+        return peak, (out / "report.html").stat().st_size / MB
+
+
 def peak_of(*arguments: str | Path) -> float:
     """MB that a command of ours held at most. Raises RuntimeError where it fails.
 
-    By its `ru_maxrss`, which is at least what this process holds, and that is little.
+    By its `ru_maxrss`, which is at least what the process held that started it: call it from a lean one.
     """
     command = [str(Path(sys.executable).with_name("fgbaseline")), *map(str, arguments)]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
