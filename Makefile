@@ -8,7 +8,7 @@ QUICK_DRIVE := --path town --duration 10 --features-per-frame 25 --seed 3
 QUICK_ESTIMATORS := dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch
 QUICK_CHECK :=
 
-.PHONY: run test quick docs figures fuzz lint types arrows install schema wheel clean
+.PHONY: run test quick bench docs figures fuzz lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
@@ -39,6 +39,14 @@ FUZZ_SECONDS ?= 60
 fuzz: install
 	$(BIN)/pip install --quiet --group fuzz
 	$(BIN)/python -m benchmarks.fuzz --seconds $(FUZZ_SECONDS)
+
+# Time and memory, side by side in one run: docs/performance.md is written anew. It takes the better part of an hour on an
+# idle machine; BENCH_FLAGS=--quick tries it in minutes, on small sizes, and writes nothing.
+RECORDINGS ?= $(or $(FGBASELINE_RECORDINGS),../shared/data)
+BENCH_RUNS ?= 3
+BENCH_FLAGS :=
+bench: install
+	$(BIN)/python -m benchmarks.performance --recordings $(RECORDINGS) --runs $(BENCH_RUNS) $(BENCH_FLAGS)
 
 lint: install
 	$(BIN)/ruff check .

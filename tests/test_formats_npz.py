@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import tracemalloc
 import zipfile
 from dataclasses import replace
@@ -352,6 +353,21 @@ def test_lying_headers(tmp_path, course_arrays, case):
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("features.npy", member)
     with pytest.raises(InputError, match=sentence):
+        read(path)
+
+
+def test_a_block_larger_than_the_machine_is_refused_with_its_size_before_it_is_read(tmp_path, course_arrays):
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    N = memory // (4 * 6 * 8) + 1
+    header = npy_bytes(f"(4, {N}, 6)", b"")
+    del course_arrays["features"]
+    path = save(tmp_path / "a.npz", course_arrays)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("features.npy", header + bytes(800))
+        # The directory is made to agree with the header: only the size itself can give it away.
+        archive.getinfo("features.npy").file_size = len(header) + 4 * N * 6 * 8
+        archive._didModify = True  # type: ignore[attr-defined]
+    with pytest.raises(InputError, match=rf"features: .*{4 * N * 6 * 8 / 1e9:,.1f} GB"):
         read(path)
 
 

@@ -1,6 +1,7 @@
 """An array in a file, opened behind its header and read piece by piece, trusting nothing the file says of itself."""
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,6 +40,29 @@ def missing(key: str, keys: frozenset[str]) -> InputError:
     """The error for an array that is not in the file, which has `keys`."""
     found = ", ".join(repr(k) for k in sorted(keys)[:16]) or "nothing"
     return InputError(f"{key} is missing; the file has {found}")
+
+
+def require_room(key: str, shape: Shape, dtype: np.dtype[Any], memory: int | None = None) -> None:
+    """Raises InputError, with its size, for an array that claims more bytes than this machine has memory (`memory`).
+
+    It would be read piece by piece and not held, but so large a block of features is a mistake or an attack, and its
+    zeros may be packed into a small file that takes hours.
+    """
+    memory = _machine_memory() if memory is None else memory
+    claimed = math.prod(shape) * dtype.itemsize
+    if memory is not None and claimed > memory:
+        raise InputError(
+            f"{key}: its header promises shape {shape} of {dtype}, which is {claimed / 1e9:,.1f} GB, more than the "
+            f"{memory / 1e9:.1f} GB of memory of this machine; check how the file was written"
+        )
+
+
+def _machine_memory() -> int | None:
+    """Bytes; None where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .array_stream import ArrayStream, Readable, Shape, damage_told, missing
+from .array_stream import ArrayStream, Readable, Shape, damage_told, missing, require_room
 
 HEADER = 128
 STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -118,6 +118,7 @@ class MatFile:
             self._head(source)
             stored, n_bytes, inline = self._tag(source)
             dtype = np.dtype(self._order + STORED[stored])
+            require_room(key, shape, dtype)
         if math.prod(shape) * dtype.itemsize != n_bytes:
             raise InputError(f"{key}: {n_bytes} bytes of {dtype} do not fill the shape {shape}; save the file again")
         yield ArrayStream(key, shape, True, dtype, source if inline is None else io.BytesIO(inline))

@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .array_stream import ArrayStream, Shape, damage_told, missing
+from .array_stream import ArrayStream, Shape, damage_told, missing, require_room
 
 
 class NpzArchive:
@@ -69,6 +69,7 @@ class NpzArchive:
         with member:
             with damage_told(key):
                 shape, fortran_order, dtype = _read_header(key, member)
+                require_room(key, shape, dtype)
                 promised = math.prod(shape) * dtype.itemsize
                 held = info.file_size - member.tell()
             if promised != held:

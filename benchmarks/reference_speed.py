@@ -1,0 +1,116 @@
+"""How fast the reference is, `python -m benchmarks.reference_speed drive.npz`: and how much of that is GTSAM's own."""
+
+# ruff: noqa: E402
+
+import os
+
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fgbaseline import data, smoother
+from fgbaseline.data import Calibration, Estimate, NoiseSettings, Problem, Status
+from fgbaseline.data.motion import Shift
+from fgbaseline.data.simulate import Simulation, simulate
+
+from .gtsam_time import INCREMENTAL, OTHER, gtsam_timed
+from .measured import Row, table
+
+MOST_OUTSIDE = 0.15
+LEAST_REAL_TIME = 4.0
+MOST_GROWTH = 1.5
+DRIVE_FRAMES, EARLY, WINDOW = 3000, 300, 100
+FEATURES = 30.0
+"""a frame of these drives: the fewer, the more shows of what grows with the drive"""
+
+
+def rows(recording: Path | None, runs: int, frames: int = DRIVE_FRAMES) -> list[Row]:
+    """What was asked of `isam2`: on a recording, where there is one, and on simulated drives, a new one each run."""
+    return [*([] if recording is None else on_recording(recording, runs)), late_against_early(runs, frames)]
+
+
+def on_recording(recording: Path, runs: int) -> list[Row]:
+    """Times real time, and the shares of GTSAM's calls in processor time."""
+    problem = data.calibrated(data.read(recording))
+    duration = float(problem.sequence.t[-1] - problem.sequence.t[0])
+    real_time, shares = [], []
+    for _ in range(runs):
+        start = time.perf_counter()
+        solved(problem)
+        real_time.append(duration / (time.perf_counter() - start))
+        shares.append(_shares(problem))
+    update, other = (np.array(values) for values in zip(*shares, strict=True))
+    name = f"isam2 on {recording.name}"
+    outside = 1.0 - update
+    wanted = f"at most {MOST_OUTSIDE:.0%}"
+    return [
+        _row(
+            f"{name}: times real time", f"at least {LEAST_REAL_TIME:g}", real_time, ".2f", LEAST_REAL_TIME, most=False
+        ),
+        _row(f"{name}: share outside {INCREMENTAL}", wanted, outside, ".1%", MOST_OUTSIDE),
+        _row(f"of that, {OTHER} (covariances, copies, last relinearisation)", "", other, ".1%"),
+        _row("of that, ours (Python, numpy, building factors)", "", outside - other, ".1%"),
+    ]
+
+
+def _shares(problem: Problem) -> tuple[float, float]:
+    """Of iSAM2's updates and estimates, and of GTSAM's other calls, in the processor time of a whole answer."""
+    with gtsam_timed() as spent:
+        start = time.process_time()
+        solved(problem)
+        whole = time.process_time() - start
+    return spent.seconds[INCREMENTAL] / whole, spent.seconds[OTHER] / whole
+
+
+def late_against_early(runs: int, frames: int = DRIVE_FRAMES) -> Row:
+    """The cost of a frame at the end of a simulated drive against that at frame 300: medians over 100 frames.
+
+    No landmark comes back on these drives once it was lost, so nothing closes a loop.
+    """
+    ratios = []
+    for seed in range(runs):
+        seconds = solved(long_drive(frames, seed)).seconds
+        early = seconds[EARLY - WINDOW // 2 : EARLY + WINDOW // 2]
+        ratios.append(float(np.median(seconds[-WINDOW:]) / np.median(early)))
+    what = f"isam2, a frame at the end of {frames} against frame {EARLY} ({FEATURES:.0f} features a frame, no loops)"
+    return _row(what, f"at most {MOST_GROWTH:g}", ratios, ".2f", MOST_GROWTH)
+
+
+def long_drive(frames: int, seed: int) -> Problem:
+    """A simulated drive through a town, with the noise that it has."""
+    simulation = Simulation(duration=frames / 10.0, features_per_frame=FEATURES, returning_share=0.0, seed=seed)
+    noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
+    return data.calibrated(simulate(simulation), settings=Calibration(noise, shift=Shift.AFTER))
+
+
+def solved(problem: Problem) -> Estimate:
+    """The answer of isam2; raises RuntimeError where there is none."""
+    estimate = smoother.isam2(problem)
+    if estimate.status is Status.FAILED:
+        raise RuntimeError(f"isam2 failed: {estimate.reason}")
+    return estimate
+
+
+def _row(what: str, wanted: str, values: object, form: str, bound: float | None = None, *, most: bool = True) -> Row:
+    measured = np.asarray(values, dtype=np.float64)
+    median = float(np.median(measured))
+    met = None if bound is None else median <= bound if most else median >= bound
+    return Row(what, wanted, f"{median:{form}}", f"{measured.min():{form}} to {measured.max():{form}}", met)
+
+
+@click.command()
+@click.argument("recording", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
+@click.option("--frames", type=click.IntRange(min=500), default=DRIVE_FRAMES, show_default=True)
+def main(recording: Path | None, runs: int, frames: int) -> None:
+    """Print the table."""
+    click.echo(table(rows(recording, runs, frames)))
+
+
+if __name__ == "__main__":
+    main()
