@@ -12,7 +12,8 @@ from ..sequence import Sequence
 from .inflation import Inflation, inflation_of
 from .links import three_rows
 from .odometry import Odometry
-from .window import SHARED, SHARED_PRIOR, Sigmas, WindowData, WindowFit, fit_window
+from .window import SHARED_PRIOR, WindowFit, fit_window
+from .window_terms import SHARED, Sigmas, WindowData
 
 FRAMES = 25
 """of a window: longer than most tracks"""
@@ -39,7 +40,7 @@ class Fit:
     sigmas: Sigmas
     """the noise that a filter may believe"""
     shared: FloatArray
-    """(8,) see `window.SHARED`"""
+    """(8,) see `window_terms.SHARED`"""
     deviation: FloatArray
     """(8,) standard errors, from the spread between windows where that is larger than what each claims"""
     windows: int

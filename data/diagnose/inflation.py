@@ -13,7 +13,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..sequence import Sequence
-from .window import SCALE, TURN, Sigmas, WindowData, fit_window
+from .window import fit_window
+from .window_terms import SCALE, TURN, Sigmas, WindowData
 
 LOOSE = 30.0
 """times the velocity noise, with which a window is fitted so that the cameras decide"""

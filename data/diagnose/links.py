@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, StereoCamera, disparity
+from fgbaseline.geometry import FloatArray, disparity
 
 from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
@@ -103,8 +103,3 @@ def links_of(sequence: Sequence) -> Links:
 def three_rows(pixel: FloatArray) -> FloatArray:
     """(..., 3) uL, uR and (vL + vR) / 2 of observations (..., 4)."""
     return np.stack([pixel[..., 0], pixel[..., 2], 0.5 * (pixel[..., 1] + pixel[..., 3])], axis=-1)
-
-
-def three_row_jacobian(camera: StereoCamera, point: FloatArray) -> FloatArray:
-    """(..., 3, 3) derivative of `three_rows` of a projected point (..., 3)."""
-    return camera.jacobian(point)[..., [0, 2, 1], :]
