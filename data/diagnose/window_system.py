@@ -198,7 +198,8 @@ def _summed_by_point(values: FloatArray, row: IntArray, m: int) -> FloatArray:
     """(k, m) sums of values (k, n) over the observations of each landmark."""
     k = len(values)
     entry = np.arange(0, k * m, m)[:, None] + row
-    return np.bincount(entry.reshape(-1), weights=values.reshape(-1), minlength=k * m).reshape(k, m)
+    sums = np.bincount(entry.reshape(-1), weights=values.reshape(-1), minlength=k * m)
+    return np.asarray(sums.reshape(k, m), dtype=np.float64)
 
 
 def _summed_by_frame(values: list[FloatArray], frame: IntArray, n_frames: int) -> FloatArray:
