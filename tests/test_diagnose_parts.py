@@ -15,13 +15,13 @@ from fgbaseline.data.diagnose.axes import linear_axes
 from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
 from fgbaseline.data.diagnose.timing import timing
-from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_window
+from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_windows_alike
 from fgbaseline.data.diagnose.window_terms import (
     HUBER,
-    OFFSET,
     SHARED,
     Sigmas,
     WindowData,
+    joined,
     motion_terms,
     pixel_terms,
 )
@@ -51,7 +51,8 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
 def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
     scene, data, poses, points = window()
     sequence = scene.sequence()
-    fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, SIGMAS, np.zeros(SHARED), iterations)
+    windows, start = [(data, poses, points)], [np.zeros(SHARED)]
+    (fit,) = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, iterations)
     return fit, data
 
 
@@ -67,15 +68,16 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
     scene, data, poses, points = window()
     sequence, h = scene.sequence(), 1e-6
     shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
-    _, before, after, by_shared = motion_terms(data, poses, SIGMAS, shared)
-    terms = pixel_terms(sequence.camera, sequence.imu_T_cam, data, poses, points, 0.5, 0.3)
+    one = joined([(data, poses, points)])
+    _, before, after, by_shared = motion_terms(one, poses, SIGMAS, shared[None])
+    terms = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, 0.5, shared[None])
     by_point = np.moveaxis(terms.by_point, 2, 0)
 
     def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
-        return motion_terms(data, p, SIGMAS, s)[0]
+        return motion_terms(one, p, SIGMAS, s[None]).residual
 
     def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
-        return pixel_terms(sequence.camera, sequence.imu_T_cam, data, p, x, 0.5, 0.3).residual.T
+        return pixel_terms(sequence.camera, sequence.imu_T_cam, one, p, x, 0.5, shared[None]).residual.T
 
     k = 3
     for axis in range(6):
@@ -102,18 +104,20 @@ def test_a_window_ends_where_scipy_ends() -> None:
     fit, data = fitted()
     sequence = window()[0].sequence()
     W, m = len(fit.poses), len(fit.points)
-    root = np.sqrt(np.diag(SHARED_PRIOR))
+    root, one = np.sqrt(np.diag(SHARED_PRIOR)), joined([(data, fit.poses, fit.points)])
 
     def residual(x: FloatArray) -> FloatArray:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
         shared = fit.shared + x[-SHARED:]
-        offset = float(shared[OFFSET])
-        r = pixel_terms(sequence.camera, sequence.imu_T_cam, data, poses, points, SIGMAS.pixel, offset).residual.T
+        pixels = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, SIGMAS.pixel, shared[None])
+        r = pixels.residual.T
         norm = np.linalg.norm(r, axis=1)
         beyond = np.maximum(norm, HUBER)  # the squared norm becomes Huber's cost
         r = r * np.sqrt(2.0 * HUBER * beyond - HUBER**2)[:, None] / beyond[:, None]
-        return np.concatenate([r.ravel(), motion_terms(data, poses, SIGMAS, shared)[0].ravel(), root * shared])
+        return np.concatenate(
+            [r.ravel(), motion_terms(one, poses, SIGMAS, shared[None]).residual.ravel(), root * shared]
+        )
 
     start = np.zeros(6 * (W - 1) + 3 * m + SHARED)
     best = least_squares(residual, start, x_scale="jac")

@@ -12,8 +12,8 @@ from ..sequence import Sequence
 from .inflation import Inflation, inflation_of
 from .links import three_rows
 from .odometry import Odometry
-from .window import SHARED_PRIOR, WindowFit, fit_window
-from .window_terms import SHARED, Sigmas, WindowData
+from .window import SHARED_PRIOR, WindowFit, fit_windows_alike
+from .window_terms import SHARED, Sigmas, Window, WindowData
 
 FRAMES = 25
 """of a window: longer than most tracks"""
@@ -80,10 +80,7 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     shared = [np.zeros(SHARED)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = [
-            fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, common, iterations=1)
-            for (data, poses, points), common in zip(windows, shared, strict=True)
-        ]
+        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, iterations=1)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas)
@@ -103,9 +100,9 @@ def half_cost(sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas:
     """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
     whiten = np.repeat([sigmas.linear, sigmas.angular], 3)
     total = 0.0
-    for data, poses, points in _windows(sequence, odometry, twist, _spread(sequence.n_frames)):
-        start = np.zeros(SHARED)
-        fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, start, iterations=5)
+    windows = _windows(sequence, odometry, twist, _spread(sequence.n_frames))
+    start = [np.zeros(SHARED)] * len(windows)
+    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, iterations=5):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
     return total
 
@@ -132,9 +129,7 @@ def _unbroken(odometry: Odometry) -> list[Span]:
     return spans[:MAX_UNBROKEN]
 
 
-def _windows(
-    sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]
-) -> list[tuple[WindowData, FloatArray, FloatArray]]:
+def _windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]) -> list[Window]:
     """Data, initial poses and initial points of each window that has enough observations."""
     o, dt = sequence.observations, sequence.dt
     chain = chains(odometry, o.landmark, o.frame)

@@ -31,14 +31,15 @@ def regress(y: FloatArray, X: FloatArray, prior: FloatArray) -> Regression:
     """Coefficients (p,) of X (n, d, p) for y (n, d), with prior deviations (p,), by reweighted least squares."""
     n, d, p = X.shape
     rows, price = np.ascontiguousarray(X).reshape(n * d, p), np.diag(1.0 / prior**2)
-    theta, information = np.zeros(p), price
+    theta: FloatArray = np.zeros(p)
+    information = price
     for _ in range(ROUNDS):
         residual = y - (rows @ theta).reshape(n, d)
         sigma = _bulk(residual)
         weight = np.maximum(1.0 - (residual / (TUKEY * sigma)) ** 2, 0.0) ** 2 / sigma**2
         weighted = rows.T * weight.reshape(-1)
         information = weighted @ rows + price
-        theta = np.linalg.solve(information, weighted @ y.reshape(-1))
+        theta = np.asarray(np.linalg.solve(information, weighted @ y.reshape(-1)), dtype=np.float64)
         theta = np.clip(theta, -FARTHEST * prior, FARTHEST * prior)
     sigma = _bulk(y - (rows @ theta).reshape(n, d))
     likelihood = -n * float(np.log(sigma).sum()) - 0.5 * float(np.sum((theta / prior) ** 2))

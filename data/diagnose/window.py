@@ -4,15 +4,18 @@ Dense and exact: landmarks are eliminated by the Schur complement, poses are few
 cannot, residuals with the right number of degrees of freedom, so that noise can be told from error.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
-from .window_system import add_motion, add_pixels, eliminated, landmark_steps, motion_redundancy
-from .window_terms import OFFSET, SHARED, Sigmas, WindowData, motion_terms, pixel_terms
+from .window_system import Landmarks, Reduced, around_intervals, landmark_steps, moved_along, reduced, terms_of
+from .window_terms import SHARED, Joined, MotionTerms, Sigmas, Window, joined, motion_terms, pixel_terms
 
+TOGETHER = 8000
+"""observations, from which on windows are not computed any more together: what they need should stay in a cache"""
 SHARED_PRIOR = np.diag(1.0 / np.array([0.1] * 3 + [0.3] + [0.1] * 3 + [1.0]) ** 2)
 """keeps what a window cannot know (a rotation about the direction of travel) from running away"""
 
@@ -41,47 +44,102 @@ class WindowFit:
     """(6, 6) of the right perturbation of the last pose"""
 
 
-def fit_window(
+def fit_windows_alike(
     camera: StereoCamera,
     imu_T_cam: FloatArray,
-    data: WindowData,
-    poses: FloatArray,
-    points: FloatArray,
+    windows: Sequence[Window],
+    sigmas: Sigmas,
+    shared: Sequence[FloatArray],
+    iterations: int,
+) -> list[WindowFit]:
+    """Gauss-Newton of each window by itself; its `shared` (8,) is free too, under a wide prior."""
+    fits: list[WindowFit] = []
+    group: list[int] = []
+    for i in range(len(windows)):
+        group.append(i)
+        if sum(len(windows[j][0].frame) for j in group) >= TOGETHER or i == len(windows) - 1:
+            chosen = [windows[j] for j in group], np.array([shared[j] for j in group])
+            fits += _fitted(camera, imu_T_cam, chosen[0], sigmas, chosen[1], iterations)
+            group = []
+    return fits
+
+
+def _fitted(
+    camera: StereoCamera,
+    imu_T_cam: FloatArray,
+    windows: list[Window],
     sigmas: Sigmas,
     shared: FloatArray,
     iterations: int,
-) -> WindowFit:
-    """Gauss-Newton from poses (W, 4, 4) and points (m, 3); `shared` (8,) is free too, under a wide prior."""
-    m = len(points)
-    n_pose = 6 * (len(poses) - 1)
+) -> list[WindowFit]:
+    data, numbers = joined(windows), range(len(windows))
+    poses, points = (np.concatenate(parts) for parts in list(zip(*windows, strict=True))[1:])
     for step in range(iterations + 1):
-        turn = poses[1:, :3, :3]
-        pixels = pixel_terms(camera, imu_T_cam, data, poses, points, sigmas.pixel, float(shared[OFFSET]))
-        residual, *J = motion_terms(data, poses, sigmas, shared)
-        H = np.zeros((n_pose + SHARED, n_pose + SHARED))
-        g = np.zeros(n_pose + SHARED)
-        H[n_pose:, n_pose:] += SHARED_PRIOR
-        g[n_pose:] -= SHARED_PRIOR @ shared
-        add_motion(H, g, residual, *J)
-        system = eliminated(data, pixels, turn, sigmas.pixel, m)
-        add_pixels(H, g, system)
+        pixels = pixel_terms(camera, imu_T_cam, data, poses, points, sigmas.pixel, shared)
+        motions = motion_terms(data, poses, sigmas, shared)
+        landmarks, frames = terms_of(data, pixels, motions, sigmas.pixel)
+        systems = [reduced(data, i, landmarks, frames, pixels.turn) for i in numbers]
+        for system, common in zip(systems, shared, strict=True):
+            system.H[-SHARED:, -SHARED:] += SHARED_PRIOR
+            system.g[-SHARED:] -= SHARED_PRIOR @ common
         if step == iterations:
             break
-        delta = np.linalg.solve(H, g)
-        points = points + landmark_steps(system, turn, np.append(delta[:n_pose], delta[n_pose + OFFSET]))
-        poses = np.concatenate([poses[:1], poses[1:] @ se3.exp(delta[:n_pose].reshape(-1, 6))])
-        shared = shared + delta[n_pose:]
-    covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-    redundancy = motion_redundancy(covariance, *J)
-    absorbed = n_pose + 3 * m + SHARED
+        poses, points, shared = _stepped(data, systems, landmarks, poses, points, shared)
+    covariances = [np.asarray(np.linalg.inv(system.H), dtype=np.float64) for system in systems]
+    redundancy = _redundancy(data, motions, np.concatenate([around_intervals(C) for C in covariances]))
+    residual = motions.residual * np.repeat([sigmas.linear, sigmas.angular], 3)
+    squared = pixels.weight * (pixels.residual**2).sum(axis=0)
+    return [_fit(data, i, covariances[i], poses, points, shared[i], residual, redundancy, squared) for i in numbers]
+
+
+def _stepped(
+    data: Joined,
+    systems: list[Reduced],
+    landmarks: Landmarks,
+    poses: FloatArray,
+    points: FloatArray,
+    shared: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Poses, points and shared parameters after a step of each window."""
+    deltas = [np.asarray(np.linalg.solve(system.H, system.g), dtype=np.float64) for system in systems]
+    dx, pull = np.zeros((len(poses), 6)), landmarks.pull.copy()
+    for system, delta, f, p in zip(systems, deltas, data.frames, data.points, strict=True):
+        dx[f.start + 1 : f.stop] = delta[:-SHARED].reshape(-1, 6)
+        pull[:, p] -= moved_along(system, poses[f.start + 1 : f.stop, :3, :3], delta)
+    points = points + landmark_steps(landmarks.factor, pull)
+    return poses @ se3.exp(dx), points, shared + np.array([delta[-SHARED:] for delta in deltas])
+
+
+def _redundancy(data: Joined, motions: MotionTerms, covariance: FloatArray) -> FloatArray:
+    """(k, 6) 1 - diag(J Sigma J^T) of each whitened motion residual, Sigma (k, 20, 20)."""
+    J = np.concatenate([motions.by_before, motions.by_after, motions.by_shared], axis=2)
+    J[[data.intervals(i).start for i in range(len(data.frames))], :, :6] = 0.0  # the first pose is held
+    return np.asarray(1.0 - ((J @ covariance) * J).sum(axis=2), dtype=np.float64)
+
+
+def _fit(
+    data: Joined,
+    window: int,
+    covariance: FloatArray,
+    poses: FloatArray,
+    points: FloatArray,
+    shared: FloatArray,
+    residual: FloatArray,
+    redundancy: FloatArray,
+    squared: FloatArray,
+) -> WindowFit:
+    """That of one of the windows, out of the arrays of all."""
+    f, o, p, k = data.frames[window], data.observations[window], data.points[window], data.intervals(window)
+    left = float(redundancy[k].sum())
     return WindowFit(
-        poses=poses,
-        points=points,
+        poses=poses[f],
+        points=points[p],
         shared=shared,
-        shared_information=np.linalg.inv(covariance[n_pose:, n_pose:]) - SHARED_PRIOR,
-        motion_residual=residual * np.repeat([sigmas.linear, sigmas.angular], 3),
-        motion_redundancy=redundancy,
-        pixel_squared=pixels.weight * (pixels.residual**2).sum(axis=0),
-        degrees_of_freedom=3.0 * len(data.frame) + n_pose - absorbed - float(redundancy.sum()),
-        last_covariance=covariance[n_pose - 6 : n_pose, n_pose - 6 : n_pose],
+        shared_information=np.linalg.inv(covariance[-SHARED:, -SHARED:]) - SHARED_PRIOR,
+        motion_residual=residual[k],
+        motion_redundancy=redundancy[k],
+        pixel_squared=squared[o],
+        # 6 rows of each interval stand against the 6 unknowns of a pose
+        degrees_of_freedom=3.0 * (o.stop - o.start) - 3.0 * (p.stop - p.start) - SHARED - left,
+        last_covariance=covariance[-SHARED - 6 : -SHARED, -SHARED - 6 : -SHARED],
     )
