@@ -135,24 +135,32 @@ def _windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: l
     chain = chains(odometry, o.landmark, o.frame)
     known = odometry.known[:, None, None]
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
-    windows = []
+    starts, before = o.frame_starts(sequence.n_frames), 0
+    parts: list[tuple[WindowData, FloatArray]] = []
+    sights, views, rows = [], [], []
     for start, size in spans:
-        chosen = np.flatnonzero((chain >= 0) & (o.frame >= start) & (o.frame < start + size))
+        chosen = np.arange(starts[start], starts[start + size])
+        chosen = chosen[chain[chosen] >= 0]
         _, row, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
         chosen = chosen[length[row] >= MIN_TRACK]
         if len(chosen) < MIN_OBSERVATIONS:
             continue
         intervals = slice(start, start + size - 1)
         poses = se3.compose(step[intervals])
-        _, row = np.unique(chain[chosen], return_inverse=True)
+        row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
-        world_T_cam = (poses @ sequence.imu_T_cam)[frame]
-        points = triangulate_tracks(
-            sequence.camera, world_T_cam, row.astype(np.int64), o.pixel[chosen], int(row.max()) + 1, 1.0, huber=2.5
-        ).position
-        data = WindowData(frame, row.astype(np.int64), three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
-        windows.append((data, poses, points))
-    return windows
+        data = WindowData(frame, row, three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        parts.append((data, poses))
+        sights.append(chosen)
+        views.append((poses @ sequence.imu_T_cam)[frame])
+        rows.append(row + before)
+        before += int(row.max()) + 1
+    if not parts:
+        return []
+    pixel, row = o.pixel[np.concatenate(sights)], np.concatenate(rows)
+    points = triangulate_tracks(sequence.camera, np.concatenate(views), row, pixel, before, 1.0, huber=2.5).position
+    ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
+    return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]
 
 
 def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
