@@ -3,14 +3,12 @@
 Each coordinate is in an array of its own, over all pairs of frames: stacks of small matrices take ten times as long.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera
 
 from ..observations import BoolArray, IntArray
-from .links import Links
+from .links import BLOCK, Links
 
 HYPOTHESES = 48
 """per pair of frames; with half of the links wrong, one of them is right with probability 0.998"""
@@ -27,49 +25,30 @@ def best_hypotheses(camera: StereoCamera, links: Links, n_pairs: int, count: Int
     `links` are those of the `known` pairs, sorted by pair, `count` (n_pairs,) how many each pair has.
     """
     pairs = np.flatnonzero(known)
-    blocks = [_block(links, chosen, pairs) for chosen in links.blocks()]
     best = np.tile(np.eye(4), (n_pairs, 1, 1))
-    best_cost = _truncated_cost(camera, blocks, _columns(best[pairs]))
+    best_cost = _truncated_costs(camera, links, count[pairs], _columns(best[pairs]))[0]
 
-    def compete(motion: FloatArray) -> None:
-        cost = _truncated_cost(camera, blocks, motion)
-        better = cost < best_cost
-        best[pairs[better], :3] = np.moveaxis(motion[:, :, better], 2, 0)
-        best_cost[better] = cost[better]
+    def compete(motions: FloatArray) -> None:
+        costs = _truncated_costs(camera, links, count[pairs], motions)
+        least, of_pair = np.argmin(costs, axis=0), np.arange(len(pairs))
+        better = costs[least, of_pair] < best_cost
+        best[pairs[better], :3] = motions[:, :, least[better], of_pair[better]].transpose(2, 0, 1)
+        best_cost[better] = costs[least, of_pair][better]
 
     point = np.ascontiguousarray(links.point.T)
     after = np.ascontiguousarray(camera.triangulate(links.pixel[:, [0, 2, 1, 2]]).T)
     rng = np.random.default_rng(SEED)
     start = (np.cumsum(count[pairs]) - count[pairs])[:, None]
     pick = np.concatenate([start + _three_of(rng, count[pairs]) for _ in range(HYPOTHESES)])
-    tried = _through_three(point[:, pick.T], after[:, pick.T]).reshape(3, 4, HYPOTHESES, len(pairs))
-    for number in range(HYPOTHESES):
-        compete(tried[:, :, number])
+    compete(_through_three(point[:, pick.T], after[:, pick.T]).reshape(3, 4, HYPOTHESES, len(pairs)))
     for shift in (1, -1):  # a neighbour's motion is a good guess where few links are right
         compete(_columns(np.roll(best, shift, axis=0)[pairs]))
     return best
 
 
-class _Block(NamedTuple):
-    """n links in succession, each coordinate in an array of its own."""
-
-    pair: IntArray
-    """(n,) the known pair, counted among these, that each is of"""
-    point: FloatArray
-    """(3, n)"""
-    pixel: FloatArray
-    """(3, n)"""
-
-
-def _block(links: Links, chosen: slice, pairs: IntArray) -> _Block:
-    point, pixel = links.point[chosen].T, links.pixel[chosen].T
-    pair = np.searchsorted(pairs, links.frame[chosen])
-    return _Block(pair, np.ascontiguousarray(point), np.ascontiguousarray(pixel))
-
-
 def _columns(M: FloatArray) -> FloatArray:
-    """(3, 4, p) of motions (p, 4, 4)."""
-    return np.ascontiguousarray(np.moveaxis(M[:, :3], 0, 2))
+    """(3, 4, 1, p) of motions (p, 4, 4)."""
+    return np.moveaxis(M[:, :3], 0, 2)[:, :, None]
 
 
 def _three_of(rng: np.random.Generator, count: IntArray) -> IntArray:
@@ -118,25 +97,35 @@ def _axes_of_plane(points: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(normal, first, axis=0), normal])
 
 
-def _truncated_cost(camera: StereoCamera, blocks: list[_Block], motion: FloatArray) -> FloatArray:
-    """(p,) sum of the squared pixel residuals of each pair's links under its motion (3, 4, p), each truncated; no
-    whitening, for speed."""
+def _truncated_costs(camera: StereoCamera, links: Links, count: IntArray, motions: FloatArray) -> FloatArray:
+    """(h, p) sum of the squared pixel residuals of each pair's links under h motions (3, 4, h, p) of it, each
+    truncated; no whitening, for speed. The pairs have `count` (p,) links each."""
     rows = np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]])
-    P = (rows @ motion.reshape(3, -1)).reshape(3, 4, -1)
-    cost = np.zeros(motion.shape[2])
-    for pair, (x, y, z), (uL, uR, row) in blocks:
-        first, last = int(pair[0]), int(pair[-1]) + 1
-        pair = pair - first
-        u, v, depth = (
-            np.take(a, pair) * x + np.take(b, pair) * y + np.take(c, pair) * z + np.take(d, pair)
-            for a, b, c, d in P[:, :, first:last]
-        )
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            near = 1.0 / depth
-            u, v = u * near, v * near
-            squared = (u - uL) ** 2
-            squared += (u - camera.fu * camera.baseline * near - uR) ** 2
-            squared += (v - row) ** 2
-        squared = np.where(depth > NEAREST, np.minimum(squared, TRUNCATION), TRUNCATION)
-        cost[first:last] = np.bincount(pair, weights=squared, minlength=last - first)
-    return cost
+    h, p = motions.shape[2:]
+    P = np.ascontiguousarray((rows @ motions.reshape(3, -1)).reshape(3, 4, h, p).transpose(3, 0, 2, 1))
+    point = np.concatenate([links.point.T, np.ones((1, len(links)))])
+    starts, costs = np.cumsum(count) - count, np.empty((h, p))
+    first = 0
+    for block in links.blocks(1 + BLOCK // h):
+        last = int(np.searchsorted(starts, block.stop))
+        moved = np.empty((3, h, block.stop - block.start))
+        own = starts[first:last].tolist()
+        for pair, start, end in zip(range(first, last), own, (*own[1:], block.stop), strict=True):
+            at = slice(start - block.start, end - block.start)
+            np.matmul(P[pair], point[:, start:end], out=moved[:, :, at])
+        squared = _truncated(camera, moved, links.pixel[block].T)
+        costs[:, first:last] = np.add.reduceat(squared, starts[first:last] - block.start, axis=1)
+        first = last
+    return costs
+
+
+def _truncated(camera: StereoCamera, moved: FloatArray, pixel: FloatArray) -> FloatArray:
+    """(h, n) squared residuals of links whose points project to moved[:2] / moved[2] (3, h, n) in the left image."""
+    u, v, depth = moved
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        near = 1.0 / depth
+        u, v = u * near, v * near
+        squared = (u - pixel[0]) ** 2
+        squared += (u - camera.fu * camera.baseline * near - pixel[1]) ** 2
+        squared += (v - pixel[2]) ** 2
+        return np.where(depth > NEAREST, np.minimum(squared, TRUNCATION), TRUNCATION)

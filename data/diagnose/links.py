@@ -42,9 +42,9 @@ class Links:
         """The links where `chosen` is true, or those at increasing indices."""
         return Links(*(getattr(self, name)[chosen] for name in self.__slots__))
 
-    def blocks(self) -> Iterator[slice]:
-        """Slices of about `BLOCK` links, each with all those of its frames."""
-        ends = np.searchsorted(self.frame, self.frame[BLOCK - 1 :: BLOCK], side="right").tolist()
+    def blocks(self, size: int = BLOCK) -> Iterator[slice]:
+        """Slices of about `size` links, each with all those of its frames."""
+        ends = np.searchsorted(self.frame, self.frame[size - 1 :: size], side="right").tolist()
         start = 0
         for end in (*ends, len(self)):
             if end > start:
