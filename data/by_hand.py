@@ -13,7 +13,7 @@ from .diagnose.diagnosis import explained
 from .diagnose.fit import Fit
 from .diagnose.inflation import Inflation
 from .diagnose.repair import TrackRepairs
-from .diagnose.window import OFFSET, SCALE, SHARED, TURN, Sigmas
+from .diagnose.window_terms import OFFSET, SCALE, SHARED, TURN, Sigmas
 from .repairs import Repairs
 from .track_mask import MaskSettings
 

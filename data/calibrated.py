@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fgbaseline.geometry import InputError
 
 from .by_hand import ASSUMED, mask_settings, overridden, told
-from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair
+from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair, track_state
 from .documented import most_observed
 from .gaps import admit_gaps
 from .motion import Shift, dead_reckoned_path, increments
@@ -85,7 +85,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     return replace(
         admit_gaps(_bridged(problem, diagnosis, noise)),
         diagnosed=not found.cannot_tell,
-        findings=findings_of(found),
+        findings=findings_of(found, track_state(found, repaired if repairs == Repairs() else None)),
         repairs=(*told(repairs), *repaired.repairs),
     )
 

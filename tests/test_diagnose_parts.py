@@ -15,17 +15,15 @@ from fgbaseline.data.diagnose.axes import linear_axes
 from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
 from fgbaseline.data.diagnose.timing import timing
-from fgbaseline.data.diagnose.window import (
+from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_windows_alike
+from fgbaseline.data.diagnose.window_terms import (
     HUBER,
-    OFFSET,
     SHARED,
-    SHARED_PRIOR,
     Sigmas,
     WindowData,
-    WindowFit,
-    _motion_terms,
-    _pixel_terms,
-    fit_window,
+    joined,
+    motion_terms,
+    pixel_terms,
 )
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.data.track_mask import MaskSettings, exclusions, split_tracks
@@ -53,7 +51,8 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
 def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
     scene, data, poses, points = window()
     sequence = scene.sequence()
-    fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, SIGMAS, np.zeros(SHARED), iterations)
+    windows, start = [(data, poses, points)], [np.zeros(SHARED)]
+    (fit,) = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, iterations)
     return fit, data
 
 
@@ -69,15 +68,16 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
     scene, data, poses, points = window()
     sequence, h = scene.sequence(), 1e-6
     shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
-    cam_T_imu = se3.inverse(sequence.imu_T_cam)
-    _, before, after, by_shared = _motion_terms(data, poses, SIGMAS, shared)
-    _, by_pose, by_point, _ = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, 0.5, 0.3)
+    one = joined([(data, poses, points)])
+    _, before, after, by_shared = motion_terms(one, poses, SIGMAS, shared[None])
+    terms = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, 0.5, shared[None])
+    by_point = np.moveaxis(terms.by_point, 2, 0)
 
     def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
-        return _motion_terms(data, p, SIGMAS, s)[0]
+        return motion_terms(one, p, SIGMAS, s[None]).residual
 
     def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
-        return _pixel_terms(sequence.camera, cam_T_imu, data, p, x, 0.5, 0.3)[0]
+        return pixel_terms(sequence.camera, sequence.imu_T_cam, one, p, x, 0.5, shared[None]).residual.T
 
     k = 3
     for axis in range(6):
@@ -86,8 +86,10 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
         assert np.allclose(difference[k - 1], after[k - 1, :, axis], atol=2e-3 * np.abs(after[k - 1]).max())
         assert np.allclose(difference[k], before[k, :, axis], atol=2e-3 * np.abs(before[k]).max())
         seen = data.frame == k
+        move, turn = poses[k, :3, :3] @ np.eye(6)[axis].reshape(2, 3, 1)
+        as_if = -(move.T + np.cross(turn.T, terms.arm.T[seen]))
         difference = -(pixel(ahead, points) - pixel(behind, points))[seen] / (2 * h)
-        assert np.allclose(difference, by_pose[seen, :, axis], rtol=1e-4, atol=1e-3)
+        assert np.allclose(difference, (by_point[seen] @ as_if[:, :, None])[:, :, 0], rtol=1e-4, atol=1e-3)
     for i in range(SHARED):
         step = h * np.eye(SHARED)[i]
         difference = -(motion(poses, shared + step) - motion(poses, shared - step)) / (2 * h)
@@ -101,18 +103,21 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
 def test_a_window_ends_where_scipy_ends() -> None:
     fit, data = fitted()
     sequence = window()[0].sequence()
-    cam_T_imu, W, m = se3.inverse(sequence.imu_T_cam), len(fit.poses), len(fit.points)
-    root = np.sqrt(np.diag(SHARED_PRIOR))
+    W, m = len(fit.poses), len(fit.points)
+    root, one = np.sqrt(np.diag(SHARED_PRIOR)), joined([(data, fit.poses, fit.points)])
 
     def residual(x: FloatArray) -> FloatArray:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
         shared = fit.shared + x[-SHARED:]
-        r = _pixel_terms(sequence.camera, cam_T_imu, data, poses, points, SIGMAS.pixel, float(shared[OFFSET]))[0]
+        pixels = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, SIGMAS.pixel, shared[None])
+        r = pixels.residual.T
         norm = np.linalg.norm(r, axis=1)
         beyond = np.maximum(norm, HUBER)  # the squared norm becomes Huber's cost
         r = r * np.sqrt(2.0 * HUBER * beyond - HUBER**2)[:, None] / beyond[:, None]
-        return np.concatenate([r.ravel(), _motion_terms(data, poses, SIGMAS, shared)[0].ravel(), root * shared])
+        return np.concatenate(
+            [r.ravel(), motion_terms(one, poses, SIGMAS, shared[None]).residual.ravel(), root * shared]
+        )
 
     start = np.zeros(6 * (W - 1) + 3 * m + SHARED)
     best = least_squares(residual, start, x_scale="jac")

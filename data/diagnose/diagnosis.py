@@ -17,7 +17,7 @@ from .links import repeated
 from .odometry import Odometry, odometry
 from .timing import Timing, timing
 from .whole_shift import whole_shift
-from .window import OFFSET, TURN, Sigmas
+from .window_terms import OFFSET, TURN, Sigmas
 
 MIN_INTERVALS = 20
 """of which the cameras must tell the motion"""

@@ -12,7 +12,8 @@ from ..sequence import Sequence
 from .inflation import Inflation, inflation_of
 from .links import three_rows
 from .odometry import Odometry
-from .window import SHARED, SHARED_PRIOR, Sigmas, WindowData, WindowFit, fit_window
+from .window import SHARED_PRIOR, WindowFit, fit_windows_alike
+from .window_terms import SHARED, Sigmas, Window, WindowData
 
 FRAMES = 25
 """of a window: longer than most tracks"""
@@ -39,7 +40,7 @@ class Fit:
     sigmas: Sigmas
     """the noise that a filter may believe"""
     shared: FloatArray
-    """(8,) see `window.SHARED`"""
+    """(8,) see `window_terms.SHARED`"""
     deviation: FloatArray
     """(8,) standard errors, from the spread between windows where that is larger than what each claims"""
     windows: int
@@ -79,10 +80,7 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     shared = [np.zeros(SHARED)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = [
-            fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, common, iterations=1)
-            for (data, poses, points), common in zip(windows, shared, strict=True)
-        ]
+        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, iterations=1)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas)
@@ -102,9 +100,9 @@ def half_cost(sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas:
     """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
     whiten = np.repeat([sigmas.linear, sigmas.angular], 3)
     total = 0.0
-    for data, poses, points in _windows(sequence, odometry, twist, _spread(sequence.n_frames)):
-        start = np.zeros(SHARED)
-        fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, sigmas, start, iterations=5)
+    windows = _windows(sequence, odometry, twist, _spread(sequence.n_frames))
+    start = [np.zeros(SHARED)] * len(windows)
+    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, iterations=5):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
     return total
 
@@ -131,32 +129,38 @@ def _unbroken(odometry: Odometry) -> list[Span]:
     return spans[:MAX_UNBROKEN]
 
 
-def _windows(
-    sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]
-) -> list[tuple[WindowData, FloatArray, FloatArray]]:
+def _windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]) -> list[Window]:
     """Data, initial poses and initial points of each window that has enough observations."""
     o, dt = sequence.observations, sequence.dt
     chain = chains(odometry, o.landmark, o.frame)
     known = odometry.known[:, None, None]
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
-    windows = []
+    starts, before = o.frame_starts(sequence.n_frames), 0
+    parts: list[tuple[WindowData, FloatArray]] = []
+    sights, views, rows = [], [], []
     for start, size in spans:
-        chosen = np.flatnonzero((chain >= 0) & (o.frame >= start) & (o.frame < start + size))
+        chosen = np.arange(starts[start], starts[start + size])
+        chosen = chosen[chain[chosen] >= 0]
         _, row, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
         chosen = chosen[length[row] >= MIN_TRACK]
         if len(chosen) < MIN_OBSERVATIONS:
             continue
         intervals = slice(start, start + size - 1)
         poses = se3.compose(step[intervals])
-        _, row = np.unique(chain[chosen], return_inverse=True)
+        row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
-        world_T_cam = (poses @ sequence.imu_T_cam)[frame]
-        points = triangulate_tracks(
-            sequence.camera, world_T_cam, row.astype(np.int64), o.pixel[chosen], int(row.max()) + 1, 1.0, huber=2.5
-        ).position
-        data = WindowData(frame, row.astype(np.int64), three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
-        windows.append((data, poses, points))
-    return windows
+        data = WindowData(frame, row, three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        parts.append((data, poses))
+        sights.append(chosen)
+        views.append((poses @ sequence.imu_T_cam)[frame])
+        rows.append(row + before)
+        before += int(row.max()) + 1
+    if not parts:
+        return []
+    pixel, row = o.pixel[np.concatenate(sights)], np.concatenate(rows)
+    points = triangulate_tracks(sequence.camera, np.concatenate(views), row, pixel, before, 1.0, huber=2.5).position
+    ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
+    return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]
 
 
 def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:

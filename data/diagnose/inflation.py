@@ -13,7 +13,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..sequence import Sequence
-from .window import SCALE, TURN, Sigmas, WindowData, fit_window
+from .window import fit_windows_alike
+from .window_terms import SCALE, TURN, Sigmas, Window, WindowData
 
 LOOSE = 30.0
 """times the velocity noise, with which a window is fitted so that the cameras decide"""
@@ -25,9 +26,6 @@ LASTING = 1.5
 MAX_FACTOR = 20.0
 CHI_SQUARE_6_MEDIAN = 5.3481
 ITERATIONS = 4
-
-Window = tuple[WindowData, FloatArray, FloatArray]
-"""data, poses (W, 4, 4) and points (m, 3)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,47 +45,43 @@ class Inflation:
 def inflation_of(sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: Sigmas) -> Inflation:
     """From windows without gaps; `shared` is what they agree on, `sigmas` the noise as it seems within them."""
     loose = Sigmas(sigmas.pixel, LOOSE * sigmas.linear, LOOSE * sigmas.angular)
-    halves = _factor(
-        [
-            (*_between_halves(sequence, window, loose, shared), np.zeros((6, 6)))
-            for window in windows
-            if len(window[2]) >= 2 * MIN_LANDMARKS
-        ]
-    )
+    pairs = [window for window in windows if len(window[2]) >= 2 * MIN_LANDMARKS]
+    ends = _ends(sequence, [_half(window, parity) for window in pairs for parity in (0, 1)], loose, shared)
+    halves = _factor([_between(*both) for both in zip(ends[::2], ends[1::2], strict=True)])
     by_cameras, by_velocities = [], []
-    for data, poses, points in windows:
-        if len(points) >= MIN_LANDMARKS:
-            seen, C = _end(sequence, data, poses, points, loose, shared)
-            driven, C_driven = _driven(data, shared, sigmas)
-            gap = se3.log(se3.inverse(seen) @ driven)
-            by_cameras.append((gap, C, C_driven))
-            by_velocities.append((gap, C_driven, halves**2 * C))
+    enough = [window for window in windows if len(window[2]) >= MIN_LANDMARKS]
+    for (data, _, _), (seen, C) in zip(enough, _ends(sequence, enough, loose, shared), strict=True):
+        driven, C_driven = _driven(data, shared, sigmas)
+        gap = se3.log(se3.inverse(seen) @ driven)
+        by_cameras.append((gap, C, C_driven))
+        by_velocities.append((gap, C_driven, halves**2 * C))
     if halves > LASTING:
         return Inflation(halves, max(halves, _factor(by_cameras)))
     return Inflation(halves, halves, _factor(by_velocities))
 
 
-def _between_halves(
-    sequence: Sequence, window: Window, loose: Sigmas, shared: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """How far apart even and odd landmarks have the last pose (6,), and the covariance of that for white noise."""
+End = tuple[FloatArray, FloatArray]
+"""pose (4, 4) and covariance (6, 6) of the last frame of a window"""
+
+
+def _between(one: End, other: End) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """How far apart two halves of the tracks have the last pose (6,), and the covariance of that for white noise."""
+    return se3.log(se3.inverse(one[0]) @ other[0]), one[1] + other[1], np.zeros((6, 6))
+
+
+def _half(window: Window, parity: int) -> Window:
+    """That of the even or the odd landmarks."""
     data, poses, points = window
-    ends = [_end(sequence, _half(data, parity), poses, points[parity::2], loose, shared) for parity in (0, 1)]
-    (one, C_one), (other, C_other) = ends
-    return se3.log(se3.inverse(one) @ other), C_one + C_other
-
-
-def _half(data: WindowData, parity: int) -> WindowData:
     chosen = data.row % 2 == parity
-    return WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
+    half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
+    return half, poses, points[parity::2]
 
 
-def _end(
-    sequence: Sequence, data: WindowData, poses: FloatArray, points: FloatArray, loose: Sigmas, shared: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Pose (4, 4) and covariance (6, 6) of the last frame, from the tracks."""
-    fit = fit_window(sequence.camera, sequence.imu_T_cam, data, poses, points, loose, shared, ITERATIONS)
-    return fit.poses[-1], fit.last_covariance
+def _ends(sequence: Sequence, windows: list[Window], loose: Sigmas, shared: FloatArray) -> list[End]:
+    """Where each window ends, from the tracks."""
+    common = [shared] * len(windows)
+    fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS)
+    return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 
 def _driven(data: WindowData, shared: FloatArray, sigmas: Sigmas) -> tuple[FloatArray, FloatArray]:

@@ -1,10 +1,11 @@
 """Pairs of observations of one landmark in neighbouring frames: all that visual odometry needs of a recording."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, StereoCamera, disparity
+from fgbaseline.geometry import FloatArray, disparity
 
 from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
@@ -13,6 +14,8 @@ MIN_DISPARITY = 1.0
 """px"""
 MAX_ROW_MISMATCH = 3.0
 """px, |vL - vR|"""
+BLOCK = 8000
+"""links: few enough for their arrays to stay in a processor's cache while they are computed with"""
 REPEATED_SHARE = 0.8
 """of the links of an interval, from which on its tracks count as copied"""
 
@@ -29,8 +32,6 @@ class Links:
     """(n,) k"""
     point: FloatArray
     """(n, 3) m, the landmark in the left camera's frame at k, from its own disparity"""
-    point_covariance: FloatArray
-    """(n, 3, 3) m^2 for a pixel deviation of 1 px in each of the four rows"""
     pixel: FloatArray
     """(n, 3) uL, uR and (vL + vR) / 2 at k + 1, px"""
 
@@ -40,6 +41,15 @@ class Links:
     def select(self, chosen: BoolArray | IntArray) -> "Links":
         """The links where `chosen` is true, or those at increasing indices."""
         return Links(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+    def blocks(self, size: int = BLOCK) -> Iterator[slice]:
+        """Slices of about `size` links, each with all those of its frames."""
+        ends = np.searchsorted(self.frame, self.frame[size - 1 :: size], side="right").tolist()
+        start = 0
+        for end in (*ends, len(self)):
+            if end > start:
+                yield slice(start, end)
+                start = end
 
 
 def sound(sequence: Sequence) -> BoolArray:
@@ -81,13 +91,11 @@ def links_of(sequence: Sequence) -> Links:
     use = sound(sequence)
     chosen = use[before] & use[after] & ~repeated(sequence)[o.frame[before]]
     before, after = before[chosen], after[chosen]
-    point = sequence.camera.triangulate(o.pixel[before])
     return Links(
         before=before,
         after=after,
         frame=o.frame[before],
-        point=point,
-        point_covariance=np.asarray(np.linalg.inv(point_information(sequence.camera, point)), dtype=np.float64),
+        point=sequence.camera.triangulate(o.pixel[before]),
         pixel=three_rows(o.pixel[after]),
     )
 
@@ -95,15 +103,3 @@ def links_of(sequence: Sequence) -> Links:
 def three_rows(pixel: FloatArray) -> FloatArray:
     """(..., 3) uL, uR and (vL + vR) / 2 of observations (..., 4)."""
     return np.stack([pixel[..., 0], pixel[..., 2], 0.5 * (pixel[..., 1] + pixel[..., 3])], axis=-1)
-
-
-def three_row_jacobian(camera: StereoCamera, point: FloatArray) -> FloatArray:
-    """(..., 3, 3) derivative of `three_rows` of a projected point (..., 3)."""
-    return camera.jacobian(point)[..., [0, 2, 1], :]
-
-
-def point_information(camera: StereoCamera, point: FloatArray) -> FloatArray:
-    """(..., 3, 3) 1/m^2: what one stereo observation with 1 px in each of its four rows tells of a point (..., 3)."""
-    J = three_row_jacobian(camera, point)
-    weighted = np.swapaxes(J, -1, -2) * np.array([1.0, 1.0, 2.0])
-    return np.asarray(weighted @ J, dtype=np.float64)

@@ -7,6 +7,7 @@ of the second frame, each whitened by its own noise and by that of the point it 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,16 +15,12 @@ from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
 from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
-from .links import Links, links_of, three_row_jacobian, three_rows
+from .hypotheses import NEAREST, TRUNCATION, best_hypotheses
+from .links import Links, links_of
 
-HYPOTHESES = 48
-"""per pair of frames; with half of the links wrong, one of them is right with probability 0.998"""
-TRUNCATION = 16.0
-"""of a squared whitened residual of three rows"""
 MIN_LINKS = 6
 """per pair of frames, for a motion to be told"""
 REFINEMENTS = 12
-SEED = 20260
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,24 +57,20 @@ def odometry(sequence: Sequence) -> Odometry:
     count = np.bincount(links.frame, minlength=n_pairs)
     known = count >= MIN_LINKS
     links = links.select(known[links.frame])
-    M = _best_hypotheses(camera, links, n_pairs, count, known)
-    sigma = 1.0
+    M = best_hypotheses(camera, links, n_pairs, count, known)
+    blocks = [_block(camera, links, chosen) for chosen in links.blocks()]
     for step in range(REFINEMENTS):
-        residual, S, J = _linearised(camera, links, M)
-        squared = _mahalanobis(residual, S)
-        sigma = _bulk_sigma(squared)
+        whitened, squared = _whitened(camera, blocks, M)
         # Geman-McClure, its scale coming down to that of the noise.
-        scale = sigma**2 * max(9.0, 200.0 * 0.5**step)
-        weight = (scale / (scale + squared)) ** 2
-        H, gradient = _normal_equations(residual, S, J, weight, links.frame, n_pairs)
+        scale = _bulk_sigma(squared) ** 2 * max(9.0, 200.0 * 0.5**step)
+        H, gradient = _normal_equations(blocks, whitened, scale / (scale + squared), n_pairs)
         delta = np.zeros((n_pairs, 6))
         delta[known] = np.linalg.solve(H[known] + 1e-9 * np.eye(6), gradient[known][:, :, None])[:, :, 0]
         M = M @ se3.exp(delta)
-    residual, S, J = _linearised(camera, links, M)
-    squared = _mahalanobis(residual, S)
+    whitened, squared = _whitened(camera, blocks, M)
     sigma = _bulk_sigma(squared)
     inlier = squared < TRUNCATION * sigma**2
-    H, _ = _normal_equations(residual, S, J, inlier.astype(np.float64), links.frame, n_pairs)
+    H, _ = _normal_equations(blocks, whitened, inlier.astype(np.float64), n_pairs)
     enough = np.bincount(links.frame[inlier], minlength=n_pairs) >= MIN_LINKS
     known &= enough
     known[known] = np.linalg.cond(H[known]) < 1e12
@@ -96,111 +89,120 @@ def _of_imu(
     return motion, covariance
 
 
-def _best_hypotheses(camera: StereoCamera, links: Links, n_pairs: int, count: IntArray, known: BoolArray) -> FloatArray:
-    """(n_pairs, 4, 4) the motion of least truncated cost among three-link hypotheses and standing still."""
-    rng = np.random.default_rng(SEED)
-    best = np.tile(np.eye(4), (n_pairs, 1, 1))
-    best_cost = _truncated_cost(camera, links, best, n_pairs)
-    start = np.concatenate([[0], np.cumsum(np.where(known, count, 0))])[:-1]
-    after = camera.triangulate(_four_rows(links.pixel))
-    pairs = np.flatnonzero(known)
-    for _ in range(HYPOTHESES):
-        pick = start[pairs, None] + _three_of(rng, count[pairs])
-        M = np.tile(np.eye(4), (n_pairs, 1, 1))
-        M[pairs] = _kabsch(links.point[pick], after[pick])
-        cost = _truncated_cost(camera, links, M, n_pairs)
-        better = cost < best_cost
-        best[better], best_cost[better] = M[better], cost[better]
-    for shift in (1, -1):  # a neighbour's motion is a good guess where few links are right
-        M = np.roll(best, shift, axis=0)
-        cost = _truncated_cost(camera, links, M, n_pairs)
-        better = cost < best_cost
-        best[better], best_cost[better] = M[better], cost[better]
-    return best
+class _Block(NamedTuple):
+    """n links in succession, each coordinate in an array of its own: stacks of small matrices take far longer."""
+
+    chosen: slice
+    """of all links"""
+    pair: IntArray
+    """(n,)"""
+    point: FloatArray
+    """(3, n) m"""
+    pixel: FloatArray
+    """(3, n) px"""
+    by_disparity: FloatArray
+    """(3, n) m/px: the point over its disparity, which is how it moves when that shrinks by one pixel"""
+    by_column: FloatArray
+    """(n,) m/px: how x moves with uL, the disparity kept"""
+    by_row: FloatArray
+    """(n,) m: the deviation of y for 1 px of noise in both vL and vR"""
 
 
-def _three_of(rng: np.random.Generator, count: IntArray) -> IntArray:
-    """(p, 3) three different indices below each count (p,)."""
-    first = rng.integers(0, count)
-    second = rng.integers(0, count - 1)
-    second += second >= first
-    low, high = np.minimum(first, second), np.maximum(first, second)
-    third = rng.integers(0, count - 2)
-    third += third >= low
-    third += third >= high
-    return np.stack([first, second, third], axis=1)
+def _block(camera: StereoCamera, links: Links, chosen: slice) -> _Block:
+    point, pixel = np.ascontiguousarray(links.point[chosen].T), np.ascontiguousarray(links.pixel[chosen].T)
+    return _Block(
+        chosen=chosen,
+        pair=links.frame[chosen],
+        point=point,
+        pixel=pixel,
+        by_disparity=point * (point[2] / (camera.fu * camera.baseline)),
+        by_column=point[2] / camera.fu,
+        by_row=point[2] * (np.sqrt(0.5) / camera.fv),
+    )
 
 
-def _kabsch(points: FloatArray, moved: FloatArray) -> FloatArray:
-    """(p, 4, 4) the rigid motions that take points (p, m, 3) to (p, m, 3) best, nearer points counting more."""
-    weight = 1.0 / (np.linalg.norm(points, axis=2) + np.linalg.norm(moved, axis=2)) ** 2
-    weight /= weight.sum(axis=1, keepdims=True)
-    centre, moved_centre = (weight[:, :, None] * points).sum(axis=1), (weight[:, :, None] * moved).sum(axis=1)
-    covariance = np.einsum("pm,pmi,pmj->pij", weight, moved - moved_centre[:, None], points - centre[:, None])
-    U, _, Vt = np.linalg.svd(covariance)
-    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
-    R = U @ Vt
-    M = np.tile(np.eye(4), (len(points), 1, 1))
-    M[:, :3, :3] = R
-    M[:, :3, 3] = moved_centre - (R @ centre[:, :, None])[:, :, 0]
-    return M
+def _whitened(camera: StereoCamera, blocks: list[_Block], M: FloatArray) -> tuple[list[FloatArray], FloatArray]:
+    """Of each block the Jacobians by delta in M @ exp(delta), [v, w], and the residuals, whitened (3, 7, n); and the
+    squared whitened residuals of all links.
+
+    What whitens a link is the noise of its pixels and that of the point it is predicted from, for 1 px in each row.
+    """
+    R, p = np.ascontiguousarray(np.moveaxis(M[:, :3, :3], 0, 2)), np.ascontiguousarray(M[:, :3, 3].T)
+    whitened = [
+        _whitened_block(camera, block, np.take(R, block.pair, axis=2), np.take(p, block.pair, axis=1))
+        for block in blocks
+    ]
+    return whitened, np.concatenate([np.empty(0), *((A[:, 6] ** 2).sum(axis=0) for A in whitened)])
 
 
-def _truncated_cost(camera: StereoCamera, links: Links, M: FloatArray, n_pairs: int) -> FloatArray:
-    """(n_pairs,) sum of the squared pixel residuals, each truncated; no whitening, for speed."""
-    residual = links.pixel - _predicted(camera, links, M)[0]
-    squared = np.minimum(np.einsum("ni,ni->n", residual, residual), TRUNCATION)
-    return np.asarray(np.bincount(links.frame, weights=squared, minlength=n_pairs), dtype=np.float64)
+def _whitened_block(camera: StereoCamera, links: _Block, R: FloatArray, p: FloatArray) -> FloatArray:
+    x, y, z = links.point
+    moved = R[:, 0] * x + R[:, 1] * y + R[:, 2] * z + p
+    behind = ~(moved[2] > NEAREST)
+    moved[:, behind] = [[0.0], [0.0], [1.0]]
+    near = 1.0 / moved[2]
+    u, v = moved[0] * near, moved[1] * near
+    along, apart = np.empty((3, 4, len(x))), camera.fu * camera.baseline * near
+    along[0, :3] = camera.fu * near * (R[0] - u * R[2])
+    along[1, :3] = along[0, :3] + apart * near * R[2]
+    along[2, :3] = camera.fv * near * (R[1] - v * R[2])
+    along[0, 3] = links.pixel[0] - (camera.fu * u + camera.cu)
+    along[1, 3] = links.pixel[1] - (camera.fu * u + camera.cu - apart)
+    along[2, 3] = links.pixel[2] - (camera.fv * v + camera.cv)
+    along[:, 3, behind] = 1e6
+    whitened = _lowered(_cholesky(_deviations(links, along)), along)
+    A = np.empty((3, 7, len(x)))
+    A[:, :3], A[:, 6] = whitened[:, :3], whitened[:, 3]
+    A[:, 3] = y * A[:, 2] - z * A[:, 1]
+    A[:, 4] = z * A[:, 0] - x * A[:, 2]
+    A[:, 5] = x * A[:, 1] - y * A[:, 0]
+    return A
 
 
-def _predicted(camera: StereoCamera, links: Links, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Predicted rows (n, 3), infinite behind the camera, and the moved points (n, 3)."""
-    moved = se3.transform(M[links.frame], links.point)
-    with np.errstate(all="ignore"):
-        rows = three_rows(camera.project(moved))
-    rows[~(moved[:, 2] > 0.1)] = np.inf
-    return rows, moved
+def _deviations(links: _Block, along: FloatArray) -> FloatArray:
+    """(3, 3, n) B: B B^T is the covariance of predicted rows, whose derivatives by the point are along[:, :3]."""
+    B = np.empty((3, 3, along.shape[2]))
+    B[:, 1] = (along[:, :3] * links.by_disparity).sum(axis=1)
+    B[:, 0] = along[:, 0] * links.by_column - B[:, 1]
+    B[:, 2] = along[:, 1] * links.by_row
+    return B
 
 
-def _linearised(camera: StereoCamera, links: Links, M: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Residuals (n, 3), their covariances (n, 3, 3) at 1 px and Jacobians (n, 3, 6) of M @ exp(delta), [v, w]."""
-    rows, moved = _predicted(camera, links, M)
-    behind = ~np.isfinite(rows[:, 0])
-    moved[behind] = [0.0, 0.0, 1.0]
-    residual = np.where(behind[:, None], 1e6, links.pixel - rows)
-    J = three_row_jacobian(camera, moved) @ M[links.frame, :3, :3]
-    S = J @ links.point_covariance @ np.swapaxes(J, 1, 2) + np.diag([1.0, 1.0, 0.5])
-    skew = np.zeros((len(links), 3, 3))
-    x, y, z = links.point.T
-    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -z, y, -x
-    skew -= np.swapaxes(skew, 1, 2)
-    return residual, S, np.concatenate([J, -J @ skew], axis=2)
+def _cholesky(B: FloatArray) -> FloatArray:
+    """(6, n) the factor of B B^T + diag(1, 1, 1/2), row after row."""
+    a, b, c = B
+    l00 = np.sqrt((a * a).sum(axis=0) + 1.0)
+    l10, l20 = (a * b).sum(axis=0) / l00, (a * c).sum(axis=0) / l00
+    l11 = np.sqrt((b * b).sum(axis=0) + 1.0 - l10**2)
+    l21 = ((b * c).sum(axis=0) - l20 * l10) / l11
+    l22 = np.sqrt((c * c).sum(axis=0) + 0.5 - l20**2 - l21**2)
+    return np.stack([l00, l10, l11, l20, l21, l22])
+
+
+def _lowered(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """(3, k, n) the rows (3, k, n) multiplied by the inverse of the factor."""
+    l00, l10, l11, l20, l21, l22 = factor
+    first = rows[0] / l00
+    second = (rows[1] - l10 * first) / l11
+    return np.stack([first, second, (rows[2] - l20 * first - l21 * second) / l22])
 
 
 def _normal_equations(
-    residual: FloatArray, S: FloatArray, J: FloatArray, weight: FloatArray, pair: IntArray, n_pairs: int
+    blocks: list[_Block], whitened: list[FloatArray], factor: FloatArray, n_pairs: int
 ) -> tuple[FloatArray, FloatArray]:
-    """(n_pairs, 6, 6) and (n_pairs, 6): J^T S^-1 J and J^T S^-1 r summed over each pair's links."""
-    half = np.linalg.inv(np.linalg.cholesky(S)) * np.sqrt(weight)[:, None, None]
-    A = np.concatenate([half @ J, half @ residual[:, :, None]], axis=2)
-    products = np.swapaxes(A, 1, 2) @ A
-    starts = np.searchsorted(pair, np.arange(n_pairs))
-    present = np.bincount(pair, minlength=n_pairs) > 0
-    sums = np.zeros((n_pairs, 7, 7))
-    if len(pair):
-        sums[present] = np.add.reduceat(products, starts[present], axis=0)
-    return sums[:, :6, :6], sums[:, :6, 6]
-
-
-def _mahalanobis(residual: FloatArray, S: FloatArray) -> FloatArray:
-    solved = np.linalg.solve(S, residual[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("ni,ni->n", residual, solved), dtype=np.float64)
+    """(n_pairs, 6, 6) and (n_pairs, 6): J^T J and J^T r summed over each pair's links, their rows times `factor`."""
+    H, gradient = np.zeros((n_pairs, 6, 6)), np.zeros((n_pairs, 6))
+    for block, A in zip(blocks, whitened, strict=True):
+        A = A * factor[block.chosen]
+        starts = np.flatnonzero(np.diff(block.pair, prepend=-1))
+        present = block.pair[starts]
+        for i in range(6):
+            sums = np.add.reduceat((A[:, i : i + 1] * A[:, i:]).sum(axis=0), starts, axis=1).T
+            H[present, i, i:] = H[present, i:, i] = sums[:, :-1]
+            gradient[present, i] = sums[:, -1]
+    return H, gradient
 
 
 def _bulk_sigma(squared: FloatArray) -> float:
     """px: the pixel deviation at which the median squared residual of three rows is that of chi-square (2.366)."""
     return float(np.sqrt(np.median(squared) / 2.366)) if len(squared) else 1.0
-
-
-def _four_rows(rows: FloatArray) -> FloatArray:
-    return rows[:, [0, 2, 1, 2]]

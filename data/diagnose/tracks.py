@@ -10,9 +10,9 @@ from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
 from ..track_mask import MaskSettings
 from .diagnosis import Diagnosis
+from .hypotheses import TRUNCATION
 from .links import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, sound
-from .odometry import TRUNCATION
-from .repair import repair
+from .repair import Repaired, repair
 
 BURST = 1.0 / 3.0
 """share of the links of an interval that contradict its motion, from which on it is a burst"""
@@ -71,8 +71,8 @@ class Tracks:
         return np.asarray(self.usable < MIN_USABLE, dtype=np.bool_)
 
 
-def track_state(diagnosis: Diagnosis) -> Tracks:
-    """Counts what the tracks of a diagnosed recording are like."""
+def track_state(diagnosis: Diagnosis, repaired: Repaired | None = None) -> Tracks:
+    """Counts what the tracks of a diagnosed recording are like; `repaired` is `repair(diagnosis, MaskSettings())`."""
     sequence = diagnosis.sequence
     o, n = sequence.observations, sequence.n_frames - 1
     apart = disparity(o.pixel)
@@ -85,7 +85,8 @@ def track_state(diagnosis: Diagnosis) -> Tracks:
         links = np.bincount(odometry.links.frame[told], minlength=n)
         wrong = np.bincount(odometry.links.frame[outlier], minlength=n)
         moving = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier)
-        left = told & _left(diagnosis, odometry.links.before, odometry.links.after)
+        repaired = repaired or repair(diagnosis, MaskSettings())
+        left = told & _left(sequence, repaired, odometry.links.before, odometry.links.after)
         after = float(outlier[left].mean()) if left.any() else 0.0
         moving_after = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier & left)
     return Tracks(
@@ -124,10 +125,9 @@ def _moving(landmark: IntArray, frame: IntArray, outlier: BoolArray) -> int:
     return len(np.unique(landmark[outlier & long_enough[run]]))
 
 
-def _left(diagnosis: Diagnosis, before: IntArray, after: IntArray) -> BoolArray:
+def _left(sequence: Sequence, repaired: Repaired, before: IntArray, after: IntArray) -> BoolArray:
     """(n,) links of the recording whose two observations are still one track's once it is repaired and masked."""
-    repaired = repair(diagnosis, MaskSettings())
-    o, now = diagnosis.sequence.observations, repaired.sequence.observations
+    o, now = sequence.observations, repaired.sequence.observations
     # The repair gives observations other landmarks, and with them another order within their frame.
     was, is_now = (np.lexsort((*x.pixel.T, x.frame)) for x in (o, now))
     excluded, landmark = np.empty(len(o), np.uint8), np.empty(len(o), np.int64)

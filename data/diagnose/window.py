@@ -4,55 +4,20 @@ Dense and exact: landmarks are eliminated by the Schur complement, poses are few
 cannot, residuals with the right number of degrees of freedom, so that noise can be told from error.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
-from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
+from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
-from ..observations import IntArray
-from .links import three_row_jacobian, three_rows
+from .window_system import Landmarks, Reduced, around_intervals, landmark_steps, moved_along, reduced, terms_of
+from .window_terms import SHARED, Joined, MotionTerms, Sigmas, Window, joined, motion_terms, pixel_terms
 
-SHARED = 8
-"""gyroscope bias (3, rad/s), velocity scale minus one, the rotation vector (3, rad) by which the axes of the recorded
-velocities are turned against those of imu_T_cam: recorded = [(1 + s) exp(phi) v, exp(phi) w + b]; and the disparity
-offset d (px) by which uR is recorded too far to the right, all disparities too small: recorded uR = uR + d"""
-SCALE = 3
-"""of the shared parameters"""
-TURN = slice(4, 7)
-"""of the shared parameters"""
-OFFSET = 7
-"""of the shared parameters"""
+TOGETHER = 8000
+"""observations, from which on windows are not computed any more together: what they need should stay in a cache"""
 SHARED_PRIOR = np.diag(1.0 / np.array([0.1] * 3 + [0.3] + [0.1] * 3 + [1.0]) ** 2)
 """keeps what a window cannot know (a rotation about the direction of travel) from running away"""
-HUBER = 2.5
-"""sigmas of the norm of an observation's three rows"""
-
-
-@dataclass(frozen=True, slots=True)
-class Sigmas:
-    """Standard deviations of pixel rows (px), linear (m/s) and angular velocity (rad/s) held over an interval."""
-
-    pixel: float
-    linear: float
-    angular: float
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class WindowData:
-    """What a window of W frames with n observations of m landmarks has to explain."""
-
-    frame: IntArray
-    """(n,) 0..W-1"""
-    row: IntArray
-    """(n,) landmark, 0..m-1"""
-    pixel: FloatArray
-    """(n, 3) uL, uR and (vL + vR) / 2"""
-    twist: FloatArray
-    """(W-1, 6) recorded [v, w] of each interval, in the axes of imu_T_cam"""
-    dt: FloatArray
-    """(W-1,) s"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,7 +29,7 @@ class WindowFit:
     points: FloatArray
     """(m, 3) m"""
     shared: FloatArray
-    """(8,) what all windows share: see `SHARED`"""
+    """(8,) what all windows share: see `window_terms.SHARED`"""
     shared_information: FloatArray
     """(8, 8) what the window knows of it, the poses and landmarks being unknown too, without any prior"""
     motion_residual: FloatArray
@@ -79,182 +44,102 @@ class WindowFit:
     """(6, 6) of the right perturbation of the last pose"""
 
 
-def fit_window(
+def fit_windows_alike(
     camera: StereoCamera,
     imu_T_cam: FloatArray,
-    data: WindowData,
-    poses: FloatArray,
-    points: FloatArray,
+    windows: Sequence[Window],
+    sigmas: Sigmas,
+    shared: Sequence[FloatArray],
+    iterations: int,
+) -> list[WindowFit]:
+    """Gauss-Newton of each window by itself; its `shared` (8,) is free too, under a wide prior."""
+    fits: list[WindowFit] = []
+    group: list[int] = []
+    for i in range(len(windows)):
+        group.append(i)
+        if sum(len(windows[j][0].frame) for j in group) >= TOGETHER or i == len(windows) - 1:
+            chosen = [windows[j] for j in group], np.array([shared[j] for j in group])
+            fits += _fitted(camera, imu_T_cam, chosen[0], sigmas, chosen[1], iterations)
+            group = []
+    return fits
+
+
+def _fitted(
+    camera: StereoCamera,
+    imu_T_cam: FloatArray,
+    windows: list[Window],
     sigmas: Sigmas,
     shared: FloatArray,
     iterations: int,
-) -> WindowFit:
-    """Gauss-Newton from poses (W, 4, 4) and points (m, 3); `shared` (8,) is free too, under a wide prior."""
-    cam_T_imu = se3.inverse(imu_T_cam)
-    W, m = len(poses), len(points)
-    n_pose = 6 * (W - 1)
+) -> list[WindowFit]:
+    data, numbers = joined(windows), range(len(windows))
+    poses, points = (np.concatenate(parts) for parts in list(zip(*windows, strict=True))[1:])
     for step in range(iterations + 1):
-        r_pix, J_pose, J_point, weight = _pixel_terms(
-            camera, cam_T_imu, data, poses, points, sigmas.pixel, float(shared[OFFSET])
-        )
-        r_mot, J_before, J_after, J_shared = _motion_terms(data, poses, sigmas, shared)
-        H = np.zeros((n_pose + SHARED, n_pose + SHARED))
-        g = np.zeros(n_pose + SHARED)
-        H[n_pose:, n_pose:] += SHARED_PRIOR
-        g[n_pose:] -= SHARED_PRIOR @ shared
-        _add_motion(H, g, r_mot, J_before, J_after, J_shared, W)
-        Hll, gl, cross = _add_pixels(H, g, data, r_pix, J_pose, J_point, weight, sigmas.pixel, W, m)
-        inverse = np.linalg.inv(Hll + 1e-9 * np.eye(3))
-        flat = cross.reshape(n_pose + 1, 3 * m)
-        eliminated = np.swapaxes(np.swapaxes(cross, 0, 1) @ inverse, 0, 1).reshape(n_pose + 1, 3 * m)
-        with_offset = np.append(np.arange(n_pose), n_pose + OFFSET)
-        H[np.ix_(with_offset, with_offset)] -= eliminated @ flat.T
-        g[with_offset] -= eliminated @ gl.reshape(-1)
+        pixels = pixel_terms(camera, imu_T_cam, data, poses, points, sigmas.pixel, shared)
+        motions = motion_terms(data, poses, sigmas, shared)
+        landmarks, frames = terms_of(data, pixels, motions, sigmas.pixel)
+        systems = [reduced(data, i, landmarks, frames, pixels.turn) for i in numbers]
+        for system, common in zip(systems, shared, strict=True):
+            system.H[-SHARED:, -SHARED:] += SHARED_PRIOR
+            system.g[-SHARED:] -= SHARED_PRIOR @ common
         if step == iterations:
             break
-        delta = np.linalg.solve(H, g)
-        dx = delta[:n_pose].reshape(W - 1, 6)
-        dl = (inverse @ (gl - (delta[with_offset] @ flat).reshape(m, 3))[:, :, None])[:, :, 0]
-        poses = np.concatenate([poses[:1], poses[1:] @ se3.exp(dx)])
-        points = points + dl
-        shared = shared + delta[n_pose:]
-    covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-    redundancy = _motion_redundancy(covariance, J_before, J_after, J_shared, W)
-    squared = weight * np.einsum("ni,ni->n", r_pix, r_pix)
-    absorbed = n_pose + 3 * m + SHARED
-    dof = 3.0 * len(data.frame) + 6.0 * (W - 1) - absorbed - float(redundancy.sum())
-    scale = np.repeat([sigmas.linear, sigmas.angular], 3)
-    return WindowFit(
-        poses=poses,
-        points=points,
-        shared=shared,
-        shared_information=np.linalg.inv(covariance[n_pose:, n_pose:]) - SHARED_PRIOR,
-        motion_residual=r_mot * scale,
-        motion_redundancy=redundancy,
-        pixel_squared=squared,
-        degrees_of_freedom=dof,
-        last_covariance=covariance[n_pose - 6 : n_pose, n_pose - 6 : n_pose],
-    )
+        poses, points, shared = _stepped(data, systems, landmarks, poses, points, shared)
+    covariances = [np.asarray(np.linalg.inv(system.H), dtype=np.float64) for system in systems]
+    redundancy = _redundancy(data, motions, np.concatenate([around_intervals(C) for C in covariances]))
+    residual = motions.residual * np.repeat([sigmas.linear, sigmas.angular], 3)
+    squared = pixels.weight * (pixels.residual**2).sum(axis=0)
+    return [_fit(data, i, covariances[i], poses, points, shared[i], residual, redundancy, squared) for i in numbers]
 
 
-def _pixel_terms(
-    camera: StereoCamera,
-    cam_T_imu: FloatArray,
-    data: WindowData,
+def _stepped(
+    data: Joined,
+    systems: list[Reduced],
+    landmarks: Landmarks,
     poses: FloatArray,
     points: FloatArray,
-    sigma: float,
-    offset: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Whitened residuals (n, 3), Jacobians (n, 3, 6) by the pose and (n, 3, 3) by the point, kernel weights (n,)."""
-    imu_T_world = se3.inverse(poses)[data.frame]
-    s = se3.transform(imu_T_world, points[data.row])
-    p_cam = se3.transform(cam_T_imu, s)
-    whiten = np.array([1.0, 1.0, np.sqrt(2.0)]) / sigma
-    front = p_cam[:, 2] > 0.3
-    p_cam[~front] = [0.0, 0.0, 1.0]
-    J = three_row_jacobian(camera, p_cam) @ cam_T_imu[:3, :3] * whiten[:, None]
-    residual = (data.pixel - three_rows(camera.project(p_cam)) - [0.0, offset, 0.0]) * whiten
-    norm = np.linalg.norm(residual, axis=1)
-    weight = np.where(front, HUBER / np.maximum(norm, HUBER), 0.0)
-    J_pose = np.concatenate([-J, J @ so3.hat3(s)], axis=2)
-    return residual, J_pose, J @ imu_T_world[:, :3, :3], weight
-
-
-def _motion_terms(
-    data: WindowData, poses: FloatArray, sigmas: Sigmas, shared: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Whitened residuals (W-1, 6), recorded minus that of the poses, and minus their Jacobians: by the pose before and
-    after (6x6 each) and by the shared parameters (6x8)."""
-    whiten = 1.0 / np.repeat([sigmas.linear, sigmas.angular], 3)
-    relative = se3.relative(poses)
-    twist = se3.log(relative) / data.dt[:, None]
-    turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = so3.exp_so3(shared[TURN])
-    turn[:3, :3] *= 1.0 + shared[3]
-    predicted = twist @ turn.T
-    predicted[:, 3:] += shared[:3]
-    # log(exp(xi) exp(d)) = xi + J_r^-1(xi) d, to second order in the small rotation of one interval
-    curly = se3.curly_hat(twist * data.dt[:, None])
-    J_after = turn @ (np.eye(6) + 0.5 * curly + curly @ curly / 12.0) / data.dt[:, None, None]
-    J_before = -J_after @ se3.adjoint(se3.inverse(relative))
-    J_shared = np.zeros((len(twist), 6, SHARED))
-    J_shared[:, 3:, :3] = np.eye(3)
-    J_shared[:, :3, 3] = predicted[:, :3] / (1.0 + shared[3])
-    J_shared[:, :3, TURN] = -so3.hat3(predicted[:, :3])
-    J_shared[:, 3:, TURN] = -so3.hat3(predicted[:, 3:] - shared[:3])
-    residual = (data.twist - predicted) * whiten
-    return residual, J_before * whiten[:, None], J_after * whiten[:, None], J_shared * whiten[:, None]
-
-
-def _add_motion(
-    H: FloatArray, g: FloatArray, r: FloatArray, J_before: FloatArray, J_after: FloatArray, J_shared: FloatArray, W: int
-) -> None:
-    tail = slice(6 * (W - 1), None)
-    for k in range(W - 1):
-        blocks = [(slice(6 * k, 6 * k + 6), J_after[k]), (tail, J_shared[k])]
-        if k > 0:
-            blocks.append((slice(6 * k - 6, 6 * k), J_before[k]))
-        for at, J in blocks:
-            g[at] += J.T @ r[k]
-            for other, J_other in blocks:
-                H[at, other] += J.T @ J_other
-
-
-def _add_pixels(
-    H: FloatArray,
-    g: FloatArray,
-    data: WindowData,
-    r: FloatArray,
-    J_pose: FloatArray,
-    J_point: FloatArray,
-    weight: FloatArray,
-    sigma: float,
-    W: int,
-    m: int,
+    shared: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Adds the blocks of poses and offset; gives the landmarks' blocks (m, 3, 3), gradients (m, 3) and their cross
-    (6(W-1) + 1, m, 3) with the poses and, last, the offset."""
-    J_offset = np.zeros((len(r), 3, 1))
-    J_offset[:, 1] = 1.0 / sigma
-    A = np.concatenate([J_pose, J_offset, J_point, r[:, :, None]], axis=2) * np.sqrt(weight)[:, None, None]
-    products = np.swapaxes(A, 1, 2) @ A
-    by_point = _summed(products[:, 7:10, 7:], data.row, m)
-    by_frame = _summed(products[:, :7][:, :, [0, 1, 2, 3, 4, 5, 6, 10]], data.frame, W)
-    n_pose = 6 * (W - 1)
-    offset = n_pose + OFFSET
-    for k in range(1, W):
-        at = slice(6 * k - 6, 6 * k)
-        H[at, at] += by_frame[k, :6, :6]
-        H[at, offset] += by_frame[k, :6, 6]
-        H[offset, at] += by_frame[k, :6, 6]
-        g[at] += by_frame[k, :6, 7]
-    H[offset, offset] += by_frame[:, 6, 6].sum()
-    g[offset] += by_frame[:, 6, 7].sum()
-    cross = np.zeros((W, 6, m, 3))
-    cross[data.frame, :, data.row, :] = products[:, :6, 7:10]
-    with_offset = _summed(products[:, 6, 7:10], data.row, m)
-    return by_point[:, :, :3], by_point[:, :, 3], np.concatenate([cross[1:].reshape(n_pose, m, 3), with_offset[None]])
+    """Poses, points and shared parameters after a step of each window."""
+    deltas = [np.asarray(np.linalg.solve(system.H, system.g), dtype=np.float64) for system in systems]
+    dx, pull = np.zeros((len(poses), 6)), landmarks.pull.copy()
+    for system, delta, f, p in zip(systems, deltas, data.frames, data.points, strict=True):
+        dx[f.start + 1 : f.stop] = delta[:-SHARED].reshape(-1, 6)
+        pull[:, p] -= moved_along(system, poses[f.start + 1 : f.stop, :3, :3], delta)
+    points = points + landmark_steps(landmarks.factor, pull)
+    return poses @ se3.exp(dx), points, shared + np.array([delta[-SHARED:] for delta in deltas])
 
 
-def _summed(values: FloatArray, index: IntArray, size: int) -> FloatArray:
-    n = len(index)
-    gather = csr_array((np.ones(n), (index, np.arange(n))), shape=(size, n))
-    return np.asarray(gather @ values.reshape(n, -1)).reshape(size, *values.shape[1:])
+def _redundancy(data: Joined, motions: MotionTerms, covariance: FloatArray) -> FloatArray:
+    """(k, 6) 1 - diag(J Sigma J^T) of each whitened motion residual, Sigma (k, 20, 20)."""
+    J = np.concatenate([motions.by_before, motions.by_after, motions.by_shared], axis=2)
+    J[[data.intervals(i).start for i in range(len(data.frames))], :, :6] = 0.0  # the first pose is held
+    return np.asarray(1.0 - ((J @ covariance) * J).sum(axis=2), dtype=np.float64)
 
 
-def _motion_redundancy(
-    covariance: FloatArray, J_before: FloatArray, J_after: FloatArray, J_shared: FloatArray, W: int
-) -> FloatArray:
-    """(W-1, 6) 1 - diag(J Sigma J^T) of each whitened motion residual."""
-    redundancy = np.empty((W - 1, 6))
-    tail = np.arange(6 * (W - 1), 6 * (W - 1) + SHARED)
-    for k in range(W - 1):
-        columns = [np.arange(6 * k, 6 * k + 6), tail]
-        blocks = [J_after[k], J_shared[k]]
-        if k > 0:
-            columns.append(np.arange(6 * k - 6, 6 * k))
-            blocks.append(J_before[k])
-        at, J = np.concatenate(columns), np.concatenate(blocks, axis=1)
-        redundancy[k] = 1.0 - np.einsum("ij,jk,ik->i", J, covariance[np.ix_(at, at)], J)
-    return redundancy
+def _fit(
+    data: Joined,
+    window: int,
+    covariance: FloatArray,
+    poses: FloatArray,
+    points: FloatArray,
+    shared: FloatArray,
+    residual: FloatArray,
+    redundancy: FloatArray,
+    squared: FloatArray,
+) -> WindowFit:
+    """That of one of the windows, out of the arrays of all."""
+    f, o, p, k = data.frames[window], data.observations[window], data.points[window], data.intervals(window)
+    left = float(redundancy[k].sum())
+    return WindowFit(
+        poses=poses[f],
+        points=points[p],
+        shared=shared,
+        shared_information=np.linalg.inv(covariance[-SHARED:, -SHARED:]) - SHARED_PRIOR,
+        motion_residual=residual[k],
+        motion_redundancy=redundancy[k],
+        pixel_squared=squared[o],
+        # 6 rows of each interval stand against the 6 unknowns of a pose
+        degrees_of_freedom=3.0 * (o.stop - o.start) - 3.0 * (p.stop - p.start) - SHARED - left,
+        last_covariance=covariance[-SHARED - 6 : -SHARED, -SHARED - 6 : -SHARED],
+    )
