@@ -2,9 +2,7 @@
 
 from collections.abc import Callable
 
-import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
 from fgbaseline.reports.comparison import Run
 
@@ -13,6 +11,7 @@ from .classes import reprojection_classes
 from .consistency import consistency, three_sigma
 from .errors import divergence, error_to_truth, height
 from .health import nees, time_per_frame
+from .layout import lay_out
 from .paths import path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojections import reprojection_distribution, reprojection_over_time
 from .style import in_style
@@ -54,17 +53,3 @@ def draw(run: Run) -> dict[str, Figure]:
         for figure in figures.values():
             lay_out(figure)
     return figures
-
-
-def lay_out(figure: Figure) -> None:
-    """Places the panels for good, at round positions.
-
-    The solver of constrained layout answers differently in the last digits from one time to the next, and from one
-    drawing of a figure to its next: a figure would not have the same bytes twice.
-    """
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
-    figure.set_layout_engine("none")
-    for axes in figure.axes:
-        axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from matplotlib.figure import Figure
@@ -13,6 +14,8 @@ from .style import in_style
 DPI = 150
 UNDATED: Mapping[str, Mapping[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """metadata without the time of writing"""
+WRITING: Mapping[str, Mapping[str, Any]] = {"png": {"pil_kwargs": {"compress_level": 3}}}
+"""zlib's default makes files 7 % smaller in three times the time"""
 _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 
@@ -31,6 +34,6 @@ def encoded(figure: Figure, form: str) -> bytes:
     if form not in forms:
         stream = BytesIO()
         with in_style():
-            figure.savefig(stream, format=form, dpi=DPI, metadata=UNDATED.get(form, {}))
+            figure.savefig(stream, format=form, dpi=DPI, metadata=UNDATED.get(form, {}), **WRITING.get(form, {}))
         forms[form] = stream.getvalue()
     return forms[form]
