@@ -10,6 +10,9 @@ from matplotlib.transforms import Bbox, blended_transform_factory
 
 from .log_axis import label_with_numbers
 
+HELD = {"figure.autolayout": False, "figure.constrained_layout.use": False}
+"""settings under which nothing gives a figure a layout engine anew, as saving it would"""
+
 
 def lay_out(figure: Figure) -> None:
     """Places panels, titles and the labels of axes for good, at round positions.
@@ -26,7 +29,7 @@ def lay_out(figure: Figure) -> None:
     if engine is not None:
         engine.execute(figure)
     # "none" would leave a layout engine that does nothing, but for which every figure is drawn twice
-    with mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
+    with mpl.rc_context(HELD):
         figure.set_layout_engine(None)
     for axes in figure.axes:
         axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))

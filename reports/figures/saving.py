@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from .layout import HELD
 from .style import in_style
 
 DPI = 150
@@ -33,7 +35,7 @@ def encoded(figure: Figure, form: str) -> bytes:
     forms = _written.setdefault(figure, {})
     if form not in forms:
         stream = BytesIO()
-        with in_style():
+        with in_style(), rc_context(HELD):
             figure.savefig(stream, format=form, dpi=DPI, metadata=UNDATED.get(form, {}), **WRITING.get(form, {}))
         forms[form] = stream.getvalue()
     return forms[form]
