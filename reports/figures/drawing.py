@@ -1,6 +1,7 @@
 """All figures of a run, in the order in which the page shows them."""
 
 from collections.abc import Callable
+from functools import partial
 
 from matplotlib.figure import Figure
 
@@ -39,17 +40,24 @@ def draw(run: Run) -> dict[str, Figure]:
     have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations. Last the
     `three_sigma_NAME` of each that has covariances, where there is truth.
     """
-    if not run.answered:
-        return {}
     with in_style():
-        figures = {"paths_overlaid": paths_overlaid(run), "paths_side_by_side": paths_side_by_side(run)}
-        figures |= {f"path_{result.name}": path_with_landmarks(run, result) for result in run.answered}
-        for draw_one in OVER_TIME:
-            figure = draw_one(run)
-            if figure is not None:
-                figures[draw_one.__name__] = figure
-        bands = {f"three_sigma_{result.name}": three_sigma(run, result) for result in run.answered}
-        figures |= {name: figure for name, figure in bands.items() if figure is not None}
+        drawn = {name: draw_one() for name, draw_one in drawings(run).items()}
+        figures = {name: figure for name, figure in drawn.items() if figure is not None}
         for figure in figures.values():
             lay_out(figure)
     return figures
+
+
+def drawings(run: Run) -> dict[str, Callable[[], Figure | None]]:
+    """What draws each of these figures, within `in_style()` and without layout; each may answer None."""
+    answered = run.answered
+    if not answered:
+        return {}
+    overlaid: dict[str, Callable[[], Figure | None]] = {
+        "paths_overlaid": partial(paths_overlaid, run),
+        "paths_side_by_side": partial(paths_side_by_side, run),
+    }
+    paths = {f"path_{result.name}": partial(path_with_landmarks, run, result) for result in answered}
+    over_time = {draw_one.__name__: partial(draw_one, run) for draw_one in OVER_TIME}
+    bands = {f"three_sigma_{result.name}": partial(three_sigma, run, result) for result in answered}
+    return {**overlaid, **paths, **over_time, **bands}

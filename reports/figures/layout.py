@@ -1,6 +1,7 @@
 """Where everything in a figure stands: found once, then held, however often and in whatever form it is written."""
 
 from collections import defaultdict
+from contextlib import AbstractContextManager
 
 import matplotlib as mpl
 import numpy as np
@@ -9,9 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox, blended_transform_factory
 
 from .log_axis import label_with_numbers
-
-HELD = {"figure.autolayout": False, "figure.constrained_layout.use": False}
-"""settings under which nothing gives a figure a layout engine anew, as saving it would"""
 
 
 def lay_out(figure: Figure) -> None:
@@ -29,12 +27,17 @@ def lay_out(figure: Figure) -> None:
     if engine is not None:
         engine.execute(figure)
     # "none" would leave a layout engine that does nothing, but for which every figure is drawn twice
-    with mpl.rc_context(HELD):
+    with held():
         figure.set_layout_engine(None)
     for axes in figure.axes:
         axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))
         axes.apply_aspect()
     _hold_labels(figure)
+
+
+def held() -> AbstractContextManager[None]:
+    """Within it nothing gives a figure a layout engine anew, as saving it would."""
+    return mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False})
 
 
 def _hold_labels(figure: Figure) -> None:

@@ -5,10 +5,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ..figures.layout import HELD
+from ..figures.layout import held
 from .style import in_style
 
 FORMATS: Final = ("pdf", "svg", "png")
@@ -19,7 +18,7 @@ UNDATED: Mapping[str, Mapping[str, Any]] = {"pdf": {"CreationDate": None}, "svg"
 
 def write(figures: Mapping[str, tuple[Figure, str]], folder: Path, formats: Iterable[str] = FORMATS) -> None:
     """NAME.FORMAT for each figure and format, and captions.json, into an existing folder."""
-    with in_style(), rc_context(HELD):
+    with in_style(), held():
         for name, (figure, _) in figures.items():
             for form in formats:
                 figure.savefig(folder / f"{name}.{form}", dpi=DPI, metadata=dict(UNDATED[form]))
