@@ -23,10 +23,13 @@ from .tables import consistency_series, write_tables
 TRUTH_FILE = "truth.tum"
 
 
-def write_run(run: Run, folder: Path) -> Summary:
-    """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary."""
+def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
+    """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary.
+
+    `processes` share the drawing of the figures. A caller that is one of several processes at work leaves it at one.
+    """
     (folder / "figures").mkdir()
-    drawn: Mapping[str, Figure] = figures.draw(run)
+    drawn = figures.draw(run) if processes == 1 else figures.draw_and_write(run, processes)
     figures.save(drawn, folder / "figures")
     summary = write_numbers(run, folder)
     write_page(run, summary, folder, drawn)
@@ -53,7 +56,7 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     return summary
 
 
-def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure]) -> None:
+def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.Written]) -> None:
     """`report.html`, with the figures that were drawn."""
     (folder / "report.html").write_text(page.render(run, _as_dict(summary), drawn), encoding="utf-8")
 

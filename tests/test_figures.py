@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.data import Observations
 from fgbaseline.reports import figures
 from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures.layout import lay_out
 from fgbaseline.reports.figures.lettering import plain
 from fgbaseline.reports.figures.palette import OWN
 from fgbaseline.reports.figures.view import TopView
@@ -232,3 +233,47 @@ def test_two_answers_of_one_run_share_a_line_of_time() -> None:
         problem, answer(problem, "isam2", seconds=seconds), answer(problem, "isam2-online", seconds=seconds.copy())
     )
     assert "isam2 and isam2-online" in legend_texts(figures.draw(run)["time_per_frame"])
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((0.05, 300.0), ["0.1", "1", "10", "100"]),
+        ((2e-6, 0.05), ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²"]),
+        ((0.7, 7.0), ["1", "2", "3", "4", "6"]),
+        ((2e5, 1.5e6), ["2×10⁵", "3×10⁵", "4×10⁵", "6×10⁵", "10⁶"]),
+        ((2.9e5, 3.55e5), ["2.9×10⁵", "3×10⁵", "3.1×10⁵", "3.2×10⁵", "3.3×10⁵", "3.4×10⁵", "3.5×10⁵"]),
+    ],
+)
+def test_a_logarithmic_axis_is_labelled_with_numbers_and_powers_where_these_would_be_long(
+    limits: tuple[float, float], expected: list[str]
+) -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    lay_out(figure)
+    axis = axes.yaxis
+    major, minor = (axis.get_majorticklocs(), axis.get_minorticklocs())
+    texts = dict(zip(major, axis.get_major_formatter().format_ticks(list(major)), strict=True))
+    texts |= dict(zip(minor, axis.get_minor_formatter().format_ticks(list(minor)), strict=True))
+    shown = [texts[value] for value in sorted(texts) if limits[0] <= value <= limits[1] and texts[value]]
+    assert shown == expected
+
+
+def test_labels_of_a_column_of_panels_stand_in_one_line() -> None:
+    panels = drawn_standard()["divergence"].axes
+    assert len({axes.yaxis.label.get_position()[0] for axes in panels}) == 1
+
+
+def test_nothing_moves_when_a_figure_is_written(tmp_path: Path) -> None:
+    figure = figures.draw(standard_run())["divergence"]
+
+    def places() -> list[object]:
+        return [(*axes.get_position().bounds, axes.yaxis.label.get_position()) for axes in figure.axes]
+
+    before = places()
+    for form in ("png", "svg"):
+        figures.save({"divergence": figure}, tmp_path, (form,))
+        assert figure.get_layout_engine() is None
+        assert places() == before

@@ -267,6 +267,20 @@ def test_on_paper_there_are_no_controls(opened: Opened, tmp_path: Path) -> None:
     assert len(opened.page.pdf(format="A4")) > 20_000
 
 
+def test_figures_folded_away_are_there_when_unfolded_or_printed(chromium: Any, address: str) -> None:
+    drawn = "() => [...document.images].every(image => image.complete && image.naturalWidth > 0)"
+    unfolded = Opened(chromium, address).page
+    unfolded.eval_on_selector_all("details", "all => all.forEach(details => { details.open = true; })")
+    unfolded.locator("img").first.scroll_into_view_if_needed()
+    unfolded.wait_for_function(drawn)
+    printed = Opened(chromium, address).page
+    assert printed.locator("img").count() > 0
+    printed.pdf(format="A4")
+    printed.wait_for_function(drawn)
+    for page_ in (unfolded, printed):
+        page_.context.close()
+
+
 def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: Any, tmp_path: Path) -> None:
     problem = plain_problem(scene(truth=None))
     alone = answer(problem, "dead-reckoning", covariance=None, seconds=np.empty(0), landmarks=Landmarks.none())

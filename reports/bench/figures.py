@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
-from ..figures.drawing import lay_out
 from ..figures.health import NEES_BOUNDS
+from ..figures.layout import lay_out
 from ..figures.lettering import plain
 from ..figures.palette import colours_of
 from ..figures.style import LETTERS_IN_A_ROW, head, in_style, sheet, swatch

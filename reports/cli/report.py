@@ -30,7 +30,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
     kept, held = job.split(sequence, settings)
 
     # Half a second of imports: bad input is told before.
-    from .. import page
+    from .. import figures, page
     from ..run_folder import write_run
     from .progress import reporter
 
@@ -50,7 +50,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
             told.say(f"{name} failed: {result.estimate.reason}")
     told.say("writing the report")
     with whole_folder(place, force=force, mark=job.MARK) as folder:
-        summary = write_run(run, folder)
+        summary = write_run(run, folder, figures.cores())
         if rerun_file is not None:
             from ..rerun_file import write_rerun
 

@@ -13,8 +13,8 @@ from fgbaseline.geometry import FloatArray
 
 from ..figures.beyond import maps_by_depth
 from ..figures.consistency import three_sigma_of
-from ..figures.drawing import lay_out
 from ..figures.frames import fit_log_or_linear
+from ..figures.layout import lay_out
 from ..figures.lettering import plain
 from ..figures.style import WIDTH, head, in_style, sheet, swatch
 from ..figures.view import TopView
@@ -100,7 +100,6 @@ def errors(comparison: Comparison) -> Figure:
             handles += panel.plot(_seconds(comparison, comparison.results[name]), values, **line(comparison, name))
         panel.set_ylabel(title)
         _fit(panel, column, series)
-    figure.align_ylabels(axes)
     axes[-1].set_xlabel("time, s" if comparison.reference.trajectory.stamped else "frame")
     rivals = [r for r in ranked(comparison) if not r.entry.by_product] or ranked(comparison)
     nearest = [f"{plain(r.name)} {rmse(r):.3g} m" for r in rivals]
@@ -122,7 +121,6 @@ def growth(comparison: Comparison) -> Figure:
             handles += panel.plot(travelled, values, **line(comparison, name))
         panel.set_ylabel(title)
         _fit(panel, column, series)
-    figure.align_ylabels(axes)
     axes[-1].set_xlabel("length of the reference's path so far, m")
     head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure

@@ -3,6 +3,7 @@
 from .diagnosis import draw_diagnosis
 from .drawing import draw
 from .palette import colours
-from .saving import encoded, save
+from .saving import Written, encoded, save
+from .sharing import cores, draw_and_write
 
-__all__ = ["colours", "draw", "draw_diagnosis", "encoded", "save"]
+__all__ = ["Written", "colours", "cores", "draw", "draw_and_write", "draw_diagnosis", "encoded", "save"]

@@ -41,7 +41,6 @@ def consistency(run: Run) -> Figure | None:
         fit_log(panel, series, decades=5.0)
         handles += _expected(panel, name, run)
         panel.set_ylabel(name)
-    figure.align_ylabels(axes)
     time_axis(run, axes)
     head(figure, "Consistency without truth: above the band too sure of itself, below it too timid", handles)
     return figure

@@ -14,7 +14,7 @@ from fgbaseline.data.diagnose.repair import sure_bias
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.geometry import FloatArray
 
-from .drawing import lay_out
+from .layout import lay_out
 from .style import head, in_style, sheet, swatch
 
 SEEN, RECORDED, REPAIRED, WRONG, COPIED = "#111111", "#D55E00", "#0072B2", "#c0392b", "#E69F00"
@@ -69,7 +69,6 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
         handles = handles or lines
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0.0, float(t[-1]))
-    figure.align_ylabels(axes)
     head(figure, f"Angular velocity about the axes of imu_T_cam, averaged over {SMOOTH:g} s", handles)
     return figure
 
@@ -186,7 +185,6 @@ def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
     lower.set_ylim(bottom=0)
     lower.set_xlabel("time, s")
     lower.set_xlim(0.0, float(t[-1]))
-    figure.align_ylabels([upper, lower])
     title = "Tracks: how many, how many wrong" + (", and when they were copied" if len(copied) else "")
     head(figure, title, handles)
     return figure

@@ -1,10 +1,9 @@
 """All figures of a run, in the order in which the page shows them."""
 
 from collections.abc import Callable
+from functools import partial
 
-import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
 from fgbaseline.reports.comparison import Run
 
@@ -13,6 +12,7 @@ from .classes import reprojection_classes
 from .consistency import consistency, three_sigma
 from .errors import divergence, error_to_truth, height
 from .health import nees, time_per_frame
+from .layout import lay_out
 from .paths import path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojections import reprojection_distribution, reprojection_over_time
 from .style import in_style
@@ -40,31 +40,24 @@ def draw(run: Run) -> dict[str, Figure]:
     have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations. Last the
     `three_sigma_NAME` of each that has covariances, where there is truth.
     """
-    if not run.answered:
-        return {}
     with in_style():
-        figures = {"paths_overlaid": paths_overlaid(run), "paths_side_by_side": paths_side_by_side(run)}
-        figures |= {f"path_{result.name}": path_with_landmarks(run, result) for result in run.answered}
-        for draw_one in OVER_TIME:
-            figure = draw_one(run)
-            if figure is not None:
-                figures[draw_one.__name__] = figure
-        bands = {f"three_sigma_{result.name}": three_sigma(run, result) for result in run.answered}
-        figures |= {name: figure for name, figure in bands.items() if figure is not None}
+        drawn = {name: draw_one() for name, draw_one in drawings(run).items()}
+        figures = {name: figure for name, figure in drawn.items() if figure is not None}
         for figure in figures.values():
             lay_out(figure)
     return figures
 
 
-def lay_out(figure: Figure) -> None:
-    """Places the panels for good, at round positions.
-
-    The solver of constrained layout answers differently in the last digits from one time to the next, and from one
-    drawing of a figure to its next: a figure would not have the same bytes twice.
-    """
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
-    figure.set_layout_engine("none")
-    for axes in figure.axes:
-        axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))
+def drawings(run: Run) -> dict[str, Callable[[], Figure | None]]:
+    """What draws each of these figures, within `in_style()` and without layout; each may answer None."""
+    answered = run.answered
+    if not answered:
+        return {}
+    overlaid: dict[str, Callable[[], Figure | None]] = {
+        "paths_overlaid": partial(paths_overlaid, run),
+        "paths_side_by_side": partial(paths_side_by_side, run),
+    }
+    paths = {f"path_{result.name}": partial(path_with_landmarks, run, result) for result in answered}
+    over_time = {draw_one.__name__: partial(draw_one, run) for draw_one in OVER_TIME}
+    bands = {f"three_sigma_{result.name}": partial(three_sigma, run, result) for result in answered}
+    return {**overlaid, **paths, **over_time, **bands}

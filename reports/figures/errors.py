@@ -86,7 +86,6 @@ def _panels(run: Run, tables: Mapping[str, pd.DataFrame], title: str) -> Figure:
         else:
             panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
             fit_signed(run, panel, columns[column], reach)
-    figure.align_ylabels(axes)
     time_axis(run, axes)
     head(figure, title, handles)
     return figure

@@ -45,7 +45,6 @@ def reprojection_over_time(run: Run) -> Figure | None:
     lower.stackplot(t, *counts.values(), colors=colours, linewidth=0, step="post", rasterized=True)
     lower.set_ylabel("matches per frame")
     lower.set_ylim(bottom=0)
-    figure.align_ylabels([upper, lower])
     time_axis(run, [upper, lower])
     bands = [swatch(BANDS[name], name) for name in counts if counts[name].any()]
     head(figure, "Reprojection error by frame, and the matches it rests on", [*handles, *bands])

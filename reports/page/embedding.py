@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from fgbaseline.reports.figures import encoded
+from fgbaseline.reports.figures import Written, encoded
 
 LARGEST_SVG = 200_000
 """bytes, from which on the PNG takes its place"""
@@ -51,15 +51,18 @@ class Picture:
     height: int
 
 
-def picture(name: str, figure: Figure) -> Picture:
+def picture(name: str, figure: Figure | Written) -> Picture:
     """The figure as SVG, or as PNG where that would be too large."""
     svg = encoded(figure, "svg")
     form, content = ("svg+xml", svg) if len(svg) <= LARGEST_SVG else ("png", encoded(figure, "png"))
-    width, height = figure.get_size_inches()
+    if isinstance(figure, Written):
+        title, (width, height) = figure.title, figure.size
+    else:
+        title, (width, height) = str(figure.get_label()), figure.get_size_inches()
     return Picture(
         name=name,
         source=f"data:image/{form};base64,{b64encode(content).decode('ascii')}",
-        title=str(figure.get_label()).replace(r"\$", "$"),
+        title=title.replace(r"\$", "$"),
         caption=CAPTIONS.get(name, ""),
         width=round(100 * width),
         height=round(100 * height),

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data import Event
 from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures import Written
 
 from .charts import TRUTH_LINE
 from .colouring import colour_rules, keys
@@ -43,11 +44,11 @@ REASONS: Mapping[str, str] = {
 }
 
 
-def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure]) -> str:
+def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | Written]) -> str:
     """`report.html`: one file that needs no other and asks for nothing.
 
-    `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` gave. All text
-    that comes from files is escaped.
+    `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
+    `figures.draw_and_write(run)` gave. All text that comes from files is escaped.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
     data = payload(run)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
-from ..figures.drawing import lay_out
+from ..figures.layout import lay_out
 from .beyond import held_out, map_difference
 from .folder import Drawn
 from .over_time import consistency, divergence, error_to_truth, reprojection, time_per_frame

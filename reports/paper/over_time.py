@@ -88,7 +88,6 @@ def _figure(run: Drawn, wanted: list[Panel], without: str | None = None) -> Figu
         if on.get_yscale() == "log":
             _few_ticks(on)
         on.set_ylabel(panel.label)
-    figure.align_ylabels(axes)
     axes[-1].set_xlabel("time, s")
     legend(figure, max(axes, key=lambda on: len(on.get_legend_handles_labels()[0])))
     return figure

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure
 
+from ..figures.layout import held
 from .style import in_style
 
 FORMATS: Final = ("pdf", "svg", "png")
@@ -18,7 +19,7 @@ UNDATED: Mapping[str, Mapping[str, Any]] = {"pdf": {"CreationDate": None}, "svg"
 
 def write(figures: Mapping[str, tuple[Figure, str]], folder: Path, formats: Iterable[str] = FORMATS) -> None:
     """NAME.FORMAT for each figure and format, and captions.json, into an existing folder."""
-    with in_style():
+    with in_style(), held():
         for name, (figure, _) in figures.items():
             for form in formats:
                 figure.savefig(folder / f"{name}.{form}", dpi=DPI, metadata=dict(UNDATED[form]))

@@ -4,7 +4,7 @@ from collections.abc import Sequence as Several
 
 from matplotlib.figure import Figure
 
-from ..figures.drawing import lay_out
+from ..figures.layout import lay_out
 from ..figures.style import in_style
 from .plots import numbered
 from .stages_figure import stages_figure

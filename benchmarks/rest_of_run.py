@@ -1,0 +1,123 @@
+"""What a run takes beside its estimators: `python -m benchmarks.rest_of_run drive.npz --runs 3`.
+
+Each run is a process of its own, so that imports count. What is wanted is asked of all that is not an estimator:
+imports, reading, posing (the diagnosis), comparison, figures, tables and page. Seconds are of the clock on the wall; a
+figure is worth as much as the machine was idle.
+"""
+
+# ruff: noqa: E402
+
+import os
+
+for library in ("OPENBLAS", "OMP", "MKL"):  # as the command line has it
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import click
+
+from benchmarks.measured import Row, table
+
+ESTIMATORS = "dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch"
+WANTED = 8.0
+"""s, of all that is not an estimator"""
+SOLVING = "solving: "
+"""how the names of stages begin that are an estimator's work"""
+
+
+def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
+    """Seconds of each stage of one run in this process, in their order."""
+    taken: dict[str, float] = {}
+
+    @contextmanager
+    def watch(stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        taken[stage] = time.perf_counter() - start
+
+    with watch("imports"):
+        from fgbaseline import ekf, smoother  # noqa: F401
+        from fgbaseline.reports import figures, job
+        from fgbaseline.reports.cli import progress  # noqa: F401
+        from fgbaseline.reports.comparison import compare_all
+        from fgbaseline.reports.run_folder import write_numbers, write_page
+        from fgbaseline.reports.solving import solve_all
+    settings = job.RunSettings(sequence=recording, estimators=estimators)
+    with watch("reading"):
+        sequence = job.read_sequence(settings)
+    with watch("posing"):
+        problem = job.pose_problem(sequence, settings)
+    answers = solve_all(problem, estimators, lambda name: watch(f"{SOLVING}{name}"))
+    with watch("comparison"):
+        run = compare_all(problem, answers, settings.record())
+    with TemporaryDirectory(prefix="fgbaseline-") as place:
+        folder = Path(place)
+        with watch("figures"):
+            (folder / "figures").mkdir()
+            drawn = figures.draw_and_write(run, figures.cores())
+            figures.save(drawn, folder / "figures")
+        with watch("tables"):
+            summary = write_numbers(run, folder)
+        with watch("page"):
+            write_page(run, summary, folder, drawn)
+    return taken
+
+
+def measured(recording: Path, runs: int, estimators: str) -> list[dict[str, float]]:
+    """The stages of so many runs, one after another, each in a process of its own."""
+    root = Path(__file__).resolve().parents[1]
+    command = [sys.executable, "-m", "benchmarks.rest_of_run", str(recording.resolve()), "--estimators", estimators]
+    told = [
+        subprocess.run([*command, "--stages"], stdout=subprocess.PIPE, text=True, check=True, cwd=root).stdout
+        for _ in range(runs)
+    ]
+    return [json.loads(text) for text in told]
+
+
+def rest(taken: Mapping[str, float]) -> float:
+    """Seconds of all that is not an estimator."""
+    return sum(seconds for stage, seconds in taken.items() if not stage.startswith(SOLVING))
+
+
+def rows(recording: Path, runs: int, estimators: str = ESTIMATORS) -> list[Row]:
+    """What is wanted of all that is not an estimator, and each stage with its share of the whole."""
+    every = measured(recording, runs, estimators)
+    whole = statistics.median(sum(taken.values()) for taken in every)
+    rests = [rest(taken) for taken in every]
+    claim = f"`run {recording.name}` beside its estimators"
+    shown = [Row(claim, f"under {WANTED:g} s", *_seconds(rests, whole), statistics.median(rests) < WANTED)]
+    for stage in every[0]:
+        shown.append(Row(stage, "", *_seconds([taken[stage] for taken in every], whole), None))
+    return shown
+
+
+def _seconds(values: list[float], whole: float) -> tuple[str, str]:
+    """Median with its share of the whole, and from the smallest to the largest."""
+    median = statistics.median(values)
+    return f"{median:.2f} s ({median / whole:.0%})", f"{min(values):.2f} to {max(values):.2f} s"
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
+@click.option("--estimators", default=ESTIMATORS, show_default=True, help="Names, by commas.")
+@click.option("--stages", "one", is_flag=True, help="The seconds of one run in this process, as JSON.")
+def main(recording: Path, runs: int, estimators: str, one: bool) -> None:
+    """Time the stages of `fgbaseline run RECORDING`."""
+    if one:
+        click.echo(json.dumps(stages(recording, tuple(estimators.split(",")))))
+        return
+    click.echo(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}\n")
+    click.echo(table(rows(recording, runs, estimators)))
+
+
+if __name__ == "__main__":
+    main()
