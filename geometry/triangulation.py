@@ -16,6 +16,9 @@ from .stereo import StereoCamera, disparity
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-8
 """relative to the point's distance"""
+NEWTON = 1e-2
+"""step, relative to the point's distance, from which on the curvature of the kernel counts: without it a point with
+outliers comes nearer by no more than half with every step, with it far away it may be led astray"""
 DAMPED = 1.0
 """damping from which on a small step may be one that was held back, and is no sign that the point has arrived"""
 FEWER = 0.5
@@ -81,14 +84,15 @@ def triangulate_tracks(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         damping = np.full(len(place), 1e-6)
         sums = _linearised(camera, sights, p, pixel_variance, huber)
-        arrived = np.zeros(len(place), dtype=np.bool_)
+        arrived = near = np.zeros(len(place), dtype=np.bool_)
         for _ in range(MAX_ITERATIONS):
-            step = _damped_step(sums, damping)
+            step = _damped_step(sums, damping, near)
             trial = _linearised(camera, sights, p + step, pixel_variance, huber)
             better = trial[0] <= sums[0]
             p, sums = np.where(better, p + step, p), np.where(better, trial, sums)
-            small = (step * step).sum(axis=0) <= (STEP_TOLERANCE * (1.0 + np.sqrt((p * p).sum(axis=0)))) ** 2
-            arrived |= small & (damping < DAMPED)
+            length = np.sqrt((step * step).sum(axis=0)) / (1.0 + np.sqrt((p * p).sum(axis=0)))
+            small, near = length <= STEP_TOLERANCE, better & (length <= NEWTON)
+            arrived = arrived | (small & (damping < DAMPED))
             damping *= np.where(better, 0.1, 10.0)
             if (arrived | small).all():
                 break
@@ -96,7 +100,7 @@ def triangulate_tracks(
                 _put(position, information, place[arrived], p[:, arrived], sums[:, arrived])
                 left = ~arrived
                 sights, place, p, sums = sights.of(left), place[left], p[:, left], sums[:, left]
-                damping, arrived = damping[left], arrived[left]
+                damping, near, arrived = damping[left], near[left], arrived[left]
     _put(position, information, place, p, sums)
     return Triangulated(position, information)
 
@@ -132,8 +136,8 @@ def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
 def _linearised(
     camera: StereoCamera, sights: _Sights, p: FloatArray, pixel_variance: float, huber: float | None
 ) -> FloatArray:
-    """(10, m) of points p (3, m): cost, then the upper triangle of J^T W J row by row, each row followed by its entry
-    of J^T W r."""
+    """(16, m) of points p (3, m): cost, then the upper triangle of J^T W J row by row, each row followed by its entry
+    of J^T W r, then the upper triangle of what the kernel's curvature takes off J^T W J."""
     axes = sights.axes
     x, y, z = (axes * (p[:, sights.row] - sights.centre)[:, None]).sum(axis=0)
     near = 1.0 / z
@@ -144,9 +148,12 @@ def _linearised(
     squared[far] = np.inf
     if huber is None:
         cost, root = squared, np.full(len(squared), 1.0 / np.sqrt(pixel_variance))
+        flatter = np.zeros(len(squared))
     else:
         norm = np.sqrt(np.maximum(squared, huber**2))
-        cost = np.where(squared > huber**2, 2.0 * huber * norm - huber**2, squared)
+        beyond = squared > huber**2
+        cost = np.where(beyond, 2.0 * huber * norm - huber**2, squared)
+        flatter = np.where(beyond, 1.0 / (huber * norm), 0.0)
         root = np.sqrt(huber / (norm * pixel_variance))
     # The rows of both images have the same derivatives and count as one of twice the weight.
     A, both = np.empty((3, 4, len(z))), np.sqrt(2.0)
@@ -156,17 +163,21 @@ def _linearised(
     A[0, 3], A[1, 3], A[2, 3] = residual[0], residual[2], (residual[1] + residual[3]) / both
     A *= root
     A[:, :, ~np.isfinite(squared)] = 0.0
-    terms = np.empty((10, len(z)))
+    terms = np.empty((16, len(z)))
     terms[0] = cost
     terms[1:5] = (A[:, :1] * A).sum(axis=0)
     terms[5:8] = (A[:, 1:2] * A[:, 1:]).sum(axis=0)
-    terms[8:] = (A[:, 2:3] * A[:, 2:]).sum(axis=0)
+    terms[8:10] = (A[:, 2:3] * A[:, 2:]).sum(axis=0)
+    pull = terms[[4, 7, 9]]
+    along = flatter * pull
+    terms[10:13], terms[13:15], terms[15] = along[0] * pull, along[1] * pull[1:], along[2] * pull[2]
     return np.add.reduceat(terms, sights.start, axis=1)
 
 
-def _damped_step(sums: FloatArray, damping: FloatArray) -> FloatArray:
-    """(3, m) m, by Cholesky's factors."""
-    _, a, b, c, x, d, e, y, f, z = sums
+def _damped_step(sums: FloatArray, damping: FloatArray, near: NDArray[np.bool_]) -> FloatArray:
+    """(3, m) m, by Cholesky's factors; with the kernel's curvature for the points that are near."""
+    a, b, c, d, e, f = sums[[1, 2, 3, 5, 6, 8]] - sums[10:] * near
+    x, y, z = sums[[4, 7, 9]]
     more, least = 1.0 + damping, 1e-12  # no pivot can be less, but by rounding
     l00 = np.sqrt(a * more + least)
     l10, l20, x = b / l00, c / l00, x / l00
