@@ -63,12 +63,14 @@ def triangulate_tracks(
     n_points: int,
     pixel_variance: float,
     huber: float | None = None,
+    tolerance: float = STEP_TOLERANCE,
 ) -> Triangulated:
     """The points that minimise the (Huber) reprojection error of n stereo observations, poses held.
 
     `world_T_cam` (n, 4, 4) is the left camera's pose of each observation, `row` (n,) the point (0..m-1) it sees,
     `pixel` (n, 4) what it measured; `huber` is the kernel's threshold in sigmas of an observation's norm. Starts at
-    the back-projection with the largest disparity; a step that raises a point's cost is refused and damped.
+    the back-projection with the largest disparity; a step that raises a point's cost is refused and damped. A point is
+    done when its step is at most `tolerance` of its distance.
     """
     position, information = np.full((n_points, 3), np.nan), np.zeros((n_points, 3, 3))
     nearest = _nearest_sights(row, pixel, n_points)
@@ -91,7 +93,7 @@ def triangulate_tracks(
             better = trial[0] <= sums[0]
             p, sums = np.where(better, p + step, p), np.where(better, trial, sums)
             length = np.sqrt((step * step).sum(axis=0)) / (1.0 + np.sqrt((p * p).sum(axis=0)))
-            small, near = length <= STEP_TOLERANCE, better & (length <= NEWTON)
+            small, near = length <= tolerance, better & (length <= NEWTON)
             arrived = arrived | (small & (damping < DAMPED))
             damping *= np.where(better, 0.1, 10.0)
             if (arrived | small).all():

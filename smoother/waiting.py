@@ -9,6 +9,9 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
+START_TOLERANCE = 1e-3
+"""of the distance: the last step of a start, which the graph moves further than that; the next would be its square"""
+
 
 @dataclass(frozen=True, slots=True)
 class EntryRule:
@@ -97,6 +100,7 @@ class WaitingLandmarks:
             n,
             problem.pixel_variance,
             None if problem.kernel is None else problem.kernel.threshold,
+            START_TOLERANCE,
         )
         weakest = np.linalg.eigvalsh(points.information)[:, 0]
         finite = np.isfinite(points.position).all(axis=1) & (weakest > 0)
