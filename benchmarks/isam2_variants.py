@@ -1,0 +1,135 @@
+"""What was tried to make iSAM2 faster, and what it does to the answer: `python -m benchmarks.isam2_variants FILE...`.
+
+Each variant answers the same problem in turn. Told are processor time, the share of it in GTSAM's updates, and how far
+final and online paths are from those of the variant that relinearises at every update.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import click
+import gtsam
+import numpy as np
+
+from fgbaseline import data, smoother
+from fgbaseline.data import Estimate, Problem, Status
+from fgbaseline.geometry import FloatArray
+from fgbaseline.smoother import incremental
+from fgbaseline.smoother.incremental import ISAM2Settings
+from fgbaseline.smoother.starts import restricted
+
+from .gtsam_time import INCREMENTAL, gtsam_timed
+
+EVERY = ISAM2Settings(relinearize_skip=1)
+
+
+class PartialCheck(ISAM2Settings):
+    """Looks for variables to relinearise from the root of the tree down, no further than they moved."""
+
+    def params(self) -> gtsam.ISAM2Params:
+        params = super().params()
+        params.enablePartialRelinearizationCheck = True
+        return params
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A way of solving a problem."""
+
+    name: str
+    solve: Callable[[Problem], Estimate]
+
+
+def isam2(settings: ISAM2Settings) -> Callable[[Problem], Estimate]:
+    return lambda problem: smoother.isam2(problem, settings=settings)
+
+
+def landmarks_first(problem: Problem) -> Estimate:
+    with crowds_above(0):
+        return smoother.isam2(problem, settings=EVERY)
+
+
+def keyframes(problem: Problem) -> Estimate:
+    """Every second frame is blind: its pose stays, tied by the velocities."""
+    return smoother.isam2(restricted(problem, problem.mask & (problem.sequence.observations.frame % 2 == 0)))
+
+
+@contextmanager
+def crowds_above(landmarks: int) -> Iterator[None]:
+    before, incremental.CROWD = incremental.CROWD, landmarks
+    try:
+        yield
+    finally:
+        incremental.CROWD = before
+
+
+VARIANTS = (
+    Variant("relinearised at every update", isam2(EVERY)),
+    Variant("at every second", isam2(replace(EVERY, relinearize_skip=2))),
+    Variant("at every third (the default)", isam2(ISAM2Settings())),
+    Variant("at every fifth", isam2(replace(EVERY, relinearize_skip=5))),
+    Variant(
+        "at every one, thresholds 2.5 times as large",
+        isam2(
+            replace(
+                EVERY,
+                **{
+                    name: 2.5 * getattr(EVERY, name)
+                    for name in ("relinearize_position", "relinearize_rotation", "relinearize_landmark")
+                },
+            )
+        ),
+    ),
+    Variant("at every one, checked from the root down", isam2(PartialCheck(relinearize_skip=1))),
+    Variant("at every one, landmarks eliminated before the pose", landmarks_first),
+    Variant("at every one, by QR", isam2(replace(EVERY, careful=True))),
+    Variant("the default, every second frame without observations", keyframes),
+    Variant("landmarks leave: `fixed-lag`", smoother.fixed_lag),
+)
+
+
+def row(variant: Variant, problem: Problem, first: Estimate | None) -> tuple[str, Estimate]:
+    with gtsam_timed() as spent:
+        start = time.process_time()
+        estimate = variant.solve(problem)
+        seconds = time.process_time() - start
+    if estimate.status is Status.FAILED:
+        return f"| {variant.name} | {seconds:.1f} | | failed: {estimate.reason} | |", estimate
+    apart = ["", ""]
+    if first is not None:
+        apart = [_apart(estimate, first), _apart(_online(estimate), _online(first))]
+    share = spent.seconds[INCREMENTAL] / seconds
+    return f"| {variant.name} | {seconds:.1f} | {share:.0%} | {apart[0]} | {apart[1]} |", estimate
+
+
+def _online(estimate: Estimate) -> Estimate | None:
+    return estimate.by_products.get("isam2-online")
+
+
+def _apart(a: Estimate | None, b: Estimate | None) -> str:
+    if a is None or b is None:
+        return ""
+    difference: FloatArray = a.world_T_imu[:, :3, 3] - b.world_T_imu[:, :3, 3]
+    return f"{np.sqrt(np.mean(np.sum(difference**2, axis=1))):.4f}"
+
+
+@click.command()
+@click.argument("recordings", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+def main(recordings: tuple[Path, ...]) -> None:
+    """Print a table for each recording."""
+    for recording in recordings:
+        problem = data.calibrated(data.read(recording))
+        click.echo(f"\n{recording.name}:\n\n| variant | s | in updates | final path, m | online path, m |")
+        click.echo("|---|---|---|---|---|")
+        first: Estimate | None = None
+        for variant in VARIANTS:
+            text, estimate = row(variant, problem, first)
+            click.echo(text)
+            first = first or estimate
+
+
+if __name__ == "__main__":
+    main()
