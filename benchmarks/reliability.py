@@ -1,7 +1,6 @@
 """Every estimator on recordings that none was made for, `python -m benchmarks.reliability`: writes docs/reliability.md.
 
-The recordings, and what is promised of each cell, are those of tests/test_hostile.py. The last of them, 2000 features
-in a frame, takes many minutes and is in no test.
+The recordings, and what is promised of each cell, are those of tests/test_hostile.py.
 """
 
 # ruff: noqa: E402
@@ -17,7 +16,7 @@ from pathlib import Path
 import click
 
 from fgbaseline.reports.comparison import Result, Run
-from tests.hostile import CROWDED, ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
+from tests.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
 
 PLACE = Path("docs/reliability.md")
 MARK = "<!-- python -m benchmarks.reliability -->"
@@ -41,11 +40,10 @@ def row(recording: Hostile, run: Run) -> str:
 
 
 @click.command()
-@click.option("--without-crowd", is_flag=True, help="Leave out the recording with 2000 features in a frame.")
-def main(without_crowd: bool) -> None:
+def main() -> None:
     """Solve every recording and write the table."""
     lines = [MARK, "", f"| recording | {' | '.join(ESTIMATORS)} | reference |", "|" + "---|" * (len(ESTIMATORS) + 2)]
-    for recording in (*RECORDINGS, *(() if without_crowd else (CROWDED,))):
+    for recording in RECORDINGS:
         start = time.monotonic()
         lines.append(row(recording, solved(recording)))
         click.echo(f"{recording.name}: {time.monotonic() - start:.0f} s", err=True)

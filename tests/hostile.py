@@ -214,7 +214,7 @@ RECORDINGS = (
         "50 m cut out, stamps as if nothing was",
         cut,
         overconfident=ESTIMATORS,
-        note="nothing in the recording tells of it but that all tracks end at once",
+        note="nothing in the recording tells of it but that all tracks end at once, which diagnosis and trust say",
     ),
     Hostile(
         "one velocity sample of 500 m/s",
@@ -223,8 +223,12 @@ RECORDINGS = (
         note="the diagnosis takes it for noise and a turned camera; the reference is said to be untrusted",
     ),
     Hostile("one landmark only", one_landmark, overconfident=()),
+    Hostile(
+        "2000 features in a frame",
+        crowd,
+        note="over three frames; `joint-ekf` lets 512 of them into its state and says how many observations that left out",
+    ),
 )
-CROWDED = Hostile("2000 features in a frame", crowd)
 
 
 def solved(recording: Hostile) -> Run:

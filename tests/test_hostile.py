@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline import data
+from fgbaseline import compare, data, smoother
 from fgbaseline.compare import Verdict
 from fgbaseline.data.diagnose import findings_of, to_json, track_state
 from fgbaseline.geometry import InputError
@@ -73,6 +73,17 @@ def test_the_report_is_written_by_the_command_and_diagnose_ends_well(tmp_path: P
     assert told.returncode == (2 if failed else 1), told.stderr
     assert "Traceback" not in told.stderr
     assert data.read_repairs(tmp_path / "repairs.toml")
+
+
+def test_a_cut_cannot_be_seen_but_that_it_may_be_there_is_said() -> None:
+    sequence = cut()
+    diagnosis = data.diagnose(sequence)
+    (finding,) = [f for f in findings_of(diagnosis, track_state(diagnosis)) if f.code == "cuts"]
+    assert "30" in finding.sentence
+    problem = data.calibrated(sequence)
+    reasons = compare.trust(problem, smoother.isam2(problem)).reasons
+    assert any("over 1 of 47 intervals no landmark ties" in reason for reason in reasons)
+    assert not any(f.code == "cuts" for f in data.calibrated(base()).findings)
 
 
 def test_the_recordings_are_what_they_are_said_to_be() -> None:
