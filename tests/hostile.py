@@ -226,7 +226,7 @@ RECORDINGS = (
     Hostile(
         "2000 features in a frame",
         crowd,
-        note="over three frames; `joint-ekf` lets 512 of them into its state and says how many observations that left out",
+        note="over three frames; `joint-ekf` lets 512 of them into its state and tells what that left out",
     ),
 )
 
