@@ -116,9 +116,13 @@ def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite()
     ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
     np.testing.assert_allclose(printed, ours, rtol=0.0, atol=1e-9 * sigma.max())
     innovation.jacobian[0] *= 1e8
-    ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
-    assert np.linalg.eigvalsh(0.5 * (printed + printed.T))[0] < 0.0
+    ours = pose_posterior(sigma, innovation, weight).covariance
     assert np.linalg.eigvalsh(ours)[0] > -1e-16 * sigma.max()
+    try:
+        printed = printed_covariance(sigma, innovation, weight)
+    except np.linalg.LinAlgError:
+        return  # on some processors rounding leaves H Sigma H^T + V no inverse at all
+    assert np.linalg.eigvalsh(0.5 * (printed + printed.T))[0] < 0.0
 
 
 @given(SEEDS)
