@@ -1,6 +1,6 @@
 """Repairs set by hand in a TOML file, in place of what the diagnosis finds."""
 
-import math
+import sys
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
 
@@ -21,7 +21,8 @@ def read_repairs(path: FilePath) -> "Repairs":
 
 
 def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    # An integer too large for a double must not be turned into one to be told from infinity.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _axes(value: object) -> str:

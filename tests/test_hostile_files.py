@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from fgbaseline import data
 from fgbaseline.data.exchange import read_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.measured import read_measured
+from fgbaseline.reports.checking.measured import read_measured, value_of
 from fgbaseline.reports.comparing.run_folder import read_run_folder
 
 from .readers import Reader, archive, course_arrays, npy, npz, problem_words, readers
@@ -151,3 +151,11 @@ def test_a_run_whose_reference_has_no_name_is_refused(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text(json.dumps(words))
     with pytest.raises(InputError, match="it is not the summary of a run"):
         read_run_folder(tmp_path)
+
+
+def test_an_integer_too_large_for_a_double_is_no_number(tmp_path: Path) -> None:
+    path = tmp_path / "repairs.toml"
+    path.write_text(f"velocity_scale = {'9' * 400}\n")
+    with pytest.raises(InputError, match="it should be a number from"):
+        data.read_repairs(path)
+    assert value_of({"status": "ok", "ate": {"rmse": 10**400}}, "ate.rmse") == (None, "it is not a finite number")

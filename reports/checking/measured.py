@@ -2,7 +2,7 @@
 
 import difflib
 import json
-import math
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,7 +134,7 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     found = _at(estimator, metric)
     if found is _ABSENT:
         return None, "it has no such metric"
-    if isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found):
+    if isinstance(found, int | float) and not isinstance(found, bool) and abs(found) <= sys.float_info.max:
         return float(found), ""
     notes = estimator.get("notes") or {}
     keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
