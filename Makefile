@@ -46,7 +46,8 @@ RECORDINGS ?= $(or $(FGBASELINE_RECORDINGS),../shared/data)
 BENCH_RUNS ?= 3
 BENCH_FLAGS :=
 bench: install
-	$(BIN)/python -m benchmarks.performance --recordings $(RECORDINGS) --runs $(BENCH_RUNS) $(BENCH_FLAGS)
+	$(BIN)/python -m benchmarks.performance --recordings $(RECORDINGS) --runs $(BENCH_RUNS) \
+	  --figure docs/images/growth.png $(BENCH_FLAGS)
 
 lint: install
 	$(BIN)/ruff check .

@@ -22,7 +22,7 @@ import click
 from . import filters, growth, growth_figure, long_run, reading, reference_speed, rest_of_run
 from .measured import Row, table
 
-PLACE, FIGURE = Path("docs/performance.md"), Path("docs/images/growth.png")
+PLACE = Path("docs/performance.md")
 MARK, END = "<!-- python -m benchmarks.performance -->", "<!-- end -->"
 RECORDING = "03.npz"
 QUICK_DRIVE, QUICK_RUN = 450, 100
@@ -75,7 +75,10 @@ def write(text: str) -> None:
 @click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
 @click.option("--quick", is_flag=True, help="Small sizes, for trying: no figure is written, and docs only if --write.")
 @click.option("--write/--no-write", "wanted", default=None, help="Write docs/performance.md.  [default: unless quick]")
-def main(recordings: Path, runs: int, quick: bool, wanted: bool | None) -> None:
+@click.option(
+    "--figure", type=click.Path(dir_okay=False, path_type=Path), help="Where to draw the growth, if anywhere."
+)
+def main(recordings: Path, runs: int, quick: bool, wanted: bool | None, figure: Path | None) -> None:
     """Measure everything, print the table and write it down."""
     told = [machine()]
     recording: Path | None = recordings / RECORDING
@@ -93,9 +96,10 @@ def main(recordings: Path, runs: int, quick: bool, wanted: bool | None) -> None:
     text = "\n\n".join([" ".join(told), table(rows), growth.tables(points, growth.axes(quick))])
     click.echo(text)
     if wanted or (wanted is None and not quick):
-        FIGURE.write_bytes(growth_figure.drawn(points))
         write(text)
-        click.echo(f"\n{PLACE} and {FIGURE} are written", err=True)
+        click.echo(f"\n{PLACE} is written", err=True)
+        if figure is not None:
+            figure.write_bytes(growth_figure.drawn(points))
 
 
 if __name__ == "__main__":

@@ -51,7 +51,13 @@ ELSEWHERE = {
     ),
 }
 """command -> the test that runs it, on other recordings and for a shorter time"""
-NOT_RUN = {"pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet"}
+IDLE = "it measures for half an hour, what only an idle machine can tell"
+NOT_RUN = {
+    "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
+    "make bench": IDLE,
+    "make bench BENCH_FLAGS=--quick": IDLE,
+    "python -m benchmarks.isam2_variants 03.npz 2011_09_26_drive_0036_sync_KLT.mat": IDLE,
+}
 """command -> why no test can run it"""
 SHORTER = {
     "--duration 10 ": "--duration 3 ",
