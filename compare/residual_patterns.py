@@ -47,13 +47,19 @@ def _classified(values: pd.DataFrame, by: str, code: IntArray, names: list[str])
         n=("error", "size"),
         median=("error", "median"),
         mean=("error", "mean"),
-        p95=("error", lambda e: e.quantile(0.95)),
+        p95=("error", _p95),
         u=("u", "mean"),
         v=("v", "mean"),
     )
     result.insert(0, "of", [names[i] for i in result.index])
     result.insert(0, "by", by)
     return result
+
+
+def _p95(errors: "pd.Series[float]") -> float:
+    """The 95 % quantile; infinite, not NaN, where it lies between a finite error and an infinite one."""
+    above = float(errors.quantile(0.95, interpolation="higher"))
+    return above if np.isinf(above) else float(errors.quantile(0.95))
 
 
 def _classes_of(values: ArrayLike, edges: tuple[float, ...]) -> IntArray:

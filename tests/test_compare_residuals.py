@@ -1,12 +1,17 @@
 """Residuals in classes, against chi-square, and of points that moved; maps matched by landmark: known answers."""
 
+import math
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fgbaseline import compare
+from fgbaseline.compare.residual_patterns import _p95
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, se3
@@ -172,3 +177,11 @@ def test_a_world_that_is_turned_as_a_whole_looks_the_same_from_the_camera() -> N
     assert table["distance"].min() > 1.0
     np.testing.assert_allclose(table["seen"], 0.0, atol=1e-9)
     assert table["sigmas"].isna().all()
+
+
+@given(st.lists(st.floats(0.0, 1e6), min_size=1, max_size=40), st.integers(0, 3))
+def test_a_class_with_infinite_errors_has_a_quantile_and_no_nan(finite: list[float], infinite: int) -> None:
+    errors = pd.Series([*finite, *[np.inf] * infinite])
+    rank = 0.95 * (len(errors) - 1)
+    expected = np.inf if math.ceil(rank) >= len(finite) else np.quantile(finite + [1e9] * infinite, 0.95)
+    assert _p95(errors) == pytest.approx(expected)
