@@ -59,7 +59,8 @@ def reprojection_summary(table: pd.DataFrame) -> dict[str, float | int]:
 
 def component_summary(table: pd.DataFrame) -> dict[str, dict[str, float]]:
     """For each of uL, vL, uR, vR its bias (mean) and spread (standard deviation) over a reprojection table, px."""
-    return {row: {"bias": float(table[row].mean()), "spread": float(table[row].std(ddof=0))} for row in ROWS}
+    with np.errstate(invalid="ignore"):  # an infinite residual, of a landmark at the camera's plane, has no spread
+        return {row: {"bias": float(table[row].mean()), "spread": float(table[row].std(ddof=0))} for row in ROWS}
 
 
 def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
