@@ -4,8 +4,6 @@ BIN := $(VENV)/bin
 PACKAGES := geometry data ekf smoother compare reports
 OUT ?= out/simulated
 
-QUICK_DRIVE := --path town --duration 10 --features-per-frame 25 --seed 3
-QUICK_ESTIMATORS := dead-reckoning,ekf,joint-ekf,isam2,isam2-online,fixed-lag,batch
 QUICK_CHECK :=
 
 .PHONY: run test quick bench docs figures fuzz lint types arrows install schema wheel clean
@@ -19,10 +17,8 @@ test: install lint types arrows
 # Are our own estimators as good as they were? `make test` asks the same (tests/test_check_ourselves.py), without the
 # report. QUICK_CHECK=--update-baseline says that they are meant to differ.
 quick: install
-	@mkdir -p out
-	$(BIN)/fgbaseline simulate out/quick.npz $(QUICK_DRIVE) --force
-	$(BIN)/fgbaseline run out/quick.npz --estimators $(QUICK_ESTIMATORS) --out out/quick --force
-	$(BIN)/fgbaseline check out/quick --limits suites/quick-limits.toml --baseline suites/quick-baseline.json $(QUICK_CHECK)
+	$(BIN)/fgbaseline bench suites/quick.toml --out out/bench/quick
+	$(BIN)/fgbaseline check out/bench/quick --limits suites/quick-limits.toml --baseline suites/quick-baseline.json $(QUICK_CHECK)
 
 # The site, to be read from its folder: out/docs/index.html. A warning is an error. The variable turns off an advertisement.
 docs: install

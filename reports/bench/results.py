@@ -38,7 +38,7 @@ class Metric:
 
 METRICS = (
     Metric("ate", ("ate", "rmse"), "error to truth", "m", ranked=True),
-    Metric("held_out", ("held_out", "median"), "held-out tracks", "px", ranked=True),
+    Metric("held_out", ("held_out", "median"), "held-out error", "px", ranked=True),
     Metric("divergence", ("divergence", "rmse"), "from the reference", "m"),
     Metric("reprojection", ("reprojection", "median"), "reprojection", "px"),
     Metric("reprojection_common", ("reprojection_common", "median"), "reprojection of common", "px"),
