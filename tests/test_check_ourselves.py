@@ -1,4 +1,4 @@
-"""The quick suite guards our own accuracy: what is committed holds, and a Jacobian of the wrong sign does not get by."""
+"""The quick suite guards our own accuracy: what is committed holds, and a wrong sign in a Jacobian does not get by."""
 
 import json
 import tomllib
