@@ -185,7 +185,7 @@ def _reach(values: list[FloatArray]) -> tuple[float, float]:
 
 
 def _colours(results: Results) -> dict[str, str]:
-    return colours_of(results.estimators, None)
+    return colours_of(results.estimators, results.reference)
 
 
 def _marks(results: Results) -> dict[str, str]:

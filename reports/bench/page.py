@@ -56,7 +56,7 @@ def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
             spent=duration(results.seconds),
             verdict=sentences(results),
             grid=grid,
-            colours=colours_of(results.estimators, None),
+            colours=colours_of(results.estimators, results.reference),
             figures=[_captioned(key, picture(key, figure)) for key, figure in figures.items()],
             words=WORDS,
             tables=[table for table in (*_rankings(results), _overall(results)) if table is not None],

@@ -81,6 +81,12 @@ class Results:
         """Their names in the suite's order."""
         return list(self.planned[0].job.estimators)
 
+    @property
+    def reference(self) -> str | None:
+        """The reference of all runs that did not fail; None where they have different ones, or there are none."""
+        names = {str(summary["reference"]["name"]) for summary in self.summaries.values()}
+        return names.pop() if len(names) == 1 else None
+
 
 def collected(planned: Sequence[Planned], store: Store) -> Results:
     """The results of jobs all of which are done."""
