@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError
@@ -43,6 +42,8 @@ def time_offset(
     chosen) that overlap at every offset searched, so that all offsets are judged by the same poses. Raises InputError
     where fewer than three do, there are no stamps, or nothing to search.
     """
+    from scipy.optimize import minimize_scalar
+
     for path in (reference, estimate):
         if not path.stamped:
             raise InputError(f"{path.source or path.name}: it has no time stamps, so no offset in time can be found")
@@ -88,6 +89,8 @@ def _crossing(misfit: Callable[[float], float], limit: float, good: float, grid:
 
     The offset itself at the end of the grid.
     """
+    from scipy.optimize import brentq
+
     beyond = grid[grid * side > good * side]
     if len(beyond) == 0:
         return good

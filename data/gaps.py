@@ -9,7 +9,6 @@ steady acceleration shows only at long lags.
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
 
 from fgbaseline.geometry import FloatArray, se3
 
@@ -74,6 +73,8 @@ def _right_jacobian(twist: FloatArray) -> FloatArray:
 
     It is the corner of one matrix exponential (Van Loan, 1978); `se3.right_jacobian` is a series for short motions.
     """
+    from scipy.linalg import expm
+
     block = np.zeros((12, 12))
     block[:6, :6], block[:6, 6:] = -se3.curly_hat(twist), np.eye(6)
     return np.asarray(expm(block)[:6, 6:], dtype=np.float64)

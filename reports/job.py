@@ -19,7 +19,6 @@ from fgbaseline.data import (
 )
 from fgbaseline.data.documented import DEFAULT_FEATURES
 from fgbaseline.data.formats import BodyFrame
-from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
 
 from .solving import Watch, solve_all, unwatched
@@ -88,6 +87,8 @@ def read_sequence(settings: RunSettings) -> Sequence:
     if settings.sequence is None:
         if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
+        from fgbaseline.data.simulate import Simulation, simulate
+
         return simulate(Simulation(seed=settings.seed))
     if settings.truth is not None and settings.truth_frame is None:
         raise InputError(

@@ -14,6 +14,7 @@ from fgbaseline.data.axes import axes_matrix
 from fgbaseline.data.diagnose.axes import linear_axes
 from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
+from fgbaseline.data.diagnose.spline import spline_through
 from fgbaseline.data.diagnose.timing import timing
 from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_windows_alike
 from fgbaseline.data.diagnose.window_terms import (
@@ -177,6 +178,19 @@ def test_the_delay_of_a_shifted_signal_is_found(shift: float, seed: int) -> None
     found = timing(seen, recorded, np.ones(300, dtype=np.bool_), 0.1)
     assert found.identifiable
     assert abs(found.shift / 0.1 - shift) < 0.1
+
+
+@given(st.integers(4, 30), st.integers(0, 1000))
+def test_the_spline_is_scipys(n: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    x = np.cumsum(random.integers(1, 4, n).astype(np.float64))
+    y = random.normal(size=(n, 3))
+    at = np.linspace(x[0] - 0.5, x[-1] + 0.5, 97).reshape(-1, 1)
+    ours, theirs = spline_through(x, y), CubicSpline(x, y)
+    assert np.allclose(ours(at), theirs(at), rtol=1e-9, atol=1e-9)
+    for derivative in (1, 2):
+        assert np.allclose(ours(at, derivative), theirs(at, derivative), rtol=1e-9, atol=1e-8)
+    assert np.allclose(spline_through(x, y[:, 0])(at), theirs(at)[..., 0], rtol=1e-9, atol=1e-9)
 
 
 def test_noise_has_no_delay() -> None:

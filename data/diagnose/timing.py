@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from fgbaseline.geometry import FloatArray
 
 from ..observations import BoolArray
+from .spline import Spline, spline_through
 
 MAX_SHIFT = 3.0
 """frames"""
@@ -51,7 +51,7 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     inside = known & _surrounded(known)
     if inside.sum() < 20:
         return Timing(0.0, np.inf, identifiable=False)
-    spline = CubicSpline(k[known], _moderate(seen, recorded, known), axis=0, extrapolate=False)
+    spline = spline_through(k[known], _moderate(seen, recorded, known))
     x = recorded - recorded[inside].mean(axis=0)
     residual = x[inside] - spline(k[inside])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
@@ -97,7 +97,7 @@ def _moderate(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Float
     return np.asarray(y - y.mean(axis=0), dtype=np.float64)
 
 
-def _energy(spline: CubicSpline, k: FloatArray, weight: FloatArray, shifts: FloatArray) -> FloatArray:
+def _energy(spline: Spline, k: FloatArray, weight: FloatArray, shifts: FloatArray) -> FloatArray:
     """(m,) sum of squares about the mean of what the cameras see at k + shift: a window that takes in a stronger turn
     at one end correlates more there, whatever the shift is.
 
@@ -106,4 +106,4 @@ def _energy(spline: CubicSpline, k: FloatArray, weight: FloatArray, shifts: Floa
     whole = np.arange(-np.ceil(MAX_SHIFT), np.ceil(MAX_SHIFT) + 1.0)
     seen = np.array([spline(k + shift) for shift in whole])
     energy = np.sum(weight * (seen - seen.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))
-    return np.asarray(CubicSpline(whole, energy)(shifts), dtype=np.float64)
+    return spline_through(whole, energy)(shifts)

@@ -1,5 +1,6 @@
 """The entry point: finds the command, and turns bad input into one sentence and exit code 2."""
 
+import gc
 import importlib
 import os
 import signal
@@ -22,6 +23,8 @@ COMMANDS = {
 }
 """command -> module of this package that holds it under the name `command`"""
 BAD_INPUT, INTERRUPTED = 2, 130
+NEW_OBJECTS = 50_000
+"""between two searches for cyclic garbage, of which there is little; Python has 700, as suits what runs for days"""
 
 
 class _Commands(click.Group):
@@ -55,6 +58,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     # Small matrices everywhere: more than one BLAS thread only makes them wait for each other.
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    gc.set_threshold(NEW_OBJECTS)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         code = group.main(arguments, standalone_mode=False)
