@@ -1,7 +1,7 @@
 """Tracks whose residuals say that the point moved."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -25,33 +25,42 @@ SETTLED, NEARLY = 1e-16, 1e-6
 """of a track's cost: once no more than that is to be gained it is left alone, the latter where it cannot have moved"""
 OPEN = 1e-9
 """share of the largest eigenvalue of a track's scaled normal equations, below which a direction is left open"""
+SYMMETRIC, PULL = [0, 1, 2, 4, 5, 7], [3, 6, 8]
+"""where the upper triangle (3, 3), row by row, and the gradient stand among rows that each end with their gradient"""
+SQUARE = np.array([[0, 1, 2], [1, 4, 5], [2, 5, 7]])
+OF_SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+"""and the whole of the symmetric matrix, in that and in the upper triangle alone"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Sights:
-    """n sights of m points."""
+class _Sights(NamedTuple):
+    """n sights of m points, sorted by point; every point has one. Each coordinate is in an array of its own: stacks of
+    small matrices take several times as long."""
 
     camera: StereoCamera
-    cam_T_world: FloatArray
-    """(n, 4, 4)"""
+    turn: FloatArray
+    """(3, 3, n) the rotation of cam_T_world"""
+    shift: FloatArray
+    """(3, n) m, its translation"""
     row: IntArray
-    """(n,) the point, 0 to m - 1"""
+    """(n,) the point, 0 to m - 1, rising"""
     pixel: FloatArray
-    """(n, 4)"""
+    """(4, n)"""
     seconds: FloatArray
     """(n,) since the middle of the track's sights"""
     variance: float
 
     def of(self, points: IntArray, m: int) -> "_Sights":
-        """Those of some of the m points, which are numbered anew in their order."""
+        """Those of some of the m points, given in rising order, which are numbered anew."""
         number = np.full(m, -1)
         number[points] = np.arange(len(points))
-        kept = np.flatnonzero(number[self.row] >= 0)
+        row = number[self.row]
+        kept = np.flatnonzero(row >= 0)
         return _Sights(
             self.camera,
-            self.cam_T_world[kept],
-            number[self.row[kept]],
-            self.pixel[kept],
+            self.turn[:, :, kept],
+            self.shift[:, kept],
+            row[kept],
+            self.pixel[:, kept],
             self.seconds[kept],
             self.variance,
         )
@@ -94,14 +103,17 @@ def _significant(gain: FloatArray) -> BoolArray:
 
 
 def _sights(problem: Problem, estimate: Estimate, rows: pd.DataFrame, row: IntArray) -> _Sights:
-    sequence, frame = problem.sequence, rows["frame"].to_numpy()
+    sequence, order = problem.sequence, np.argsort(row, kind="stable")
+    row, frame = row[order], rows["frame"].to_numpy()[order]
     count = np.maximum(np.bincount(row), 1)
     seconds = sequence.t[frame] - sequence.t[0]
+    cam_T_world = np.moveaxis(se3.inverse(estimate.world_T_imu @ sequence.imu_T_cam)[:, :3], 0, 2)
     return _Sights(
         sequence.camera,
-        se3.inverse((estimate.world_T_imu @ sequence.imu_T_cam)[frame]),
+        np.take(cam_T_world[:, :3], frame, axis=2),
+        np.take(cam_T_world[:, 3], frame, axis=1),
         row,
-        sequence.observations.pixel[rows["observation"].to_numpy()],
+        np.ascontiguousarray(sequence.observations.pixel[rows["observation"].to_numpy()[order]].T),
         seconds - (np.bincount(row, weights=seconds) / count)[row],
         problem.pixel_variance,
     )
@@ -134,21 +146,34 @@ def _fitted(sights: _Sights, start: FloatArray, settled: FloatArray) -> tuple[Fl
 
 def _linearised(sights: _Sights, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cost (m,), infinite behind a camera, and normal equations (m, d, d), (m, d)."""
-    row, s, n, moves = sights.row, sights.seconds, len(state), state.shape[1] > 3
-    points = state[row, :3] + (s[:, None] * state[row, 3:] if moves else 0.0)
-    p_cam = se3.transform(sights.cam_T_world, points)
-    front = p_cam[:, 2] > 0.0
-    p_cam[~front] = [0.0, 0.0, 1.0]
-    residual = sights.pixel - sights.camera.project(p_cam)
-    H = sights.camera.jacobian(p_cam) @ sights.cam_T_world[:, :3, :3]
-    Ht = np.swapaxes(H, 1, 2) / sights.variance
-    squared = np.where(front, np.sum(residual**2, axis=1) / sights.variance, np.inf)
-    information, pull = Ht @ H, (Ht @ residual[:, :, None])[:, :, 0]
-    cost, normal, gradient = (_summed(values, row, n) for values in (squared, information, pull))
+    camera, R, s, moves = sights.camera, sights.turn, sights.seconds, state.shape[1] > 3
+    points = np.take(state[:, :3].T, sights.row, axis=1)
+    if moves:
+        points = points + s * np.take(state[:, 3:].T, sights.row, axis=1)
+    p_cam = (R * points).sum(axis=1) + sights.shift
+    front = p_cam[2] > 0.0
+    p_cam[:, ~front] = [[0.0], [0.0], [1.0]]
+    near = 1.0 / p_cam[2]
+    u, v, apart = p_cam[0] * near, p_cam[1] * near, camera.fu * camera.baseline * near
+    left, height = camera.fu * u + camera.cu, camera.fv * v + camera.cv
+    residual = sights.pixel - np.stack([left, height, left - apart, height])
+    # vL and vR have the same derivatives and count as one row of twice the weight: columns are d/dp, then the residual
+    A, both = np.empty((3, 4, len(s))), np.sqrt(2.0)
+    A[0, :3] = (camera.fu * near) * (R[0] - u * R[2])
+    A[1, :3] = A[0, :3] + (apart * near) * R[2]
+    A[2, :3] = (both * camera.fv * near) * (R[1] - v * R[2])
+    A[0, 3], A[1, 3], A[2, 3] = residual[0], residual[2], (residual[1] + residual[3]) / both
+    squared = np.where(front, (residual * residual).sum(axis=0), np.inf)
+    products = np.concatenate([(A[:, i : i + 1] * A[:, i:]).sum(axis=0) for i in range(3)])
+    weighted = [squared[None], products, *((s * products, s * s * products[SYMMETRIC]) if moves else ())]
+    starts = np.flatnonzero(np.diff(sights.row, prepend=-1))
+    sums = np.add.reduceat(np.concatenate(weighted), starts, axis=1).T / sights.variance
+    cost, information, pull = sums[:, 0], sums[:, 1:10], sums[:, 1:10][:, PULL]
+    normal = information[:, SQUARE]
     if not moves:
-        return cost, normal, gradient
-    mixed, velocity = (_summed(s[:, None, None] ** power * information, row, n) for power in (1, 2))
-    gradient = np.concatenate([gradient, _summed(s[:, None] * pull, row, n)], axis=1)
+        return cost, normal, pull
+    mixed, velocity = sums[:, 10:19][:, SQUARE], sums[:, 19:][:, OF_SYMMETRIC]
+    gradient = np.concatenate([pull, sums[:, 10:19][:, PULL]], axis=1)
     return cost, np.block([[normal, mixed], [mixed, velocity]]), gradient
 
 
@@ -164,11 +189,3 @@ def _step(normal: FloatArray, gradient: FloatArray) -> FloatArray:
     inverse = np.linalg.pinv(unit[~regular], rcond=OPEN, hermitian=True)
     step[~regular] = (inverse @ right[~regular][:, :, None])[:, :, 0]
     return np.asarray(step / scale)
-
-
-def _summed(values: FloatArray, row: IntArray, n: int) -> FloatArray:
-    flat = values.reshape(len(values), math.prod(values.shape[1:]))
-    sums = np.empty((n, flat.shape[1]))
-    for i, column in enumerate(flat.T):
-        sums[:, i] = np.bincount(row, weights=column, minlength=n)
-    return sums.reshape(n, *values.shape[1:])

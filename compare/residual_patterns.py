@@ -1,8 +1,11 @@
 """Where reprojection errors come from: by distance, by how long a track has lasted, by place in the image, by side."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from pandas.api.typing import SeriesGroupBy
 
 from fgbaseline.data import Sequence
 from fgbaseline.data.observations import IntArray
@@ -41,25 +44,28 @@ def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
 
 def _classified(values: pd.DataFrame, by: str, code: IntArray, names: list[str]) -> pd.DataFrame:
     """Statistics of the rows of each class; those with a code that has no name are in none."""
-    named = values[(code >= 0) & (code < len(names))]
-    groups = named.groupby(code[(code >= 0) & (code < len(names))])
-    result = groups.agg(
-        n=("error", "size"),
-        median=("error", "median"),
-        mean=("error", "mean"),
-        p95=("error", _p95),
-        u=("u", "mean"),
-        v=("v", "mean"),
+    named = (code >= 0) & (code < len(names))
+    groups = values[named].groupby(code[named])
+    error = groups["error"]
+    result = pd.DataFrame(
+        {
+            "n": groups.size(),
+            "median": error.median(),
+            "mean": error.mean(),
+            "p95": _p95(error),
+            "u": groups["u"].mean(),
+            "v": groups["v"].mean(),
+        }
     )
     result.insert(0, "of", [names[i] for i in result.index])
     result.insert(0, "by", by)
     return result
 
 
-def _p95(errors: "pd.Series[float]") -> float:
+def _p95(errors: "SeriesGroupBy[Any, Any]") -> "pd.Series[float]":
     """The 95 % quantile; infinite, not NaN, where it lies between a finite error and an infinite one."""
-    above = float(errors.quantile(0.95, interpolation="higher"))
-    return above if np.isinf(above) else float(errors.quantile(0.95))
+    above = errors.quantile(0.95, interpolation="higher")
+    return above.where(np.isinf(above), errors.quantile(0.95))
 
 
 def _classes_of(values: ArrayLike, edges: tuple[float, ...]) -> IntArray:
