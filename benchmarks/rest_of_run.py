@@ -1,8 +1,8 @@
 """What a run takes beside its estimators: `python -m benchmarks.rest_of_run drive.npz --runs 3`.
 
 Each run is a process of its own, so that imports count. What is wanted is asked of all that is not an estimator:
-imports, reading, posing (the diagnosis), comparison, figures, tables and page. Seconds are of the clock on the wall; a
-figure is worth as much as the machine was idle.
+imports, reading, posing (the diagnosis), comparison, figures, tables and page, in the order and with the forks of
+`reports/cli/report.py`. Seconds are of the clock on the wall; a figure is worth as much as the machine was idle.
 """
 
 # ruff: noqa: E402
@@ -12,6 +12,7 @@ import os
 for library in ("OPENBLAS", "OMP", "MKL"):  # as the command line has it
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+import gc
 import json
 import statistics
 import subprocess
@@ -25,17 +26,20 @@ from tempfile import TemporaryDirectory
 import click
 
 from benchmarks.measured import Row, table
+from fgbaseline.reports.cli.main import NEW_OBJECTS
 from fgbaseline.reports.cli.run import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""
 SOLVING = "solving: "
 """how the names of stages begin that are an estimator's work"""
+POSING = "posing, and imports meanwhile"
 
 
 def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
     """Seconds of each stage of one run in this process, in their order."""
     taken: dict[str, float] = {}
+    gc.set_threshold(NEW_OBJECTS)  # as the command line has it
 
     @contextmanager
     def watch(stage: str) -> Iterator[None]:
@@ -44,28 +48,30 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         taken[stage] = time.perf_counter() - start
 
     with watch("imports"):
-        from fgbaseline import ekf, smoother  # noqa: F401
-        from fgbaseline.reports import figures, job
+        from fgbaseline.reports import job
         from fgbaseline.reports.cli import progress  # noqa: F401
-        from fgbaseline.reports.comparison import compare_all
-        from fgbaseline.reports.run_folder import write_numbers, write_page
-        from fgbaseline.reports.solving import solve_all
+        from fgbaseline.reports.forks import cores, shared
     settings = job.RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = job.read_sequence(settings)
-    with watch("posing"):
-        problem = job.pose_problem(sequence, settings)
+    with watch(POSING), shared(lambda _: job.pose_problem(sequence, settings), 1, cores()) as posed:
+        from fgbaseline.reports import figures
+        from fgbaseline.reports.comparison import compare_all
+        from fgbaseline.reports.run_folder import write_numbers, write_page
+        from fgbaseline.reports.solving import solve_all
+
+        job.load_estimators(estimators)
+        (problem,) = posed()
     answers = solve_all(problem, estimators, lambda name: watch(f"{SOLVING}{name}"))
     with watch("comparison"):
-        run = compare_all(problem, answers, settings.record())
+        run = compare_all(problem, answers, settings.record(), processes=cores())
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
-        with watch("figures"):
-            (folder / "figures").mkdir()
-            drawn = figures.draw_and_write(run, figures.cores())
-            figures.save(drawn, folder / "figures")
-        with watch("tables"):
+        with watch("figures, and tables meanwhile"), figures.being_drawn(run, cores()) as finished:
             summary = write_numbers(run, folder)
+            drawn = finished()
+            (folder / "figures").mkdir()
+            figures.save(drawn, folder / "figures")
         with watch("page"):
             write_page(run, summary, folder, drawn)
     return taken

@@ -1,7 +1,7 @@
 """Stereo observations as flat arrays sorted by frame: never the dense 4 x N x T block."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,9 @@ class Observations:
             raise FgbaselineError("observations must be sorted by frame, then landmark, without repeats")
         for array in (self.frame, self.landmark, self.pixel):
             array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:  # made anew by who unpickles it: read-only there too
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     def __len__(self) -> int:
         return len(self.frame)

@@ -1,6 +1,6 @@
 """What was recorded: velocities, stereo tracks, calibration and, where it is known, the truth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -76,6 +76,9 @@ class Sequence:
         check_sequence(self)
         for array in (self.t, self.linear_velocity, self.angular_velocity, self.imu_T_cam):
             array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:  # made anew by who unpickles it: read-only there too
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
     def n_frames(self) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -11,6 +12,7 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
 from .evidence import Evidence, HeldOutReport, gathered, held_out_report
+from .forks import shared
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""
@@ -72,29 +74,33 @@ def compare_all(
     estimates: Mapping[str, Estimate],
     settings: Mapping[str, object],
     held: HeldOut | None = None,
+    processes: int = 1,
 ) -> Run:
-    """All comparisons of a run, `held` being the tracks that were kept from it."""
+    """All comparisons of a run, `held` being the tracks that were kept from it; so many `processes` share the work."""
     reference = next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
     if reference is None:
         trusted = compare.Trust(compare.Verdict.UNTRUSTED, (NO_REFERENCE,))
     else:
         trusted = compare.trust(problem, estimates[reference], estimates.get("batch"))
     origin = None if reference is None else estimates[reference]
-    results = {name: _compared(problem, estimate, origin) for name, estimate in estimates.items()}
+    names = list(estimates)
+    with shared(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
+        parts = compared()
+    results = {name: Result(estimates[name], **part) for name, part in zip(names, parts, strict=True)}
     held_out = None if held is None else held_out_report(problem, estimates.values(), held)
     return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings, held_out)
 
 
-def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> Result:
+def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> dict[str, Any]:
+    """All of a `Result` but the estimate itself, which need not be sent from one process to another."""
     truth, up = problem.sequence.truth, problem.sequence.up
     reprojection = compare.reprojection(problem.sequence, estimate)
     evidence = gathered(problem, estimate, reprojection, reference)
-    return Result(
-        estimate=estimate,
-        reprojection=reprojection,
-        divergence=None if reference is None else compare.divergence(estimate, reference, up),
-        truth=None if truth is None else compare.truth_errors(estimate, truth, up),
-        truth_aligned=None if truth is None else compare.truth_errors(estimate, truth, up, aligned=True),
-        nees=None if evidence.nees is None else evidence.nees["pose"].to_numpy(),
-        evidence=evidence,
-    )
+    return {
+        "reprojection": reprojection,
+        "divergence": None if reference is None else compare.divergence(estimate, reference, up),
+        "truth": None if truth is None else compare.truth_errors(estimate, truth, up),
+        "truth_aligned": None if truth is None else compare.truth_errors(estimate, truth, up, aligned=True),
+        "nees": None if evidence.nees is None else evidence.nees["pose"].to_numpy(),
+        "evidence": evidence,
+    }

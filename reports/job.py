@@ -1,5 +1,6 @@
 """The main job: from a recording and the user's wishes to a run that can be reported."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -13,6 +14,7 @@ from fgbaseline.data import (
     calibrated,
     documented,
     estimator_names,
+    find_estimator,
     hold_out,
     read,
     read_repairs,
@@ -82,6 +84,13 @@ def check_estimators(names: tuple[str, ...]) -> None:
             raise InputError(f"estimators: '{name}' can be no file's name; register it under another")
 
 
+def load_estimators(names: tuple[str, ...]) -> None:
+    """Imports them beforehand; one that cannot be imported says so when its turn comes."""
+    for name in names:
+        with suppress(Exception):
+            find_estimator(name)
+
+
 def read_sequence(settings: RunSettings) -> Sequence:
     """The recording, with its truth; raises InputError."""
     if settings.sequence is None:
@@ -118,8 +127,15 @@ def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
     return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None, repairs=repairs)
 
 
-def solve(problem: Problem, settings: RunSettings, watch: Watch = unwatched, held: HeldOut | None = None) -> "Run":
-    """All estimators on the problem, and their comparison."""
+def solve(
+    problem: Problem,
+    settings: RunSettings,
+    watch: Watch = unwatched,
+    held: HeldOut | None = None,
+    processes: int = 1,
+) -> "Run":
+    """All estimators on the problem, one after another, and their comparison, which `processes` share."""
     from .comparison import compare_all  # pandas: not before the input is known to be good
 
-    return compare_all(problem, solve_all(problem, settings.estimators, watch), settings.record(), held)
+    answers = solve_all(problem, settings.estimators, watch)
+    return compare_all(problem, answers, settings.record(), held, processes)

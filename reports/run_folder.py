@@ -28,10 +28,11 @@ def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
 
     `processes` share the drawing of the figures. A caller that is one of several processes at work leaves it at one.
     """
+    with figures.being_drawn(run, processes) as finished:
+        summary = write_numbers(run, folder)
+        drawn = finished()
     (folder / "figures").mkdir()
-    drawn = figures.draw(run) if processes == 1 else figures.draw_and_write(run, processes)
     figures.save(drawn, folder / "figures")
-    summary = write_numbers(run, folder)
     write_page(run, summary, folder, drawn)
     return summary
 

@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -36,3 +38,9 @@ def test_the_observations_of_frames_are_those_whose_frame_lies_between(
 def test_what_is_not_sorted_is_refused() -> None:
     with pytest.raises(FgbaselineError, match="sorted by frame"):
         Observations(np.array([1, 0]), np.array([0, 0]), np.zeros((2, 4)))
+
+
+def test_they_are_read_only_where_they_are_unpickled_too() -> None:
+    sent: Observations = pickle.loads(pickle.dumps(observed({(0, 3), (2, 1)})))
+    assert np.array_equal(sent.landmark, [3, 1])
+    assert not any(array.flags.writeable for array in (sent.frame, sent.landmark, sent.pixel))

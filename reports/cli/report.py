@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .. import job
+from ..forks import cores, shared
 from ..whole_folder import require_free, whole_folder
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
 
     kept, held = job.split(sequence, settings)
 
-    # Half a second of imports: bad input is told before.
-    from .. import figures, page
-    from ..run_folder import write_run
     from .progress import reporter
 
     told = reporter()
@@ -43,14 +41,20 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
         told.say(f"{held.n_tracks} tracks held out, {len(held.observations)} observations")
     if settings.preset == "calibrated" and not settings.as_recorded:
         told.say("diagnosing the recording")
-    problem = job.pose_problem(kept, settings)
-    run = job.solve(problem, settings, told.estimator, held)
+    with shared(lambda _: job.pose_problem(kept, settings), 1, cores()) as posed:
+        # Two seconds of imports: bad input is told before, and the diagnosis goes on meanwhile.
+        from .. import page
+        from ..run_folder import write_run
+
+        job.load_estimators(settings.estimators)
+        (problem,) = posed()
+    run = job.solve(problem, settings, told.estimator, held, cores())
     for name, result in run.results.items():
         if not result.answered:
             told.say(f"{name} failed: {result.estimate.reason}")
     told.say("writing the report")
     with whole_folder(place, force=force, mark=job.MARK) as folder:
-        summary = write_run(run, folder, figures.cores())
+        summary = write_run(run, folder, cores())
         if rerun_file is not None:
             from ..rerun_file import write_rerun
 

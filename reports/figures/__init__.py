@@ -4,6 +4,6 @@ from .diagnosis import draw_diagnosis
 from .drawing import draw
 from .palette import colours
 from .saving import Written, encoded, save
-from .sharing import cores, draw_and_write
+from .sharing import being_drawn, draw_and_write
 
-__all__ = ["Written", "colours", "cores", "draw", "draw_and_write", "draw_diagnosis", "encoded", "save"]
+__all__ = ["Written", "being_drawn", "colours", "draw", "draw_and_write", "draw_diagnosis", "encoded", "save"]

@@ -9,23 +9,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox, blended_transform_factory
 
-from .log_axis import label_with_numbers
+from .grid import fill_grid
+from .log_axis import draw_minor_ticks_at_once, label_with_numbers
 
 
 def lay_out(figure: Figure) -> None:
     """Places panels, titles and the labels of axes for good, at round positions.
 
-    The solver of constrained layout answers differently in the last digits from one time to the next, and from one
-    drawing of a figure to its next: a figure would not have the same bytes twice. And every drawing would ask all tick
-    labels of all panels again where a title or a label has room.
+    Every drawing would otherwise ask all tick labels of all panels again where a title or a label has room.
     """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             label_with_numbers(axis)
         axes.set_title(axes.get_title(loc="left"), loc="left", y=1.0)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
+    draw_minor_ticks_at_once(figure.axes)
+    fill_grid(figure)
     # "none" would leave a layout engine that does nothing, but for which every figure is drawn twice
     with held():
         figure.set_layout_engine(None)

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
 from matplotlib.figure import Figure
+from PIL import Image
 
 from .layout import held
-from .style import in_style
+from .style import DPI, in_style
 
-DPI = 150
 UNDATED: Mapping[str, Mapping[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """metadata without the time of writing"""
-WRITING: Mapping[str, Mapping[str, Any]] = {"png": {"pil_kwargs": {"compress_level": 3}}}
-"""zlib's default makes files 7 % smaller in 1.4 times the time"""
+COMPRESSION = 3
+"""of a PNG; zlib's default makes files 7 % smaller in 1.4 times the time"""
 _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 
@@ -53,8 +54,22 @@ def encoded(figure: Figure | Written, form: str) -> bytes:
         return figure.files[form]
     forms = _written.setdefault(figure, {})
     if form not in forms:
-        stream = BytesIO()
         with in_style(), held():
-            figure.savefig(stream, format=form, dpi=DPI, metadata=UNDATED.get(form, {}), **WRITING.get(form, {}))
-        forms[form] = stream.getvalue()
+            forms[form] = _png(figure) if form == "png" else _saved(figure, form, metadata=UNDATED[form])
     return forms[form]
+
+
+def _png(figure: Figure) -> bytes:
+    """Without an alpha channel, since the ground is white: three quarters of the time."""
+    pixels = np.frombuffer(_saved(figure, "raw"), dtype=np.uint8)
+    width, height = (int(side * DPI) for side in figure.get_size_inches())
+    stream = BytesIO()
+    colours = np.ascontiguousarray(pixels.reshape(height, width, 4)[:, :, :3])
+    Image.fromarray(colours).save(stream, "png", compress_level=COMPRESSION, dpi=(DPI, DPI))
+    return stream.getvalue()
+
+
+def _saved(figure: Figure, form: str, **options: Any) -> bytes:
+    stream = BytesIO()
+    figure.savefig(stream, format=form, dpi=DPI, **options)
+    return stream.getvalue()

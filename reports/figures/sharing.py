@@ -1,16 +1,11 @@
-"""The figures of a run drawn by several processes at once, each taking the next that nobody has taken."""
+"""The figures of a run, drawn by several processes at once."""
 
 import gc
-import os
-import signal
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from multiprocessing.context import ForkProcess
 
 from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.forks import shared
 
 from .drawing import drawings
 from .layout import lay_out
@@ -20,46 +15,31 @@ from .style import in_style
 FORMS = ("png", "svg")
 
 
-def draw_and_write(run: Run, processes: int) -> dict[str, Written]:
-    """What `draw` draws, by name, written as PNG and SVG; the same bytes however many processes share the work.
+@contextmanager
+def being_drawn(run: Run, processes: int) -> Iterator[Callable[[], dict[str, Written]]]:
+    """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, written as PNG and SVG.
 
-    The others are forks, which have the run and all that is imported, and need nothing sent. Only Linux forks safely;
-    elsewhere one process draws everything.
+    The same bytes however many processes share the work. The figures over time, which take longest, are the last and
+    come first.
     """
     names = list(drawings(run))
-    helpers = min(processes, len(names)) - 1 if sys.platform == "linux" else 0
-    with _not_collecting(), _taken_in_turn(len(names)) as numbers, _helping(run, names, numbers, helpers) as answers:
-        done = _written(run, names, numbers)
-        for answer in answers:
-            try:
-                done |= answer.recv()
-            except EOFError:  # it died; what it had taken is drawn below
-                continue
-    missing = [name for name in names if name not in done]
-    done |= {name: _one(run, name) for name in missing}
-    return {name: figure for name in names if (figure := done[name]) is not None}
+    with shared(lambda number: _one(run, names[number]), len(names), processes) as gathered:
+        yield lambda: {name: one for name, one in zip(names, gathered(), strict=True) if one is not None}
 
 
-def cores() -> int:
-    """That this process may use, as far as `draw_and_write` can make use of them."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+def draw_and_write(run: Run, processes: int = 1) -> dict[str, Written]:
+    """The same, with nothing else to do meanwhile."""
+    with being_drawn(run, processes) as drawn:
+        return drawn()
 
 
 def _one(run: Run, name: str) -> Written | None:
-    with in_style():
+    with _not_collecting(), in_style():
         figure = drawings(run)[name]()
-        if figure is not None:
-            lay_out(figure)
-    return None if figure is None else written(figure, FORMS)
-
-
-def _written(run: Run, names: Sequence[str], numbers: int) -> dict[str, Written | None]:
-    """The figures whose numbers this process takes."""
-    done = {}
-    while number := os.read(numbers, 1):
-        name = names[number[0]]
-        done[name] = _one(run, name)
-    return done
+        if figure is None:
+            return None
+        lay_out(figure)
+        return written(figure, FORMS)
 
 
 @contextmanager
@@ -72,48 +52,3 @@ def _not_collecting() -> Iterator[None]:
     finally:
         if collected:
             gc.enable()
-
-
-@contextmanager
-def _taken_in_turn(n: int) -> Iterator[int]:
-    """A pipe of the bytes 0 to n - 1, out of which whoever reads a byte has taken that number for himself.
-
-    The last are the figures over time, which take longest: they come first.
-    """
-    numbers, into = os.pipe()
-    os.write(into, bytes(reversed(range(n))))
-    os.close(into)
-    try:
-        yield numbers
-    finally:
-        os.close(numbers)
-
-
-@contextmanager
-def _helping(run: Run, names: Sequence[str], numbers: int, helpers: int) -> Iterator[list[Connection]]:
-    """Where the answers of so many forks come from; none of them is left when the block ends, however it does."""
-    context = get_context("fork")
-    answers, started = [], list[ForkProcess]()
-    try:
-        for _ in range(helpers):
-            answer, into = context.Pipe(duplex=False)
-            process = context.Process(target=_help, args=(run, names, numbers, answer, into), daemon=True)
-            process.start()
-            into.close()
-            started.append(process)
-            answers.append(answer)
-        yield answers
-    finally:
-        for process in started:
-            process.kill()
-            process.join()
-        for answer in answers:
-            answer.close()
-
-
-def _help(run: Run, names: Sequence[str], numbers: int, answer: Connection, into: Connection) -> None:
-    """In the fork. Interrupting is the parent's business; where the parent is gone, nobody reads, and sending fails."""
-    answer.close()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    into.send(_written(run, names, numbers))

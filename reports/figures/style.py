@@ -16,6 +16,8 @@ from .palette import TRUTH, colours
 
 WIDTH = 8.0
 """inches: 1200 px in a PNG, readable at 800"""
+DPI = 150
+"""of a PNG"""
 LETTERS_IN_A_ROW = 92
 """that a legend has room for, with six to spare for each mark"""
 
@@ -42,6 +44,7 @@ STYLE: Mapping[str, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 9.5,
     "legend.handlelength": 1.6,
+    "figure.dpi": DPI,  # so that letters are measured once for layout and PNG
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
     "figure.constrained_layout.use": True,
