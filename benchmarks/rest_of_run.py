@@ -48,13 +48,13 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         taken[stage] = time.perf_counter() - start
 
     with watch("imports"):
+        from fgbaseline.data.forks import cores, shared
         from fgbaseline.reports import job
         from fgbaseline.reports.cli import progress  # noqa: F401
-        from fgbaseline.reports.forks import cores, shared
     settings = job.RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = job.read_sequence(settings)
-    with watch(POSING), shared(lambda _: job.pose_problem(sequence, settings), 1, cores()) as posed:
+    with watch(POSING), shared(lambda _: job.pose_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.reports import figures
         from fgbaseline.reports.comparison import compare_all
         from fgbaseline.reports.run_folder import write_numbers, write_page

@@ -48,6 +48,7 @@ def calibrated(
     diagnosis: Diagnosis | None = None,
     settings: Calibration | None = None,
     repairs: Repairs | None = None,
+    processes: int = 1,
 ) -> Problem:
     """The problem that the recording supports, the first pose held at the identity.
 
@@ -55,13 +56,14 @@ def calibrated(
     what the diagnosis found; where it cannot tell, or with `settings`, the recording is taken as it is. What `repairs`
     has is taken from there and not from the diagnosis. The noise of an increment is the standard deviation of a
     velocity times dt. A fractional shift makes the errors of neighbouring increments correlated; that is not modelled.
-    `features` keeps only that many landmarks, those seen most often after masking. Raises InputError for repairs that
-    cannot be, or that `settings` would leave without effect.
+    `features` keeps only that many landmarks, those seen most often after masking. `processes` share the diagnosis,
+    which is the same however many. Raises InputError for repairs that cannot be, or that `settings` would leave without
+    effect.
     """
     if settings is not None and repairs is not None:
         raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
     if settings is None:
-        diagnosis = diagnosis or diagnose(sequence)
+        diagnosis = diagnosis or diagnose(sequence, processes)
         if diagnosis.sigmas is not None or repairs is not None:
             return _diagnosed(diagnosis, features, repairs or Repairs())
     problem = admit_gaps(_as_recorded(sequence, features, settings or Calibration()))

@@ -8,11 +8,11 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.data import Estimate, HeldOut, Problem, Status
+from fgbaseline.data.forks import shared
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
 from .evidence import Evidence, HeldOutReport, gathered, held_out_report
-from .forks import shared
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""

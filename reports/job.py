@@ -113,8 +113,8 @@ def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut 
     return hold_out(sequence, settings.held_out, settings.seed) if settings.held_out != 0.0 else (sequence, None)
 
 
-def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
-    """The problem that the preset makes of a recording; raises InputError."""
+def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) -> Problem:
+    """The problem that the preset makes of a recording, `processes` sharing its diagnosis; raises InputError."""
     if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
         why = "--as-recorded" if settings.as_recorded else "the documented preset"
         raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
@@ -124,7 +124,8 @@ def pose_problem(sequence: Sequence, settings: RunSettings) -> Problem:
         if settings.features is None:
             features = DEFAULT_FEATURES
         return documented(sequence, features, settings.landmarks)
-    return calibrated(sequence, features, settings=Calibration() if settings.as_recorded else None, repairs=repairs)
+    taken = Calibration() if settings.as_recorded else None
+    return calibrated(sequence, features, settings=taken, repairs=repairs, processes=processes)
 
 
 def solve(

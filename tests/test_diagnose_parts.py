@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.axes import axes_matrix
+from fgbaseline.data.diagnose import window as adjustment
 from fgbaseline.data.diagnose.axes import linear_axes
 from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
@@ -55,6 +56,21 @@ def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
     windows, start = [(data, poses, points)], [np.zeros(SHARED)]
     (fit,) = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, iterations)
     return fit, data
+
+
+def test_windows_are_fitted_alike_by_one_process_and_by_three(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adjustment, "TOGETHER", 1)  # every window is a piece of work
+    scenes = [window(seed=seed) for seed in range(5)]
+    windows = [(data, poses, points) for _, data, poses, points in scenes]
+    sequence, start = scenes[0][0].sequence(), [np.zeros(SHARED)] * 5
+    one, three = (
+        fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, 2, processes)
+        for processes in (1, 3)
+    )
+    assert len(one) == len(three) == 5
+    for fit, other in zip(one, three, strict=True):
+        assert np.array_equal(fit.poses, other.poses)
+        assert np.array_equal(fit.last_covariance, other.last_covariance)
 
 
 def moved(poses: FloatArray, k: int, axis: int, step: float) -> FloatArray:

@@ -24,6 +24,7 @@ from fgbaseline import data, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli.main import COMMANDS, group
+from fgbaseline.reports.figures import layout, saving
 
 from .commands import environment
 from .documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown
@@ -186,6 +187,8 @@ def _figures_left_empty(patch: pytest.MonkeyPatch) -> None:
             written(figure, target, **options)  # type: ignore[arg-type]
 
     patch.setattr(Figure, "savefig", savefig)
+    patch.setattr(saving, "_png", lambda _: empty["png"])
+    patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fgbaseline.reports.forks import shared
+from fgbaseline.data.forks import shared
 
 FORKS = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
 
@@ -67,7 +67,7 @@ def test_a_fork_whose_parent_was_killed_ends() -> None:
     """What it computes fits into no pipe, so it would wait for a reader for ever."""
     script = """
 import os, signal, time
-from fgbaseline.reports.forks import shared
+from fgbaseline.data.forks import shared
 
 def large(_):
     time.sleep(0.5)

@@ -81,18 +81,21 @@ class Diagnosis:
         return None if self.fit is None else self.fit.sigmas
 
 
-def diagnose(sequence: Sequence) -> Diagnosis:
-    """Finds axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth."""
+def diagnose(sequence: Sequence, processes: int = 1) -> Diagnosis:
+    """Finds axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth.
+
+    `processes`, forks of this one, share what takes longest.
+    """
     if len(sequence.observations) == 0:
         return Diagnosis(sequence, "the recording has no observations")
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            return _diagnose(sequence)
+            return _diagnose(sequence, processes)
     except (np.linalg.LinAlgError, ValueError, FloatingPointError) as error:
         return Diagnosis(sequence, f"its computation failed ({type(error).__name__}: {error})")
 
 
-def _diagnose(sequence: Sequence) -> Diagnosis:
+def _diagnose(sequence: Sequence, processes: int) -> Diagnosis:
     copies = repeated(sequence)
     seen_by_cameras = odometry(sequence)
     known = seen_by_cameras.known
@@ -103,7 +106,7 @@ def _diagnose(sequence: Sequence) -> Diagnosis:
     recorded = held_twist(sequence, Shift.MIDDLE)
     angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
     linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name)
-    return explained(sequence, seen_by_cameras, angular, linear, copies)
+    return explained(sequence, seen_by_cameras, angular, linear, copies, processes=processes)
 
 
 def explained(
@@ -113,6 +116,7 @@ def explained(
     linear: Axes,
     copies: BoolArray,
     given_shift: float | None = None,
+    processes: int = 1,
 ) -> Diagnosis:
     """Delay, bias, scale, misalignment and noise of velocities in these axes; a shift that is given is taken."""
     seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
@@ -124,14 +128,18 @@ def explained(
 
     fit = None
     if not when.identifiable and given_shift is None:
-        fit = fit_windows(sequence, seen_by_cameras, twist(Shift.AFTER))
+        fit = fit_windows(sequence, seen_by_cameras, twist(Shift.AFTER), processes)
         white = None if fit is None else fit.white
         if white is not None:
-            when = whole_shift(lambda shift: half_cost(sequence, seen_by_cameras, twist(shift), white), dt) or when
+
+            def cost(shift: float) -> float:
+                return half_cost(sequence, seen_by_cameras, twist(shift), white, processes)
+
+            when = whole_shift(cost, dt) or when
     found = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
     shift = found if given_shift is None else given_shift
     if fit is None or shift != Shift.AFTER:
-        fit = fit_windows(sequence, seen_by_cameras, twist(shift))
+        fit = fit_windows(sequence, seen_by_cameras, twist(shift), processes)
     reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
     return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
 

@@ -66,7 +66,7 @@ def chains(odometry: Odometry, landmark: IntArray, frame: IntArray) -> IntArray:
     return np.where(linked, chain, -1)
 
 
-def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fit | None:
+def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> Fit | None:
     """The common answer of windows spread over the recording; None where no window has enough observations.
 
     `twist` (T-1, 6) is the recorded velocity of each interval, turned to the axes of imu_T_cam. The sigmas are the
@@ -80,13 +80,13 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     shared = [np.zeros(SHARED)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, iterations=1)
+        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas)
     shared_mean, deviation = _agreed(fits)
     unbroken = _windows(sequence, odometry, twist, _unbroken(odometry))
-    inflation = inflation_of(sequence, unbroken, shared_mean, sigmas)
+    inflation = inflation_of(sequence, unbroken, shared_mean, sigmas, processes)
     believed = Sigmas(
         sigmas.pixel * inflation.pixel, sigmas.linear * inflation.velocity, sigmas.angular * inflation.velocity
     )
@@ -96,13 +96,13 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray) -> Fi
     return Fit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
 
 
-def half_cost(sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas: Sigmas) -> float:
+def half_cost(sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas: Sigmas, processes: int = 1) -> float:
     """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
     whiten = np.repeat([sigmas.linear, sigmas.angular], 3)
     total = 0.0
     windows = _windows(sequence, odometry, twist, _spread(sequence.n_frames))
     start = [np.zeros(SHARED)] * len(windows)
-    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, iterations=5):
+    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
     return total
 

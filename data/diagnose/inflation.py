@@ -42,15 +42,19 @@ class Inflation:
     """of the velocities: else it is blamed on them"""
 
 
-def inflation_of(sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: Sigmas) -> Inflation:
+def inflation_of(
+    sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: Sigmas, processes: int = 1
+) -> Inflation:
     """From windows without gaps; `shared` is what they agree on, `sigmas` the noise as it seems within them."""
     loose = Sigmas(sigmas.pixel, LOOSE * sigmas.linear, LOOSE * sigmas.angular)
     pairs = [window for window in windows if len(window[2]) >= 2 * MIN_LANDMARKS]
-    ends = _ends(sequence, [_half(window, parity) for window in pairs for parity in (0, 1)], loose, shared)
-    halves = _factor([_between(*both) for both in zip(ends[::2], ends[1::2], strict=True)])
+    both = [_half(window, parity) for window in pairs for parity in (0, 1)]
+    ends = _ends(sequence, both, loose, shared, processes)
+    halves = _factor([_between(one, other) for one, other in zip(ends[::2], ends[1::2], strict=True)])
     by_cameras, by_velocities = [], []
     enough = [window for window in windows if len(window[2]) >= MIN_LANDMARKS]
-    for (data, _, _), (seen, C) in zip(enough, _ends(sequence, enough, loose, shared), strict=True):
+    whole = _ends(sequence, enough, loose, shared, processes)
+    for (data, _, _), (seen, C) in zip(enough, whole, strict=True):
         driven, C_driven = _driven(data, shared, sigmas)
         gap = se3.log(se3.inverse(seen) @ driven)
         by_cameras.append((gap, C, C_driven))
@@ -77,10 +81,10 @@ def _half(window: Window, parity: int) -> Window:
     return half, poses, points[parity::2]
 
 
-def _ends(sequence: Sequence, windows: list[Window], loose: Sigmas, shared: FloatArray) -> list[End]:
+def _ends(sequence: Sequence, windows: list[Window], loose: Sigmas, shared: FloatArray, processes: int) -> list[End]:
     """Where each window ends, from the tracks."""
     common = [shared] * len(windows)
-    fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS)
+    fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
     return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 

@@ -30,29 +30,30 @@ class Regression(NamedTuple):
 def regress(y: FloatArray, X: FloatArray, prior: FloatArray) -> Regression:
     """Coefficients (p,) of X (n, d, p) for y (n, d), with prior deviations (p,), by reweighted least squares."""
     n, d, p = X.shape
-    rows, price = np.ascontiguousarray(X).reshape(n * d, p), np.diag(1.0 / prior**2)
+    columns, price = np.ascontiguousarray(X.transpose(2, 1, 0)).reshape(p, d * n), np.diag(1.0 / prior**2)
+    target = np.ascontiguousarray(y.T)
     theta: FloatArray = np.zeros(p)
     information = price
     for _ in range(ROUNDS):
-        residual = y - (rows @ theta).reshape(n, d)
-        sigma = _bulk(residual)
+        residual = target - (theta @ columns).reshape(d, n)
+        sigma = _bulk(residual)[:, None]
         weight = np.maximum(1.0 - (residual / (TUKEY * sigma)) ** 2, 0.0) ** 2 / sigma**2
-        weighted = rows.T * weight.reshape(-1)
-        information = weighted @ rows + price
-        theta = np.asarray(np.linalg.solve(information, weighted @ y.reshape(-1)), dtype=np.float64)
+        weighted = columns * weight.reshape(-1)
+        information = weighted @ columns.T + price
+        theta = np.asarray(np.linalg.solve(information, weighted @ target.reshape(-1)), dtype=np.float64)
         theta = np.clip(theta, -FARTHEST * prior, FARTHEST * prior)
-    sigma = _bulk(y - (rows @ theta).reshape(n, d))
-    likelihood = -n * float(np.log(sigma).sum()) - 0.5 * float(np.sum((theta / prior) ** 2))
+    deviation = _bulk(target - (theta @ columns).reshape(d, n))
+    likelihood = -n * float(np.log(deviation).sum()) - 0.5 * float(np.sum((theta / prior) ** 2))
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    return Regression(theta, covariance, sigma, likelihood)
+    return Regression(theta, covariance, deviation, likelihood)
 
 
 def _bulk(residual: FloatArray) -> FloatArray:
-    """(d,) 1.4826 times the median size of residuals (n, d): the deviation of a Gaussian bulk."""
-    half = len(residual) // 2
+    """(d,) 1.4826 times the median size of residuals (d, n): the deviation of a Gaussian bulk."""
+    half = residual.shape[1] // 2
     # np.median's value; it takes several times as long, and this is half of what a regression does.
-    sorted_about = np.partition(np.abs(residual.T), half, axis=1)
+    sorted_about = np.partition(np.abs(residual), half, axis=1)
     median = sorted_about[:, half]
-    if len(residual) % 2 == 0:
+    if residual.shape[1] % 2 == 0:
         median = 0.5 * (median + sorted_about[:, :half].max(axis=1))
     return np.asarray(np.maximum(1.4826 * median, 1e-9), dtype=np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
+from .. import forks
 from .window_system import Landmarks, Reduced, around_intervals, landmark_steps, moved_along, reduced, terms_of
 from .window_terms import SHARED, Joined, MotionTerms, Sigmas, Window, joined, motion_terms, pixel_terms
 
@@ -51,17 +52,21 @@ def fit_windows_alike(
     sigmas: Sigmas,
     shared: Sequence[FloatArray],
     iterations: int,
+    processes: int = 1,
 ) -> list[WindowFit]:
     """Gauss-Newton of each window by itself; its `shared` (8,) is free too, under a wide prior."""
-    fits: list[WindowFit] = []
-    group: list[int] = []
+    groups: list[list[int]] = [[]]
     for i in range(len(windows)):
-        group.append(i)
-        if sum(len(windows[j][0].frame) for j in group) >= TOGETHER or i == len(windows) - 1:
-            chosen = [windows[j] for j in group], np.array([shared[j] for j in group])
-            fits += _fitted(camera, imu_T_cam, chosen[0], sigmas, chosen[1], iterations)
-            group = []
-    return fits
+        if sum(len(windows[j][0].frame) for j in groups[-1]) >= TOGETHER:
+            groups.append([])
+        groups[-1].append(i)
+
+    def fitted(group: list[int]) -> list[WindowFit]:
+        chosen = [windows[i] for i in group]
+        return _fitted(camera, imu_T_cam, chosen, sigmas, np.array([shared[i] for i in group]), iterations)
+
+    with forks.shared(lambda number: fitted(groups[number]), len(groups) if windows else 0, processes) as gathered:
+        return [fit for fits in gathered() for fit in fits]
 
 
 def _fitted(

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fgbaseline.data.forks import cores, shared
+
 from .. import job
-from ..forks import cores, shared
 from ..whole_folder import require_free, whole_folder
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
         told.say(f"{held.n_tracks} tracks held out, {len(held.observations)} observations")
     if settings.preset == "calibrated" and not settings.as_recorded:
         told.say("diagnosing the recording")
-    with shared(lambda _: job.pose_problem(kept, settings), 1, cores()) as posed:
+    with shared(lambda _: job.pose_problem(kept, settings, cores()), 1, cores()) as posed:
         # Two seconds of imports: bad input is told before, and the diagnosis goes on meanwhile.
         from .. import page
         from ..run_folder import write_run

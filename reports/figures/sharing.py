@@ -4,8 +4,8 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from fgbaseline.data.forks import shared
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.forks import shared
 
 from .drawing import drawings
 from .layout import lay_out

@@ -70,7 +70,7 @@ def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
         for _ in range(helpers):
             context = get_context("fork")
             answer, into = context.Pipe(duplex=False)
-            process = context.Process(target=_help, args=(work, numbers, answer, into), daemon=True)
+            process = context.Process(target=_help, args=(work, numbers, answer, into))
             process.start()
             into.close()
             started.append(process)
