@@ -62,12 +62,12 @@ def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
     Rows are named by their edges in m; points that lie behind the camera are in none.
     """
     groups = table.groupby(pd.cut(table["depth"], DEPTHS, labels=depth_classes(), right=False), observed=False)
-    return groups.agg(
-        n=("distance", "size"),
-        distance=("distance", "median"),
-        seen=("seen", "median"),
-        sigmas=("sigmas", "median"),
-        with_sigmas=("sigmas", "count"),
+    return pd.DataFrame(
+        {
+            "n": groups.size(),
+            **{column: groups[column].median() for column in ("distance", "seen", "sigmas")},
+            "with_sigmas": groups["sigmas"].count(),
+        }
     )
 
 

@@ -68,16 +68,16 @@ def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
     groups = table.assign(squared=table["error"] ** 2, near=table["error"] < NEAR, behind=table["depth"] <= 0).groupby(
         what
     )
-    result = groups.agg(
-        median=("error", "median"),
-        mean=("error", "mean"),
-        rmse=("squared", "mean"),
-        under_3px=("near", "mean"),
-        behind_camera=("behind", "sum"),
-        n=("error", "size"),
+    return pd.DataFrame(
+        {
+            "median": groups["error"].median(),
+            "mean": groups["error"].mean(),
+            "rmse": np.sqrt(groups["squared"].mean()),
+            "under_3px": groups["near"].mean(),
+            "behind_camera": groups["behind"].sum(),
+            "n": groups.size(),
+        }
     )
-    result["rmse"] = np.sqrt(result["rmse"])
-    return result
 
 
 def commonly_used(estimates: Iterable[Estimate]) -> BoolArray | None:

@@ -43,7 +43,7 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
-        series(run, result).to_csv(folder / "series" / f"{name}.csv", float_format="%.9g")
+        nine_digits(series(run, result)).to_csv(folder / "series" / f"{name}.csv")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
             write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
@@ -55,6 +55,16 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     text = json.dumps(_as_dict(summary), indent=2, allow_nan=False)
     (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
     return summary
+
+
+def nine_digits(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with its floats as text, empty where they have no number: pandas asks of each on its own what it is."""
+    text = {
+        str(name): [f"{value:.9g}" if value == value else "" for value in column.tolist()]
+        for name, column in table.items()
+        if column.dtype.kind == "f"
+    }
+    return table.assign(**text)
 
 
 def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.Written]) -> None:
