@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Collection
+from collections.abc import Sequence as Listing
 from dataclasses import dataclass, field
 
 import gtsam
@@ -15,17 +16,17 @@ from fgbaseline.geometry import FloatArray
 from .arrival import FRAME_LOST, Arrival, add_recovering
 from .arrivals import Arrivals
 from .convention import reordered
+from .elimination import Chronology
 from .journal import IndeterminateSystemError, RestorableISAM2
-from .keys import distance_key, landmark_of, pose_key, thresholds
+from .keys import TAIL, distance_key, landmark_of, pose_key, thresholds
 from .undone import UNDONE, undone
 from .values import landmarks_of, poses_of
 from .waiting import EntryRule
 
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
-CROWD = 200
-"""landmarks of a frame, above which they are eliminated before its pose. By default GTSAM keeps all that a frame sees
-for the end, which costs the next frame least, as long as so many dense columns do not cost more themselves"""
+TIE = gtsam.noiseModel.Unit.Create(6)
+"""of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
 UNSETTLED = 4
 """updates that all relinearise, from one on whose landmarks are all new: they and the last poses start far off"""
 SETTLING_UPDATES = 8
@@ -87,6 +88,9 @@ class IncrementalSmoother:
         """in the graph"""
         self._unsettled = 0
         """frames for which every update relinearises"""
+        self._chronology = Chronology()
+        self._tail: int | None = None
+        """the slot of its factor"""
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
@@ -102,6 +106,9 @@ class IncrementalSmoother:
 
     def settle(self) -> None:
         """After the last frame: updates without anything new, until every variable is within its threshold."""
+        if self._tail is not None:
+            self._update(gtsam.NonlinearFactorGraph(), gtsam.Values(), (), [self._tail])
+            self._tail = None
         for _ in range(SETTLING_UPDATES):
             try:
                 result = self.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
@@ -129,8 +136,12 @@ class IncrementalSmoother:
         """See `arrival.Graph`."""
         k, factors = arrival.frame, self.arrivals.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        values.insert(pose_key(k), gtsam.Pose3(arrival.guess))
+        pose = gtsam.Pose3(arrival.guess)
+        values.insert(pose_key(k), pose)
         graph.push_back(arrival.motion)
+        if self._tail is None:
+            values.insert(TAIL, pose)
+        graph.push_back(gtsam.BetweenFactorPose3(pose_key(k), TAIL, gtsam.Pose3(), TIE))
         owner: list[tuple[int, int]] = []
         new = {e.landmark: distance_key(e.landmark, _distance(e.start, arrival.guess)) for e in arrival.entries}
         for entry in arrival.entries:
@@ -147,25 +158,28 @@ class IncrementalSmoother:
             owner.append((j, i))
         if arrival.entries and not arrival.seen:
             self._unsettled = UNSETTLED
-        crowded = len(arrival.entries) + len(arrival.seen) > CROWD
-        result = self._update(graph, values, given_up, pose_key(k) if crowded else None, self._unsettled > 0)
+        sighted = [*new.values(), *(self.key[j] for j in arrival.seen)]
+        groups = self._chronology.groups(k, sighted, fresh=self._unsettled > 0)
+        tail = [] if self._tail is None else [self._tail]
+        result = self._update(graph, values, given_up, tail, groups, self._unsettled > 0)
         self._unsettled = max(0, self._unsettled - 1)
         self.key |= new
-        for (j, i), slot in zip(owner, list(result.getNewFactorsIndices())[1:], strict=True):
-            self._slots.setdefault(j, {})[i] = int(slot)
+        _, self._tail, *slots = result.getNewFactorsIndices()
+        for (j, i), slot in zip(owner, slots, strict=True):
+            self._slots.setdefault(j, {})[i] = slot
 
     def _update(
         self,
         graph: gtsam.NonlinearFactorGraph,
         values: gtsam.Values,
         given_up: Collection[int],
-        last: int | None = None,
+        removed: Listing[int] = (),
+        groups: dict[int, int] | None = None,
         relinearise: bool = False,
     ) -> gtsam.ISAM2Result:
         there = [j for j in given_up if j in self.key]
-        result = self.isam.update(
-            graph, values, [slot for j in there for slot in self._slots[j].values()], last, relinearise
-        )
+        slots = [slot for j in there for slot in self._slots[j].values()]
+        result = self.isam.update(graph, values, [*removed, *slots], groups, relinearise)
         for j in there:
             del self.key[j], self._slots[j]
         return result

@@ -23,6 +23,13 @@ _LETTER_AT = 56
 """the bit of a key from which on it holds its letter, as in `gtsam.symbol`, which costs ten times as much"""
 _POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
 
+TAIL = ord("z") << _LETTER_AT
+"""the key of a pose that hangs on the newest one alone and is eliminated after it.
+
+It tells nothing, but makes a root of two poses, where the covariance of the newest one is at hand. Without it GTSAM
+would find that pose at the end of a clique with all that a frame sees, and invert the whole of it for each frame.
+"""
+
 
 def pose_key(frame: int) -> int:
     """The key of the pose of a frame."""
@@ -42,13 +49,15 @@ def distance_key(landmark: int, distance: float) -> int:
 
 def landmark_of(key: int) -> int | None:
     """The landmark that a key stands for; None for a pose."""
-    return None if key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
+    return None if key == TAIL or key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
 
 
 def thresholds(position: float, rotation: float, landmark: float) -> gtsam.ISAM2ThresholdMap:
     """Relinearisation thresholds: of poses in m and rad, of landmarks as a share of their distance."""
     by_letter = gtsam.ISAM2ThresholdMap()
     by_letter.insert((POSE, np.array([rotation] * 3 + [position] * 3)))
+    by_letter.insert(("z", np.full(6, 1e9)))
+    by_letter.insert((chr(TAIL >> _LETTER_AT), np.full(6, np.inf)))
     for i, letter in enumerate(LETTERS):
         by_letter.insert((letter, np.full(3, landmark * NEAREST * RATIO**i)))
     return by_letter

@@ -1,0 +1,117 @@
+"""Updates eliminate what came first first; that changes what they cost, and not what they find."""
+
+from itertools import pairwise
+
+import gtsam
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fgbaseline import data, smoother
+from fgbaseline.data import NoiseSettings, Problem
+from fgbaseline.data.motion import Shift
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.smoother import incremental
+from fgbaseline.smoother.elimination import CROWD, FRAMES, GROUPS, Chronology
+from fgbaseline.smoother.keys import TAIL, distance_key, landmark_of, pose_key
+
+LIFE = 3
+"""frames that a landmark of these drives is seen"""
+
+
+def key(landmark: int) -> int:
+    return distance_key(landmark, 20.0)
+
+
+def seen_at(frame: int) -> list[int]:
+    """One new landmark a frame."""
+    return [key(j) for j in range(max(0, frame - LIFE + 1), frame + 1)]
+
+
+def test_what_came_first_is_eliminated_first() -> None:
+    chronology = Chronology()
+    frame = 0
+    for frame in range(2 * FRAMES * GROUPS):
+        groups = chronology.groups(frame, seen_at(frame))
+    ages = [groups.get(pose_key(k), 0) for k in range(frame + 1)]
+    assert all(a <= b for a, b in pairwise(ages))
+    assert ages[0] == 0
+    # A landmark goes with the frame that saw it last, and what the newest frame sees with that.
+    last_sight = [groups.get(key(j), 0) for j in range(frame - LIFE + 1)]
+    assert last_sight == ages[LIFE - 1 : frame]
+    assert [groups[k] for k in seen_at(frame)] == [groups[pose_key(frame)]] * LIFE
+    assert groups[pose_key(frame)] == max(ages) > ages[frame - 1]
+    assert groups[TAIL] == max(groups.values()) > groups[pose_key(frame)]
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.booleans()), min_size=1, max_size=60))
+def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool]]) -> None:
+    chronology, fresh_landmark = Chronology(), 0
+    for frame, (n, fresh) in enumerate(frames):
+        sights = [key(fresh_landmark + i) for i in range(n)]
+        fresh_landmark += n
+        groups = chronology.groups(frame, sights, fresh=fresh)
+        variables = 2 + (frame > 0) + n
+        assert max(groups.values()) < variables
+        assert groups[TAIL] > max(group for k, group in groups.items() if k != TAIL)
+
+
+def test_of_a_crowd_only_the_pose_is_kept_for_the_end() -> None:
+    assert Chronology().groups(5, list(map(key, range(CROWD + 1)))) == {pose_key(5): 1, TAIL: 2}
+
+
+def test_where_all_is_fresh_the_frame_before_is_kept_for_the_end() -> None:
+    groups = Chronology().groups(5, [key(0)], fresh=True)
+    assert groups == {pose_key(4): 1, pose_key(5): 1, key(0): 1, TAIL: 2}
+
+
+def test_the_tail_is_no_landmark() -> None:
+    assert landmark_of(TAIL) is None
+
+
+def short_drive() -> Problem:
+    simulation = Simulation(duration=4.0, features_per_frame=15.0, seed=4, wrong_share=0.0)
+    noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
+    return data.calibrated(simulate(simulation), settings=data.Calibration(noise, shift=Shift.AFTER))
+
+
+def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = short_drive()
+    ours = smoother.isam2(problem)
+    calls = []
+
+    def last(_: Chronology, frame: int, __: list[int], **fresh: bool) -> dict[int, int]:
+        calls.append(frame)
+        return {pose_key(frame): min(frame, 1), TAIL: 1 + min(frame, 1)}
+
+    monkeypatch.setattr(incremental.Chronology, "groups", last)
+    other = smoother.isam2(problem)
+    assert calls == list(range(problem.n_frames))
+    np.testing.assert_allclose(ours.world_T_imu, other.world_T_imu, atol=1e-6)
+    assert ours.covariance is not None
+    assert other.covariance is not None
+    np.testing.assert_allclose(ours.covariance, other.covariance, rtol=1e-4, atol=1e-12)
+    a, b = ours.by_products["isam2-online"], other.by_products["isam2-online"]
+    np.testing.assert_allclose(a.world_T_imu, b.world_T_imu, atol=2e-3)
+    assert a.covariance is not None
+    assert b.covariance is not None
+    sigmas = [np.sqrt(np.einsum("nii->ni", covariance)) for covariance in (a.covariance, b.covariance)]
+    np.testing.assert_allclose(*sigmas, rtol=0.01)
+
+
+def test_the_tail_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    graphs = []
+    final = smoother.reference._final
+
+    def kept(*arguments: object) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        graphs.append(final(*arguments))
+        return graphs[-1]
+
+    monkeypatch.setattr(smoother.reference, "_final", kept)
+    smoother.isam2(short_drive())
+    ((graph, values),) = graphs
+    assert not values.exists(TAIL)
+    keys = {key for i in range(graph.size()) for key in list(graph.at(i).keys())}
+    assert pose_key(0) in keys
+    assert TAIL not in keys
