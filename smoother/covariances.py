@@ -25,63 +25,89 @@ class _Joint(NamedTuple):
     """of each variable, by its key"""
     covariance: FloatArray
 
+    def of(self, keys: list[int]) -> list[int]:
+        """The columns of some of the variables, in the order of their keys."""
+        return [i for columns in map(self.columns.__getitem__, keys) for i in columns]
+
+
+class _Conditional(NamedTuple):
+    """p(x_i | x_S)."""
+
+    key: int
+    later: list[int]
+    """the keys of S"""
+    own: FloatArray
+    """(d, d) R_i^-1 R_i^-T"""
+    gain: FloatArray
+    """(d, n) G"""
+
 
 def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
     """The covariance (d, d) of every variable, by its key, in GTSAM's tangent order, linearised at `values`.
 
     Raises RuntimeError where the system is indeterminate.
     """
-    net = graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD)
-    conditionals = [net.at(i) for i in range(net.size())]
-    keys = [list(conditional.keys()) for conditional in conditionals]
-    position = {key: i for i, (key, *_) in enumerate(keys)}
+    conditionals = _conditionals(graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD))
+    position = {conditional.key: i for i, conditional in enumerate(conditionals)}
     children: dict[int, list[int]] = defaultdict(list)
     waiting: list[tuple[int, _Joint]] = []
-    for i, (_, *neighbours) in enumerate(keys):
-        if neighbours:
-            children[min(position[key] for key in neighbours)].append(i)
+    for i, conditional in enumerate(conditionals):
+        if conditional.later:
+            children[min(map(position.__getitem__, conditional.later))].append(i)
         else:
             waiting.append((i, _Joint({}, np.empty((0, 0)))))
     found: dict[int, FloatArray] = {}
     while waiting:
         # Depth first: only the joint covariances on the way to the root are held.
         i, parent = waiting.pop()
-        own = _Own.of(keys[i][1:], conditionals[i].R(), conditionals[i].S(), parent)
-        found[keys[i][0]] = own.covariance
-        if children[i]:
-            joint = _joint(keys[i], own, parent)
-            waiting.extend((child, joint) for child in children[i])
+        joint = _joint(conditionals[i], parent)
+        d = len(conditionals[i].own)
+        found[conditionals[i].key] = joint.covariance[:d, :d]
+        inner = [child for child in children[i] if child in children]
+        waiting.extend((child, joint) for child in inner)
+        found |= _leaves([conditionals[child] for child in children[i] if child not in children], joint)
     return found
 
 
-class _Own(NamedTuple):
-    """A variable's covariance, and what it took."""
-
-    covariance: FloatArray
-    cross: FloatArray
-    """-cov(x_i, x_S)"""
-    later: FloatArray
-    """cov(x_S)"""
-
-    @staticmethod
-    def of(later_keys: list[int], R: FloatArray, S: FloatArray, parent: _Joint) -> "_Own":
-        """Of the variable with this conditional, whose later neighbours are among the variables of `parent`."""
-        R_inverse = np.linalg.inv(R)
-        covariance = R_inverse @ R_inverse.T
-        if not later_keys:
-            return _Own(covariance, np.empty((len(R), 0)), np.empty((0, 0)))
-        among = [i for columns in map(parent.columns.__getitem__, later_keys) for i in columns]
-        later = parent.covariance[among][:, among]
-        gain = R_inverse @ S
-        cross = gain @ later
-        return _Own(covariance + cross @ gain.T, cross, later)
+def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
+    each = [net.at(i) for i in range(net.size())]
+    R = [conditional.R() for conditional in each]
+    inverse: list[FloatArray] = [np.empty(0)] * len(each)
+    for d in {len(r) for r in R}:  # many at once cost little more than one
+        chosen = [i for i, r in enumerate(R) if len(r) == d]
+        for i, r in zip(chosen, np.linalg.inv(np.array([R[i] for i in chosen])), strict=True):
+            inverse[i] = r
+    result = []
+    for conditional, r in zip(each, inverse, strict=True):
+        key, *later = conditional.keys()
+        result.append(_Conditional(key, later, r @ r.T, r @ conditional.S()))
+    return result
 
 
-def _joint(keys: list[int], own: _Own, parent: _Joint) -> _Joint:
-    """The joint covariance of a variable and its later neighbours."""
-    d = len(own.covariance)
-    columns, end = {keys[0]: range(d)}, d
-    for key in keys[1:]:
+def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
+    """The joint covariance of a variable and its later neighbours, which are among the variables of `parent`."""
+    d = len(conditional.own)
+    columns, end = {conditional.key: range(d)}, d
+    for key in conditional.later:
         columns[key] = range(end, end + len(parent.columns[key]))
         end = columns[key].stop
-    return _Joint(columns, np.block([[own.covariance, -own.cross], [-own.cross.T, own.later]]))
+    among = parent.of(conditional.later)
+    covariance = np.empty((end, end))
+    later = covariance[d:, d:] = parent.covariance[among][:, among]
+    cross = conditional.gain @ later
+    covariance[:d, d:], covariance[d:, :d] = -cross, -cross.T
+    covariance[:d, :d] = conditional.own + cross @ conditional.gain.T
+    return _Joint(columns, covariance)
+
+
+def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
+    """The covariances of variables whose later neighbours are all among those of `parent`, by their keys."""
+    result = {}
+    for d in {len(leaf.own) for leaf in leaves}:
+        chosen = [leaf for leaf in leaves if len(leaf.own) == d]
+        gain = np.zeros((len(chosen), d, len(parent.covariance)))
+        for i, leaf in enumerate(chosen):
+            gain[i][:, parent.of(leaf.later)] = leaf.gain
+        covariance = (gain @ parent.covariance) @ gain.transpose(0, 2, 1) + np.array([leaf.own for leaf in chosen])
+        result |= {leaf.key: covariance[i] for i, leaf in enumerate(chosen)}
+    return result
