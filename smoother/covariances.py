@@ -102,7 +102,7 @@ def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
 
 def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
     """The covariances of variables whose later neighbours are all among those of `parent`, by their keys."""
-    result = {}
+    result: dict[int, FloatArray] = {}
     for d in {len(leaf.own) for leaf in leaves}:
         chosen = [leaf for leaf in leaves if len(leaf.own) == d]
         gain = np.zeros((len(chosen), d, len(parent.covariance)))
