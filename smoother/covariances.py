@@ -36,10 +36,19 @@ class _Conditional(NamedTuple):
     key: int
     later: list[int]
     """the keys of S"""
-    own: FloatArray
-    """(d, d) R_i^-1 R_i^-T"""
-    gain: FloatArray
-    """(d, n) G"""
+    inverse: FloatArray
+    """(d, d) R_i^-1"""
+    density: gtsam.GaussianConditional
+
+    @property
+    def own(self) -> FloatArray:
+        """(d, d) R_i^-1 R_i^-T."""
+        return self.inverse @ self.inverse.T
+
+    @property
+    def gain(self) -> FloatArray:
+        """(d, n) G; large, so it is made when it is needed."""
+        return self.inverse @ self.density.S()
 
 
 def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
@@ -61,8 +70,8 @@ def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict
         # Depth first: only the joint covariances on the way to the root are held.
         i, parent = waiting.pop()
         joint = _joint(conditionals[i], parent)
-        d = len(conditionals[i].own)
-        found[conditionals[i].key] = joint.covariance[:d, :d]
+        d = len(conditionals[i].inverse)
+        found[conditionals[i].key] = joint.covariance[:d, :d].copy()  # a view would hold the whole
         inner = [child for child in children[i] if child in children]
         waiting.extend((child, joint) for child in inner)
         found |= _leaves([conditionals[child] for child in children[i] if child not in children], joint)
@@ -71,7 +80,7 @@ def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict
 
 def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
     each = [net.at(i) for i in range(net.size())]
-    R = [conditional.R() for conditional in each]
+    R = [np.array(conditional.R()) for conditional in each]
     inverse: list[FloatArray] = [np.empty(0)] * len(each)
     for d in {len(r) for r in R}:  # many at once cost little more than one
         chosen = [i for i, r in enumerate(R) if len(r) == d]
@@ -80,13 +89,13 @@ def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
     result = []
     for conditional, r in zip(each, inverse, strict=True):
         key, *later = conditional.keys()
-        result.append(_Conditional(key, later, r @ r.T, r @ conditional.S()))
+        result.append(_Conditional(key, later, r, conditional))
     return result
 
 
 def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
     """The joint covariance of a variable and its later neighbours, which are among the variables of `parent`."""
-    d = len(conditional.own)
+    d = len(conditional.inverse)
     columns, end = {conditional.key: range(d)}, d
     for key in conditional.later:
         columns[key] = range(end, end + len(parent.columns[key]))
@@ -94,17 +103,18 @@ def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
     among = parent.of(conditional.later)
     covariance = np.empty((end, end))
     later = covariance[d:, d:] = parent.covariance[among][:, among]
-    cross = conditional.gain @ later
+    gain = conditional.gain
+    cross = gain @ later
     covariance[:d, d:], covariance[d:, :d] = -cross, -cross.T
-    covariance[:d, :d] = conditional.own + cross @ conditional.gain.T
+    covariance[:d, :d] = conditional.own + cross @ gain.T
     return _Joint(columns, covariance)
 
 
 def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
     """The covariances of variables whose later neighbours are all among those of `parent`, by their keys."""
     result: dict[int, FloatArray] = {}
-    for d in {len(leaf.own) for leaf in leaves}:
-        chosen = [leaf for leaf in leaves if len(leaf.own) == d]
+    for d in {len(leaf.inverse) for leaf in leaves}:
+        chosen = [leaf for leaf in leaves if len(leaf.inverse) == d]
         gain = np.zeros((len(chosen), d, len(parent.covariance)))
         for i, leaf in enumerate(chosen):
             gain[i][:, parent.of(leaf.later)] = leaf.gain
