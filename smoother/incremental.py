@@ -204,14 +204,24 @@ class IncrementalSmoother:
         o = self.arrivals.observations.select(self.used())
         return undone(self.problem, o, poses_of(values, range(self._n_frames)), landmarks_of(values, self.key))
 
-    def drop_undone(self, values: gtsam.Values) -> bool:
-        """After the last frame: gives up every landmark whose geometry came undone; False if there is none.
+    def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        """After the last frame: the factors in their slots and the solution. The tree is gone, as large as it is."""
+        tree = self.isam.tree
+        graph = gtsam.NonlinearFactorGraph(tree.getFactorsUnsafe())
+        values = tree.calculateEstimate()
+        del self.isam
+        return graph, values
+
+    def drop_undone(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:
+        """Takes every landmark whose geometry came undone out of what `released` gave; False if there is none.
 
         Such a landmark pulls at nothing (its Jacobian is zero) and its residual means nothing.
         """
         given_up = self._undone(values)
-        if given_up:
-            self._update(gtsam.NonlinearFactorGraph(), gtsam.Values(), given_up)
+        for j in given_up:
+            for slot in self._slots.pop(j).values():
+                graph.remove(slot)
+            values.erase(self.key.pop(j))
         last = self.problem.n_frames - 1
         self.events += [Event(last, "landmark dropped", UNDONE, landmark) for landmark in given_up]
         return bool(given_up)

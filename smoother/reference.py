@@ -114,10 +114,11 @@ def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
 
 def _final(smoother: IncrementalSmoother, relinearise: bool) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     """The whole graph and its solution, relinearised or not, without the landmarks whose geometry came undone."""
+    slots, values = smoother.released()
     while True:
-        graph, values = compact(smoother.isam.tree.getFactorsUnsafe()), smoother.isam.tree.calculateEstimate()
+        graph = compact(slots)
         values, failure = relinearised(graph, values) if relinearise else Relinearised(values)
-        if not smoother.drop_undone(values):
+        if not smoother.drop_undone(slots, values):
             break
     if failure:
         last = smoother.problem.n_frames - 1
