@@ -10,15 +10,11 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from fgbaseline import data, ekf
 from fgbaseline.data.simulate import Simulation, simulate
@@ -27,6 +23,7 @@ from fgbaseline.reports.cli.main import COMMANDS, group
 
 from .commands import environment
 from .documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown
+from .empty_figures import figures_left_empty
 
 ELSEWHERE = {
     "make test": "tests/test_docs.py::test_targets_of_make_are_there",
@@ -166,27 +163,9 @@ class Place:
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     folder = tmp_path_factory.mktemp("docs")
     with pytest.MonkeyPatch.context() as patch:
-        _figures_left_empty(patch)
+        figures_left_empty(patch)
         patch.chdir(folder)
         yield Place(folder)
-
-
-def _figures_left_empty(patch: pytest.MonkeyPatch) -> None:
-    """Nine tenths of a run on a short recording are writing its figures; tests/test_figures.py looks at these."""
-    written, empty = Figure.savefig, {}
-    for form in ("png", "svg", "pdf"):
-        stream = BytesIO()
-        Figure(figsize=(0.1, 0.1)).savefig(stream, format=form)
-        empty[form] = stream.getvalue()
-
-    def savefig(figure: Figure, target: object, **options: Any) -> None:
-        if isinstance(target, BytesIO):
-            target.write(empty[options["format"]])
-        else:
-            written(figure, target, **options)  # type: ignore[arg-type]
-
-    patch.setattr(Figure, "savefig", savefig)
-    patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
 
 
 def _ids(documents: list[Path]) -> list[str]:

@@ -167,7 +167,7 @@ def test_the_command_takes_a_share(tmp_path: Path) -> None:
     assert refused.returncode == 2
     assert "held-out: expected a share above 0 and below 1, got 2" in refused.stderr
     assert not (tmp_path / "out").exists()
-    taken = fgbaseline(*arguments, "--held-out", "0.3", "--as-recorded", cwd=tmp_path)
+    taken = fgbaseline(*arguments, "--held-out", "0.3", "--as-recorded", cwd=tmp_path, drawing=False)
     assert taken.returncode == 0, taken.stderr
     assert "tracks held out" in taken.stderr
     settings = json.loads((tmp_path / "out" / "summary.json").read_text())["settings"]
