@@ -18,6 +18,7 @@ from .saving import Written, written
 from .style import in_style
 
 FORMS = ("png", "svg")
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 def draw_and_write(run: Run, processes: int) -> dict[str, Written]:
@@ -98,7 +99,8 @@ def _helping(run: Run, names: Sequence[str], numbers: int, helpers: int) -> Iter
         for _ in range(helpers):
             answer, into = context.Pipe(duplex=False)
             process = context.Process(target=_help, args=(run, names, numbers, answer, into), daemon=True)
-            process.start()
+            with _interrupts_held_back():
+                process.start()
             into.close()
             started.append(process)
             answers.append(answer)
@@ -111,9 +113,20 @@ def _helping(run: Run, names: Sequence[str], numbers: int, helpers: int) -> Iter
             answer.close()
 
 
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """They come when the block ends: in the functions that Python calls around a fork, an exception is swallowed."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _help(run: Run, names: Sequence[str], numbers: int, answer: Connection, into: Connection) -> None:
     """In the fork. Interrupting is the parent's business; where the parent is gone, nobody reads, and sending fails."""
     answer.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
     into.send(_written(run, names, numbers))
