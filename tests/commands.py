@@ -7,8 +7,8 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from contextlib import suppress
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
@@ -21,10 +21,9 @@ from fgbaseline.reports.cli import main
 from .empty_figures import figures_left_empty
 
 COMMAND = Path(sys.executable).with_name("fgbaseline")
-SECONDS = 300
-"""that a command may take"""
-INTERNAL_ERROR = 1
 ROOT = Path(__file__).parents[1]
+SECONDS = 1200
+"""that a command may take, on a machine that has much else to do"""
 UNDRAWN = """
 import sys
 import pytest
@@ -48,25 +47,12 @@ def environment(**changes: str) -> dict[str, str]:
 
 def installed(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
     """The installed command run to its end in `cwd`, with no input, in a process that imports everything anew."""
-    return _ended([COMMAND, *arguments], cwd, env)
+    return _ended([COMMAND, *arguments], cwd, environment(**env))
 
 
 def undrawn(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
     """The command in a new Python that leaves its figures empty."""
-    return _ended([sys.executable, "-c", UNDRAWN, ROOT, *arguments], cwd, env)
-
-
-def _ended(command: list[str | Path], cwd: Path, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [str(part) for part in command],
-        cwd=cwd,
-        env=environment(**env),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=SECONDS,
-        check=False,
-    )
+    return _ended([sys.executable, "-c", UNDRAWN, ROOT, *arguments], cwd, environment(**env))
 
 
 def fgbaseline(
@@ -80,22 +66,48 @@ def fgbaseline(
 
     Without `drawing`, figures have their files, but nothing is on them. `first` is called in the fork before all else.
     """
+    command = _in_a_fork([str(part) for part in arguments], environment(**env), drawing, first)
+    return _ended(["fgbaseline", *arguments], cwd, None, command)
+
+
+def started(*arguments: str | Path, cwd: Path, drawing: bool = True) -> subprocess.Popen[str]:
+    """The same, running; its standard error can be read line by line."""
+    command = _in_a_fork([str(part) for part in arguments], environment(), drawing)
+    return subprocess.Popen(
+        ["fgbaseline"],
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=command,
+        restore_signals=False,
+    )
+
+
+def _ended(
+    command: list[str | Path], cwd: Path, env: dict[str, str] | None, instead: Callable[[], NoReturn] | None = None
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env=env,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+        check=False,
+        preexec_fn=instead,
+        restore_signals=instead is None,  # those that Python ignores are ignored in a fork of it
+    )
+
+
+def _in_a_fork(
+    arguments: list[str], env: dict[str, str], drawing: bool, first: Callable[[], object] = lambda: None
+) -> Callable[[], NoReturn]:
+    """What `subprocess` is to call in the child it forks, which does not come to starting another program then."""
     _everything_imported()
-    (out, into_out), (err, into_err) = os.pipe(), os.pipe()
-    process = os.fork()
-    if process == 0:
-        _become(list(map(str, arguments)), cwd, environment(**env), into_out, into_err, drawing, first)
-    os.close(into_out)
-    os.close(into_err)
-    with ThreadPoolExecutor(2) as readers:
-        told = list(readers.map(_read, (out, err)))
-    status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-    return subprocess.CompletedProcess(["fgbaseline", *map(str, arguments)], status, *told)
-
-
-def _read(number: int) -> str:
-    with open(number) as stream:
-        return stream.read()
+    return partial(_become, arguments, env, drawing, first, _descriptors())
 
 
 @cache
@@ -106,26 +118,21 @@ def _everything_imported() -> None:
             import_module(module.name)
 
 
+def _descriptors() -> set[int]:
+    return {int(path.name) for path in Path("/proc/self/fd").iterdir()}
+
+
 def _become(
-    arguments: list[str],
-    cwd: Path,
-    env: dict[str, str],
-    out: int,
-    err: int,
-    drawing: bool,
-    first: Callable[[], object],
+    arguments: list[str], env: dict[str, str], drawing: bool, first: Callable[[], object], known: set[int]
 ) -> NoReturn:
-    """Turns this fork into the command; never returns into the tests."""
-    code = INTERNAL_ERROR
+    """Turns this fork into the command, in the folder and with the output that it has; never returns into the tests."""
+    code: int | str | None = 1
     try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.alarm(SECONDS)
-        with open(os.devnull) as nothing:  # noqa: PTH123
-            os.dup2(nothing.fileno(), 0)
-        os.dup2(out, 1)
-        os.dup2(err, 2)
+        for number in _descriptors() - known - {0, 1, 2}:  # one of them has the parent wait for a new program
+            with suppress(OSError):
+                os.close(number)
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
         sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
-        os.chdir(cwd)
         os.environ.clear()
         os.environ.update(env)
         first()
@@ -133,32 +140,18 @@ def _become(
             figures_left_empty(pytest.MonkeyPatch())
         main(arguments)
     except SystemExit as ended:
-        code = ended.code if isinstance(ended.code, int) else INTERNAL_ERROR
+        code = ended.code
     except BaseException:
         traceback.print_exc()
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(code)
+        os._exit(code if isinstance(code, int) else 0)
 
 
 def heeding_interrupts() -> None:
     """For a child before it starts: a shell's background jobs, and so all they start, ignore interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def started(*arguments: str | Path, cwd: Path) -> subprocess.Popen[str]:
-    """The installed command, running; its standard error can be read line by line."""
-    return subprocess.Popen(
-        [COMMAND, *map(str, arguments)],
-        cwd=cwd,
-        env=environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heeding_interrupts,
-    )
 
 
 def everything_in(folder: Path) -> set[str]:
