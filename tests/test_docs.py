@@ -49,7 +49,10 @@ ELSEWHERE = {
 }
 """command -> the test that runs it, on other recordings and for a shorter time"""
 IDLE = "it measures for half an hour, what only an idle machine can tell"
+OVER_AND_OVER = "it runs the tests themselves, for half an hour and more"
 NOT_RUN = {
+    "make coverage": OVER_AND_OVER,
+    "make mutants": OVER_AND_OVER,
     "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
     "make bench": IDLE,
     "make bench BENCH_FLAGS=--quick": IDLE,
