@@ -152,6 +152,9 @@ def test_equals_are_called_different_no_more_often_than_promised() -> None:
 def test_pairs_without_a_difference_settle_nothing() -> None:
     x = np.arange(20.0)
     assert not compare.rmse_difference(x, x).settled
-    assert not compare.rmse_difference([np.nan], [1.0]).settled
+    nothing = compare.rmse_difference([np.nan], [1.0])
+    assert not nothing.settled
+    assert np.isnan([nothing.value, nothing.low, nothing.high]).all()
+    assert (nothing.block, nothing.reliable) == (1, False)
     with pytest.raises(InputError, match="same moments"):
         compare.rmse_difference([1.0, 2.0], [1.0])
