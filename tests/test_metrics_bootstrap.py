@@ -69,6 +69,13 @@ def test_intervals_hold_the_true_value_as_often_as_they_say() -> None:
     assert hits[1] / trials < 0.65
 
 
+@pytest.mark.parametrize(("n", "block"), [(1, 2), (5, 6), (5, 0), (0, 2)])
+def test_a_block_is_no_longer_than_the_series(n: int, block: int) -> None:
+    with pytest.raises(InputError, match="block"):
+        compare.error_statistics(np.ones(n), block=block)
+    assert compare.error_statistics(np.ones(n), block=max(n, 1), repetitions=5).attrs["block"] == max(n, 1)
+
+
 def test_the_rmse_has_its_interval_too() -> None:
     hits = 0
     for seed in range(100):
