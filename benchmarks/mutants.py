@@ -23,7 +23,6 @@ ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
 PLACE = Path("out/mutants")
 PAGE = Path("docs/mutants.md")
 MARK, END = "<!-- python -m benchmarks.mutants -->", "<!-- end -->"
-SEED = 1
 DIED = (1, 3, 24, -24, 36, 152, 255, -9, -11)
 """exit codes: a test failed, pytest itself did, the time ran out, the process was lost"""
 SURVIVED, WITHOUT_TEST = 0, 33
@@ -65,14 +64,14 @@ def mutmut(*arguments: str) -> None:
     subprocess.run([program, *arguments], cwd=PLACE, env=env, check=False)
 
 
-def sampled(everything: list[Mutant], per_module: int) -> list[Mutant]:
+def sampled(everything: list[Mutant], per_module: int, seed: int) -> list[Mutant]:
     """So many of each module, the same every time."""
     by_module: dict[str, list[Mutant]] = {}
     for mutant in everything:
         by_module.setdefault(mutant.module, []).append(mutant)
     chosen = []
     for module, of in by_module.items():
-        chosen += random.Random(f"{SEED} {module}").sample(of, min(per_module, len(of)))
+        chosen += random.Random(f"{seed} {module}").sample(of, min(per_module, len(of)))
     return chosen
 
 
@@ -122,14 +121,16 @@ def difference(name: str) -> str:
 
 @click.command()
 @click.option("--per-module", default=12, show_default=True, help="how many mutants of each module are tried; 0: all")
+@click.option("--seed", default=1, show_default=True, help="which sample; the table is over all that were ever tried")
 @click.option("--again", is_flag=True, help="try once more only those that survived")
-def main(per_module: int, again: bool) -> None:
+def main(per_module: int, seed: int, again: bool) -> None:
     """Try mutants, and write the table."""
     copied()
     if not (PLACE / "mutants" / "mutmut-stats.json").is_file():
         mutmut("run", "--max-children", "1", "fgbaseline.compare.absolute.*")
     everything = mutants()
-    chosen = [m for m in everything if m.code == SURVIVED] if again else sampled(everything, per_module or 10**9)
+    survived = [m for m in everything if m.code in (SURVIVED, WITHOUT_TEST)]
+    chosen = survived if again else sampled(everything, per_module or 10**9, seed)
     untried = chosen if again else [m for m in chosen if m.code is None]
     if untried:
         mutmut("run", "--max-children", "1", *(m.name for m in untried))

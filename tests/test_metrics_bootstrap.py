@@ -44,7 +44,7 @@ def test_the_block_is_as_long_as_theory_has_it(phi: float) -> None:
     n = 4000
     theory = (1.5 * (2 * phi / (1 - phi**2)) ** 2 * n) ** (1 / 3)
     found = np.median([block_length(autoregressive(n, phi, seed)).length for seed in range(30)])
-    assert found == pytest.approx(theory, rel=0.25)
+    assert found == pytest.approx(theory, rel=0.12)
 
 
 def test_blocks_at_the_ends_of_what_can_be() -> None:
