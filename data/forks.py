@@ -15,6 +15,7 @@ from multiprocessing.context import ForkProcess
 from typing import TypeVar
 
 T = TypeVar("T")
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 def cores() -> int:
@@ -71,7 +72,8 @@ def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
             context = get_context("fork")
             answer, into = context.Pipe(duplex=False)
             process = context.Process(target=_help, args=(work, numbers, answer, into))
-            process.start()
+            with _interrupts_held_back():
+                process.start()
             into.close()
             started.append(process)
             answers.append(answer)
@@ -84,10 +86,21 @@ def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
             answer.close()
 
 
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """They come when the block ends: in the functions that Python calls around a fork, an exception is swallowed."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _help(work: Callable[[int], T], numbers: int, answer: Connection, into: Connection) -> None:
     """In the fork. Interrupting is the parent's business; where the parent is gone, nobody reads, and sending fails."""
     answer.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
     with suppress(Exception):
         into.send(_done(work, numbers))

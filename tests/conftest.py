@@ -22,6 +22,24 @@ settings.load_profile("fgbaseline")
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 
 
+LONGEST = (
+    "test_packaging",
+    "test_bench_runs",
+    "test_docs",
+    "test_docs_site",
+    "test_reproduce",
+    "test_check_ourselves",
+    "test_hostile",
+    "test_joint_ekf_consistency",
+)
+"""files that take half a minute and more: where they are shared out whole, none of them may be the last that runs"""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, the others in their order."""
+    items.sort(key=lambda item: item.path.stem not in LONGEST)
+
+
 @pytest.fixture(scope="session")
 def recordings() -> Callable[[str], Path]:
     """The path of a real recording, such as `recordings("03.npz")`; the test is skipped where it is missing."""

@@ -1,6 +1,6 @@
 """What a bench reports: failures as rows with their reasons, an escaped page that needs nothing else, every table."""
 
-import subprocess
+import sys
 import time
 from html.parser import HTMLParser
 from io import StringIO
@@ -32,7 +32,7 @@ from fgbaseline.reports.bench.wording import sentences
 from fgbaseline.reports.bench.work import Outcome, work
 
 from .benches import written
-from .commands import COMMAND, environment
+from .commands import fgbaseline
 
 SCRIPT = "<script>alert(1)<_script>"
 METADATA = "Metadata-Version: 2.1\nName: dying\nVersion: 1.0\n"
@@ -69,14 +69,12 @@ def test_a_process_that_dies_and_an_estimator_that_fails_are_rows_and_stop_nothi
     (package / "dying-1.0.dist-info" / "entry_points.txt").write_text("[fgbaseline.estimators]\ndying = dying:solve\n")
     (package / "dying.py").write_text(DYING)
     written(tmp_path, WITH_ONE_THAT_DIES)
-    result = subprocess.run(
-        [COMMAND, "bench", "suite.toml", "--out", "out", "--workers", "2"],
+    result = fgbaseline(
+        *("bench", "suite.toml", "--out", "out", "--workers", "2"),
         cwd=tmp_path,
-        env=environment(PYTHONPATH=str(package)),
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
+        drawing=False,
+        first=lambda: sys.path.insert(0, str(package)),
+        PYTHONPATH=str(package),
     )
     assert result.returncode == 1, result.stderr
     runs = pd.read_csv(tmp_path / "out" / "tables" / "runs.csv").set_index(["case", "estimator"])

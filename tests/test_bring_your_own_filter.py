@@ -11,7 +11,7 @@ from fgbaseline import data, ekf
 from fgbaseline.data import read_problem
 from fgbaseline.reports.comparing import compare
 
-from .commands import COMMAND, environment
+from .commands import fgbaseline
 from .synthetic import drive
 
 METADATA = """\
@@ -124,17 +124,13 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def started(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, env=environment(**env), capture_output=True, text=True, check=False)
-
-
 def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: Path) -> None:
     data.write_npz(drive(features_per_frame=20.0), tmp_path / "drive.npz")
-    told = started(COMMAND, "export", "drive.npz", "--out", "problem", cwd=tmp_path)
+    told = fgbaseline("export", "drive.npz", "--out", "problem", cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     (tmp_path / "filter.py").write_text(STANDALONE)
-    solved = started("-I", "filter.py", "problem", "mine.tum", "mine.csv", cwd=tmp_path)
+    command = [sys.executable, "-I", "filter.py", "problem", "mine.tum", "mine.csv"]
+    solved = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert solved.returncode == 0, solved.stderr
     problem = read_problem(tmp_path / "problem")
     ours = ekf.dead_reckoning(problem)
@@ -161,8 +157,12 @@ def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: P
 def test_a_registered_filter_has_its_column_beside_ours(installed: Path, tmp_path: Path) -> None:
     data.write_npz(drive(features_per_frame=20.0), tmp_path / "drive.npz")
     names = "dead-reckoning,their-filter,broken-filter"
-    lent = {"PYTHONPATH": str(installed)}
-    told = started(COMMAND, "run", "drive.npz", "--estimators", names, "--out", "run", cwd=tmp_path, **lent)
+    asked = ("--estimators", names, "--out", "run")
+
+    def lent() -> None:
+        sys.path.insert(0, str(installed))
+
+    told = fgbaseline("run", "drive.npz", *asked, cwd=tmp_path, drawing=False, first=lent)
     assert told.returncode == 1, told.stderr  # the broken one failed, and stopped nobody
     summary = json.loads((tmp_path / "run/summary.json").read_text())["estimators"]
     assert summary["their-filter"]["status"] == "ok"
@@ -177,7 +177,7 @@ def test_a_registered_filter_has_its_column_beside_ours(installed: Path, tmp_pat
 
 def test_without_the_package_its_name_is_unknown(tmp_path: Path) -> None:
     data.write_npz(drive(), tmp_path / "drive.npz")
-    told = started(COMMAND, "run", "drive.npz", "--estimators", "their-filter", "--out", "run", cwd=tmp_path)
+    told = fgbaseline("run", "drive.npz", "--estimators", "their-filter", "--out", "run", cwd=tmp_path)
     assert told.returncode == 2
     assert "'their-filter'" in told.stderr
     assert not (tmp_path / "run").exists()

@@ -1,15 +1,14 @@
 """Help is instant, complete and has an example of everything."""
 
-import statistics
+import os
 import subprocess
 import sys
-import time
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
-from .commands import COMMAND, environment, fgbaseline
+from .commands import COMMAND, environment, fgbaseline, installed
 
 COMMANDS = ("run", "compare", "diagnose", "check", "bench", "export", "figures", "reproduce", "simulate")
 FOR_GOOD_INPUT = ("scipy", "pandas", "gtsam", "matplotlib", "jinja2", "rich", "fgbaseline.data.simulate")
@@ -56,12 +55,15 @@ def test_a_run_imports_no_package_that_only_other_commands_need() -> None:
 
 def test_help_answers_at_once(tmp_path: Path) -> None:
     def seconds() -> float:
-        start = time.perf_counter()
-        fgbaseline("--help", cwd=tmp_path)
-        return time.perf_counter() - start
+        """Of the processor's time, in children."""
+        spent = os.times()
+        return spent.children_user + spent.children_system
 
-    # Half a second is what is promised; it takes 0.15 s where nothing else runs.
-    assert statistics.median(seconds() for _ in range(5)) < 1.5
+    begin = seconds()
+    for _ in range(5):
+        installed("--help", cwd=tmp_path)
+    # Half a second is what is promised; it takes 0.15 s.
+    assert (seconds() - begin) / 5 < 0.5
 
 
 @pytest.mark.parametrize("arguments", [(), *((name,) for name in COMMANDS)])

@@ -6,6 +6,7 @@ import os
 import pty
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,9 +61,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def finished(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Finished:
     """A run on it that went well."""
     folder = tmp_path_factory.mktemp("finished")
-    return Finished(
-        folder, fgbaseline("run", recording, "--out", "out", "--estimators", ",".join(ESTIMATORS), cwd=folder)
-    )
+    asked = ("--out", "out", "--estimators", ",".join(ESTIMATORS))
+    return Finished(folder, fgbaseline("run", recording, *asked, cwd=folder, drawing=False))
 
 
 def rows(path: Path) -> Iterator[dict[str, str]]:
@@ -187,7 +187,7 @@ def imu_only(recording: Path, tmp_path: Path) -> Path:
 
 
 def test_without_features_the_path_is_reported_and_the_others_fail(imu_only: Path, tmp_path: Path) -> None:
-    result = fgbaseline("run", imu_only, "--out", "out", cwd=tmp_path)
+    result = fgbaseline("run", imu_only, "--out", "out", cwd=tmp_path, drawing=False)
     assert result.returncode == 1, result.stderr
     estimators = Finished(tmp_path, result).summary["estimators"]
     assert {name: e["status"] for name, e in estimators.items()} == {
@@ -249,7 +249,10 @@ def test_estimators_of_other_packages_take_part_and_their_crashes_stop_nobody(re
     (tmp_path / "out" / "summary.json").write_text("{}")
     (tmp_path / "out" / "old.txt").write_text("of an earlier run, which --force replaces whole")
     result = fgbaseline(
-        "run", recording, "--out", "out", "--force", "--estimators", names, cwd=tmp_path, PYTHONPATH=str(site)
+        *("run", recording, "--out", "out", "--force", "--estimators", names),
+        cwd=tmp_path,
+        drawing=False,
+        first=lambda: sys.path.insert(0, str(site)),
     )
     assert result.returncode == 1
     assert "Traceback" not in result.stderr

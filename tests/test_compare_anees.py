@@ -46,6 +46,7 @@ def test_the_bounds_are_those_of_the_textbook() -> None:
     np.testing.assert_allclose(probability_beyond(np.array([3.0, 9.0]), 6.0), chi2.sf([3.0, 9.0], 6))
     drawn = np.random.default_rng(2).chisquare(6, 20000)
     assert share_inside(drawn, 6.0) == pytest.approx(0.95, abs=0.005)
+    assert share_inside(drawn, 6.0, 0.5) == pytest.approx(0.5, abs=0.01)
     assert np.isnan(share_inside(np.array([np.nan]), 6.0))
 
 

@@ -26,7 +26,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert sequence.truth is not None
     data.write_npz(sequence, folder / "drive.npz")
     data.write_tum(folder / "truth.tum", sequence.t, sequence.truth.world_T_imu)
-    run = fgbaseline("run", "drive.npz", "--estimators", "dead-reckoning,ekf", "--out", "run", cwd=folder)
+    run = fgbaseline(
+        "run", "drive.npz", "--estimators", "dead-reckoning,ekf", "--out", "run", cwd=folder, drawing=False
+    )
     assert run.returncode == 0, run.stderr
     assert fgbaseline("export", "drive.npz", "--out", "problem", cwd=folder).returncode == 0
     (folder / "mine.tum").write_bytes((folder / "run/trajectories/dead-reckoning.tum").read_bytes())
@@ -43,6 +45,7 @@ def test_against_a_run_the_trust_comes_first_and_its_estimators_stand_beside(mad
     told = fgbaseline(
         *["compare", "run", "mine.tum", "--sequence", "problem", "--landmarks", "mine.csv", "--out", "out/c"],
         cwd=made,
+        drawing=False,
         COLUMNS="200",
     )
     assert told.returncode == 0, told.stderr

@@ -77,6 +77,14 @@ def test_one_mask_for_all_and_a_track_that_no_path_explains_is_out() -> None:
     np.testing.assert_array_equal(alone.table["piece"], errors.table["piece"])
 
 
+def test_the_gate_is_six_times_what_a_piece_errs_by_as_a_rule() -> None:
+    errors = ranking(true=true_path(), bent=bent(0.01))
+    assert errors.inliers == errors.pieces > 50
+    squares = (errors.error**2).groupby(errors.table["piece"].to_numpy()).mean()
+    assert errors.gate == pytest.approx(6.0 * np.median(np.sqrt(squares.min(axis=1))), rel=1e-12)
+    assert 3.0 < errors.gate < 12.0
+
+
 def test_the_order_of_the_paths_changes_nothing_but_ties() -> None:
     one = compare.held_out_ranking(ranking(a=true_path(), b=bent(0.02)))
     other = compare.held_out_ranking(ranking(b=bent(0.02), a=true_path()))

@@ -119,6 +119,9 @@ def test_what_an_estimator_did_not_use_is_not_held_against_it() -> None:
     nothing = compare.reprojection(wrong.sequence, replace(estimate, used=np.zeros_like(wild)))
     assert compare.whitened_summary(wrong, nothing)["tracks"] == SCENE.n_points  # all of the problem's, then
     assert compare.whitened_summary(wrong, nothing)["ratio"] > 100.0
+    empty = compare.whitened_summary(replace(wrong, excluded=np.ones_like(wrong.excluded)), nothing)
+    assert empty["tracks"] == 0
+    assert np.isnan([empty[key] for key in ("ratio", "beyond_95", "spread_uL", "spread_uR", "spread_v")]).all()
 
 
 def test_classes_hold_every_observation_once_and_show_where_a_bias_is() -> None:

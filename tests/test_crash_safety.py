@@ -17,7 +17,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports.exchange_names import exchanged
 from fgbaseline.reports.whole_folder import whole_folder
 
-from .commands import COMMAND, environment, everything_in, fgbaseline, started
+from .commands import everything_in, fgbaseline, started
 from .summaries import estimator, summary
 from .synthetic import drive
 
@@ -138,17 +138,8 @@ def test_on_a_full_disk_what_was_there_survives_and_one_sentence_says_why(folder
     if name == "repairs":
         (folder / "out" / "repairs.toml").write_text("# mine\n")
     before = contents(folder)
-    result = subprocess.run(
-        [COMMAND, *COMMANDS[name]],
-        cwd=folder,
-        env=environment(MPLCONFIGDIR=str(folder.parent)),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (LIMITS[name], LIMITS[name])),
-    )
+    may = (LIMITS[name], LIMITS[name])
+    result = fgbaseline(*COMMANDS[name], cwd=folder, first=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, may))
     assert result.returncode == 2, result.stderr
     assert "Traceback" not in result.stderr
     assert "cannot be written (File too large)" in result.stderr.splitlines()[-1]

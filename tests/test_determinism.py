@@ -10,7 +10,7 @@ import pytest
 
 from fgbaseline import data
 
-from .commands import fgbaseline
+from .commands import undrawn
 from .synthetic import drive
 
 TIMINGS = ("seconds", "seconds_total", "frames_per_second")
@@ -65,7 +65,7 @@ def test_two_processes_give_the_same_tables(folder: Path, name: str) -> None:
         for path in folder.iterdir():
             if path.is_file():
                 (work / path.name).write_bytes(path.read_bytes())
-        result = fgbaseline(*COMMANDS[name], "--out", "out", cwd=work, PYTHONHASHSEED=seed)
+        result = undrawn(*COMMANDS[name], "--out", "out", cwd=work, PYTHONHASHSEED=seed)
         assert result.returncode in (0, 1), result.stderr
         places.append(work / "out")
     one, other = ({p.relative_to(place): p for p in place.rglob("*") if p.is_file()} for place in places)

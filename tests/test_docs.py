@@ -10,24 +10,20 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from fgbaseline import data, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli.main import COMMANDS, group
-from fgbaseline.reports.figures import layout, saving
 
 from .commands import environment
 from .documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown
+from .empty_figures import figures_left_empty
 
 ELSEWHERE = {
     "make test": "tests/test_docs.py::test_targets_of_make_are_there",
@@ -53,7 +49,10 @@ ELSEWHERE = {
 }
 """command -> the test that runs it, on other recordings and for a shorter time"""
 IDLE = "it measures for half an hour, what only an idle machine can tell"
+OVER_AND_OVER = "it runs the tests themselves, for half an hour and more"
 NOT_RUN = {
+    "make coverage": OVER_AND_OVER,
+    "make mutants": OVER_AND_OVER,
     "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
     "make bench": IDLE,
     "make bench BENCH_FLAGS=--quick": IDLE,
@@ -167,29 +166,9 @@ class Place:
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     folder = tmp_path_factory.mktemp("docs")
     with pytest.MonkeyPatch.context() as patch:
-        _figures_left_empty(patch)
+        figures_left_empty(patch)
         patch.chdir(folder)
         yield Place(folder)
-
-
-def _figures_left_empty(patch: pytest.MonkeyPatch) -> None:
-    """Nine tenths of a run on a short recording are writing its figures; tests/test_figures.py looks at these."""
-    written, empty = Figure.savefig, {}
-    for form in ("png", "svg", "pdf"):
-        stream = BytesIO()
-        Figure(figsize=(0.1, 0.1)).savefig(stream, format=form)
-        empty[form] = stream.getvalue()
-
-    def savefig(figure: Figure, target: object, **options: Any) -> None:
-        if isinstance(target, BytesIO):
-            target.write(empty[options["format"]])
-        else:
-            written(figure, target, **options)  # type: ignore[arg-type]
-
-    patch.setattr(Figure, "savefig", savefig)
-    patch.setattr(saving, "_png", lambda _: empty["png"])
-    patch.setattr(layout, "fill_grid", lambda _: None)
-    patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
 
 
 def _ids(documents: list[Path]) -> list[str]:

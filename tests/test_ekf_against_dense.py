@@ -1,6 +1,7 @@
 """The cheap forms of `ekf/` are the printed equations: equal to a literal dense transcription, to 1e-8."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,16 @@ def test_mapping_is_equations_11_and_12_along_the_dead_reckoned_path(path: str, 
     estimate = ekf.landmark_mapping(problem)
     same_poses(estimate.world_T_imu, expected.mu)
     same_landmarks(estimate, problem, expected)
+    assert estimate.name == "landmark-mapping"
+    assert estimate.covariance is not None
+    same_covariances(estimate.covariance, DenseFilter(problem).dead_reckoning()[1])
+
+
+def test_the_noise_of_the_map_is_its_own() -> None:
+    problem = replace(posed("town", 20), mapping_pixel_variance=7.0, pixel_variance=3.0)
+    same_landmarks(ekf.landmark_mapping(problem), problem, DenseFilter(problem).mapping())
+    alone = ekf.landmark_mapping(replace(problem, mapping_pixel_variance=None))
+    same_landmarks(alone, problem, DenseFilter(replace(problem, mapping_pixel_variance=3.0)).mapping())
 
 
 @pytest.mark.parametrize("reading", Reading)

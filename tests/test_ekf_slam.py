@@ -58,6 +58,7 @@ def test_a_landmark_at_the_camera_plane_is_told_and_the_run_goes_on(depth: float
     assert estimate.status is Status.RECOVERED
     assert estimate.events[0].frame == frame
     assert estimate.events[0].kind == "innovation covariance singular"
+    assert "with a condition number of " in estimate.events[0].reason
     assert f"first at frame {frame}" in estimate.reason
     assert np.isfinite(estimate.world_T_imu).all()
     assert_covariances(estimate)

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
@@ -79,3 +80,19 @@ with shared(large, 1, 2):
     # The fork has the pipe open as well: that it closes says that the fork has ended.
     killed = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, timeout=120.0, check=False)
     assert killed.returncode == -signal.SIGKILL
+
+
+@FORKS
+def test_an_interrupt_that_comes_while_a_process_forks_is_not_lost() -> None:
+    def interrupt(signum: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    due = [signal.SIGTERM]
+    os.register_at_fork(after_in_parent=lambda: signal.raise_signal(due.pop()) if due else None)
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt), shared(lambda i: i, 2, 2) as gathered:
+            gathered()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert due == []

@@ -36,9 +36,9 @@ def aligned_rmse(path: FloatArray, truth: FloatArray) -> float:
 
 def test_03(recordings, tmp_path):
     path = recordings("03.npz")
-    began = time.perf_counter()
+    began = time.process_time()
     s = read(path)
-    assert time.perf_counter() - began < 5.0  # about 0.2 s; wide, for busy machines
+    assert time.process_time() - began < 5.0  # about 0.2 s; of the processor
     assert (s.form, s.name, s.n_frames, s.n_landmarks) == ("course", "03", 1010, 5105)
     assert len(s.observations) == 66353
     d = disparity(s.observations.pixel)

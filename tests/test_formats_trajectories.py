@@ -146,11 +146,11 @@ def test_a_bad_kitti_file_is_told_with_its_line(tmp_path, line, sentence):
 def test_a_hundred_thousand_lines_take_no_time(tmp_path):
     n = 100_000
     poses = se3.exp(np.random.default_rng(0).normal(size=(n, 6)))
-    began = time.perf_counter()
+    began = time.process_time()
     write_tum(tmp_path / "a.tum", np.arange(n) / 100.0, poses)
     t, _ = read_tum(tmp_path / "a.tum")
     assert len(t) == n
-    assert time.perf_counter() - began < 10.0  # about 1 s; wide, for busy machines
+    assert time.process_time() - began < 10.0  # about 1 s; of the processor
     with (tmp_path / "a.tum").open("a") as file:
         file.write("1e9 0 0 oops 0 0 0 1\n")
     with pytest.raises(InputError, match="line 100002: 'oops'"):

@@ -46,6 +46,20 @@ def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
     assert squared_norm_of_known(innovation, sigma, 0.25) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
 
 
+def test_what_is_no_covariance_has_no_norm() -> None:
+    sequence = Scene().sequence()
+    assert sequence.truth is not None
+    assert sequence.truth.landmarks is not None
+    innovation = pose_innovation(
+        sequence.camera,
+        se3.inverse(sequence.imu_T_cam),
+        np.eye(4),
+        sequence.truth.landmarks,
+        sequence.observations.pixel[:12],
+    )
+    assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan), 0.25))
+
+
 @pytest.mark.parametrize("told", [1.0, 0.5])
 def test_the_joint_filter_s_innovations_are_chi_square_where_it_knows_its_noise_only(told: float) -> None:
     total, degrees = 0.0, 0

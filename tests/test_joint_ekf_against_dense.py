@@ -73,12 +73,12 @@ def turning(problem: Problem) -> Problem:
 
 
 PROBLEMS = {
-    "town, kernel": matched(drive("town", 4.0, 10.0)),
-    "town, tight kernel": replace(matched(drive("town", 4.0, 10.0)), kernel=HuberKernel(1.0)),
-    "town": unmasked(drive("town", 4.0, 10.0)),
-    "town, prior": with_prior(unmasked(drive("town", 4.0, 10.0))),
-    "loop, uncertain start": uncertain_start(matched(drive("loop", 4.0, 10.0))),
-    "handheld": unmasked(drive("handheld", 4.0, 10.0)),
+    "town, kernel": matched(drive("town", 2.5, 10.0)),
+    "town, tight kernel": replace(matched(drive("town", 2.5, 10.0)), kernel=HuberKernel(1.0)),
+    "town": unmasked(drive("town", 2.5, 10.0)),
+    "town, prior": with_prior(unmasked(drive("town", 2.5, 10.0))),
+    "loop, uncertain start": uncertain_start(matched(drive("loop", 2.5, 10.0))),
+    "handheld": unmasked(drive("handheld", 2.5, 10.0)),
     "returning": unmasked(returning()),
     "returning, prior": with_prior(unmasked(returning())),
 }

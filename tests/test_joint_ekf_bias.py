@@ -23,6 +23,23 @@ BIAS = (0.012, -0.02, 0.015)
 SEEDS = 8
 
 
+def test_a_wrong_bias_turns_the_motion_as_the_transition_says() -> None:
+    prior, dt, step = GyroBiasPrior(deviation=0.03, walk=0.02), 0.25, 1e-6
+    twist = np.array([0.8, -0.2, 0.1, 0.3, -0.5, 0.4])
+    transition, noise = np.diag(np.arange(1.0, 7.0)), np.diag(np.arange(2.0, 8.0))
+    F, Q = prior.along(twist, dt, transition, noise)
+    for i, d in enumerate(step * np.eye(3)):
+        wrong = se3.exp(twist - dt * np.concatenate([np.zeros(3), d]))
+        np.testing.assert_allclose(F[:6, 6 + i], se3.log(se3.inverse(se3.exp(twist)) @ wrong) / step, atol=1e-5)
+    np.testing.assert_array_equal(F[:6, :6], transition)
+    np.testing.assert_array_equal(F[6:], np.eye(9)[6:])
+    np.testing.assert_array_equal(Q[:6, :6], noise)
+    np.testing.assert_allclose(Q[6:, 6:], 0.02**2 * 0.25 * np.eye(3), rtol=1e-12)
+    assert not Q[:6, 6:].any()
+    assert not Q[6:, :6].any()
+    np.testing.assert_allclose(prior.covariance(), 0.03**2 * np.eye(3), rtol=1e-12)
+
+
 def biased(path: PathName, seed: int, seconds: float = 15.0) -> Sequence:
     return simulate(
         Simulation(path=path, duration=seconds, features_per_frame=25.0, seed=seed, wrong_share=0.0, gyro_bias=BIAS)

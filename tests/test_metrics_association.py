@@ -194,3 +194,17 @@ def test_frame_numbers_are_not_taken_for_seconds() -> None:
     for pair in ((bare, path(t)), (path(t), bare)):
         with pytest.raises(InputError, match=r"bare.tum: it has no time stamps, but path.tum has; give it the times"):
             compare.associate(*pair)
+
+
+def test_absolute_errors_are_those_of_each_pose_at_its_time() -> None:
+    t, poses = np.array([1.0, 2.0, 4.0]), np.tile(np.eye(4), (3, 1, 1))
+    wrong = poses.copy()
+    wrong[1, :3, 3] = [3.0, 4.0, 0.0]
+    wrong[2] = se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.deg2rad(30.0)])
+    pair = compare.associate(Trajectory(t, poses, "truth"), Trajectory(t, wrong, "estimate"))
+    table = compare.absolute_errors(pair)
+    assert table.index.name == "pose_index"
+    assert table.columns.tolist() == ["t", "translation", "rotation_deg", "rotation_chord", "pose"]
+    assert table["t"].tolist() == [1.0, 2.0, 4.0]
+    assert table["translation"].tolist() == [0.0, 5.0, 0.0]
+    assert table["rotation_deg"].tolist() == pytest.approx([0.0, 0.0, 30.0])

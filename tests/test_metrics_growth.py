@@ -105,6 +105,26 @@ def test_the_first_time_beyond_a_bound() -> None:
     assert right.value < -2.0
 
 
+def test_two_poses_have_their_rates() -> None:
+    truth, estimate = (np.tile(np.eye(4), (2, 1, 1)) for _ in range(2))
+    truth[1, 0, 3] = 2.0
+    estimate[1] = se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.deg2rad(4.0)])
+    estimate[1, 0, 3] = 2.2
+    t = np.array([0.0, 0.5])
+    rates = compare.drift(compare.associate(Trajectory(t, truth, "reference"), Trajectory(t, estimate, "estimate")))
+    assert rates["unit"].to_dict() == {
+        "translation": "%",
+        "rotation": "deg/m",
+        "translation per second": "m/s",
+        "rotation per second": "deg/s",
+        "end translation": "%",
+        "end rotation": "deg/m",
+    }
+    assert rates["value"].tolist() == pytest.approx([10.0, 2.0, 0.4, 8.0, 10.0, 2.0])
+    assert rates["over"].tolist() == ["2 m", "2 m", "0.5 s", "0.5 s", "2 m", "2 m"]
+    assert rates["n"].tolist() == [1] * 6
+
+
 @pytest.mark.parametrize(
     ("wrong", "share"),
     [({"scale": 1.02}, "scale"), ({"heading_rate": 2e-4}, "heading"), ({"noise": 0.5}, "noise")],
@@ -162,6 +182,8 @@ def test_intervals_of_shares_are_shares_and_hold_them(seed: int, kind: compare.A
 
 def test_no_difference_has_no_intervals_either() -> None:
     table = compare.share_intervals(matched(winding()))
+    assert table.columns.tolist() == ["value", "low", "high"]
+    assert table.index.tolist() == ["scale", "heading", "noise"]
     assert table.isna().all(axis=None)
     still = compare.share_intervals(matched(winding(), np.tile(np.eye(4), (N, 1, 1))), repetitions=5)
     assert still["high"].tolist() == [0.0, 0.0, 1.0]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from fgbaseline import compare
 from fgbaseline.compare import Unit
 from fgbaseline.compare.pairs import chained_pairs, nearest_delta_pairs, turned_pairs
+from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 RISING = st.lists(st.floats(0.01, 3.0), min_size=1, max_size=30).map(lambda steps: np.cumsum([0.0, *steps]))
@@ -123,3 +124,27 @@ def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
     assert compare.absolute_difference(estimate, reference, "rotation_chord")[1] == pytest.approx(2.0)
     with pytest.raises(ValueError, match="not one of poses, but of motions"):
         compare.absolute_difference(estimate, reference, "distance_percent")
+
+
+def test_a_table_of_motions_says_where_each_begins_and_what_it_spans() -> None:
+    t = np.array([0.0, 0.5, 1.5, 2.0, 4.0, 4.5])
+    true, drifting = straight(np.array([1.0, 2.0, 1.0, 4.0, 1.0])), straight(np.array([1.5, 2.0, 1.0, 3.0, 1.0]))
+    matched = compare.associate(Trajectory(t, true, "truth"), Trajectory(t, drifting, "estimate"))
+    table = compare.relative_errors(matched, 2, Unit.FRAMES)
+    assert table["start"].tolist() == [0, 2]
+    assert table["end"].tolist() == [2, 4]
+    assert table["t"].tolist() == [0.0, 1.5]
+    assert table["seconds"].tolist() == [1.5, 2.5]
+    assert table["metres"].tolist() == [3.0, 5.0]
+    assert table["translation"].tolist() == pytest.approx([0.5, 1.0])
+    assert table["distance"].tolist() == pytest.approx([0.5, 1.0])
+    assert table["distance_percent"].tolist() == pytest.approx([100.0 / 6.0, 20.0])
+    assert table["rotation_deg"].tolist() == [0.0, 0.0]
+    every = compare.relative_errors(matched, 2, Unit.FRAMES, all_pairs=True)
+    assert every["start"].tolist() == [0, 1, 2, 3]
+    near = compare.relative_errors(matched, 3.0, Unit.METRES, all_pairs=True, tolerance=0.0)
+    wide = compare.relative_errors(matched, 3.0, Unit.METRES, all_pairs=True, tolerance=0.34)
+    assert near["start"].tolist() == [0, 1]
+    assert wide["start"].tolist() == [0, 1, 3]
+    own = compare.relative_errors(matched, 3.5, Unit.METRES, all_pairs=True, from_reference=False, tolerance=0.01)
+    assert list(zip(own["start"], own["end"], strict=True)) == [(0, 2)]

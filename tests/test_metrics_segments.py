@@ -106,6 +106,13 @@ def test_a_long_simulated_drive_has_every_official_length() -> None:
     np.testing.assert_allclose(found.table["speed"], 10.0, rtol=0.02)
 
 
+def test_without_stamps_a_segment_has_no_speed() -> None:
+    _, truth, result = drive(61)
+    frames = np.arange(61.0)
+    unstamped = (Trajectory(frames, poses, name, stamped=False) for poses, name in ((truth, "truth"), (result, "it")))
+    assert compare.segment_errors(compare.associate(*unstamped)).table["speed"].isna().all()
+
+
 def test_a_short_path_has_lengths_fitted_to_it_and_says_so() -> None:
     t, truth, result = drive(61)
     found = compare.segment_errors(matched(t, truth, result))

@@ -194,9 +194,8 @@ def test_from_the_diagnosis_to_a_file_to_a_run(tmp_path: Path) -> None:
     assert again.returncode == 2
     assert "--force" in again.stderr
     (tmp_path / "found.toml").write_text(text.replace("velocity_scale = 1 ", "velocity_scale = 1.5 "))
-    run = fgbaseline(
-        "run", "rig.npz", "--repairs", "found.toml", "--estimators", "dead-reckoning", "--out", "out", cwd=tmp_path
-    )
+    asked = ("--repairs", "found.toml", "--estimators", "dead-reckoning", "--out", "out")
+    run = fgbaseline("run", "rig.npz", *asked, cwd=tmp_path, drawing=False)
     assert run.returncode == 0, run.stderr
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["settings"]["repairs"] == "found.toml"

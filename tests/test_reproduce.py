@@ -211,7 +211,7 @@ def test_without_any_noise_the_first_update_has_no_inverse(faulty: Sequence) -> 
 
 def test_the_reports_own_recording(recordings: Callable[[str], Path], tmp_path: Path) -> None:
     result = fgbaseline(
-        "reproduce", recordings("03.npz"), "--sweep-features", "200", "--sweep-noise", "15", cwd=tmp_path
+        "reproduce", recordings("03.npz"), "--sweep-features", "200", "--sweep-noise", "15", cwd=tmp_path, drawing=False
     )
     assert result.returncode == 0, result.stderr
     place = tmp_path / "out/reproduction"

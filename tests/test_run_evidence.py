@@ -19,6 +19,7 @@ from fgbaseline.reports.evidence import frames_in_words
 from fgbaseline.reports.run_folder import write_run
 
 from .commands import fgbaseline
+from .empty_figures import figures_left_empty
 from .reported import answer, as_dict, failed, run_of, scene, standard_run
 from .synthetic import drive, matched, plain_problem
 
@@ -67,7 +68,8 @@ def test_nothing_is_held_out_unless_asked_for() -> None:
         job.split(sequence, job.RunSettings(held_out=1.5))
 
 
-def test_the_folder_has_series_and_tables_of_it(tmp_path: Path) -> None:
+def test_the_folder_has_series_and_tables_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    figures_left_empty(monkeypatch)
     run = held_out_run()
     write_run(run, tmp_path)
     tables = {path.name for path in (tmp_path / "tables").iterdir()}
@@ -167,7 +169,7 @@ def test_the_command_takes_a_share(tmp_path: Path) -> None:
     assert refused.returncode == 2
     assert "held-out: expected a share above 0 and below 1, got 2" in refused.stderr
     assert not (tmp_path / "out").exists()
-    taken = fgbaseline(*arguments, "--held-out", "0.3", "--as-recorded", cwd=tmp_path)
+    taken = fgbaseline(*arguments, "--held-out", "0.3", "--as-recorded", cwd=tmp_path, drawing=False)
     assert taken.returncode == 0, taken.stderr
     assert "tracks held out" in taken.stderr
     settings = json.loads((tmp_path / "out" / "summary.json").read_text())["settings"]

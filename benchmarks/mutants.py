@@ -1,0 +1,157 @@
+"""Do the tests notice a small error in `compare` or `ekf`? `python -m benchmarks.mutants` writes docs/mutants.md.
+
+mutmut needs the package where Python imports it from, and our rooms are renamed when they are installed: so it works
+on a copy in out/mutants, in which they are folders of `fgbaseline`. Of the mutants of each module a random sample is
+tried.
+"""
+
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+from scipy.stats import beta
+
+ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+PLACE = Path("out/mutants")
+PAGE = Path("docs/mutants.md")
+MARK, END = "<!-- python -m benchmarks.mutants -->", "<!-- end -->"
+DIED = (1, 3, 24, -24, 36, 152, 255, -9, -11)
+"""exit codes: a test failed, pytest itself did, the time ran out, the process was lost"""
+SURVIVED, WITHOUT_TEST = 0, 33
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change of one expression, and what the tests said to it (None: it was not tried)."""
+
+    name: str
+    module: str
+    code: int | None
+
+
+def copied() -> None:
+    """The tree as it is installed, with its tests; what an earlier run has found is kept for what did not change."""
+    for room in ROOMS:
+        shutil.copytree(room, PLACE / "fgbaseline" / room, dirs_exist_ok=True)
+    for folder in ("tests", "docs", "suites"):
+        shutil.copytree(folder, PLACE / folder, dirs_exist_ok=True)
+    shutil.copy("pyproject.toml", PLACE)
+
+
+def mutants() -> list[Mutant]:
+    """All there are, by module."""
+    found = []
+    for path in sorted((PLACE / "mutants" / "fgbaseline").glob("*/*.meta")):
+        module = f"{path.parent.name}/{path.name.removesuffix('.meta')}"
+        codes = json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
+        found += [Mutant(name, module, code) for name, code in codes.items()]
+    return found
+
+
+def mutmut(*arguments: str) -> None:
+    """Runs it in the copy."""
+    recordings = Path(os.environ.get("FGBASELINE_RECORDINGS", "../shared/data")).resolve()
+    env = {**os.environ, "FGBASELINE_RECORDINGS": str(recordings)}
+    program = Path(sys.executable).with_name("mutmut")
+    subprocess.run([program, *arguments], cwd=PLACE, env=env, check=False)
+
+
+def sampled(everything: list[Mutant], per_module: int, seed: int) -> list[Mutant]:
+    """So many of each module, the same every time."""
+    by_module: dict[str, list[Mutant]] = {}
+    for mutant in everything:
+        by_module.setdefault(mutant.module, []).append(mutant)
+    chosen = []
+    for module, of in by_module.items():
+        chosen += random.Random(f"{seed} {module}").sample(of, min(per_module, len(of)))
+    return chosen
+
+
+def interval(died: int, n: int) -> tuple[float, float]:
+    """95 % of Clopper and Pearson, per cent."""
+    low = beta.ppf(0.025, died, n - died + 1) if died else 0.0
+    high = beta.ppf(0.975, died + 1, n - died) if died < n else 1.0
+    return 100.0 * float(low), 100.0 * float(high)
+
+
+def table(everything: list[Mutant]) -> list[str]:
+    """A row for each module, each room, and all."""
+    rows = ["| module | mutants | tried | died | of those tried |", "|---|---|---|---|---|"]
+    groups = [
+        (module, [m for m in everything if m.module == module]) for module in sorted({m.module for m in everything})
+    ]
+    for room in ("compare", "ekf"):
+        groups.append((f"**{room}**", [m for m in everything if m.module.startswith(room)]))
+    groups.append(("**both**", everything))
+    for name, of in groups:
+        tried = [m for m in of if m.code is not None]
+        died = sum(m.code in DIED for m in tried)
+        if tried:
+            rows.append(f"| {name} | {len(of):,} | {len(tried)} | {died} | {100.0 * died / len(tried):.0f} % |")
+    return rows
+
+
+def weighted(everything: list[Mutant]) -> float:
+    """Per cent of all mutants that would die: each module's share by how many mutants it has."""
+    of, total = 0.0, 0
+    for module in {m.module for m in everything}:
+        its = [m for m in everything if m.module == module]
+        tried = [m for m in its if m.code is not None]
+        if tried:
+            of += len(its) * sum(m.code in DIED for m in tried) / len(tried)
+            total += len(its)
+    return 100.0 * of / total
+
+
+def difference(name: str) -> str:
+    """The change, on one line."""
+    program = Path(sys.executable).with_name("mutmut")
+    told = subprocess.run([program, "show", name], cwd=PLACE, capture_output=True, text=True, check=False).stdout
+    changed = [line for line in told.splitlines() if re.match(r"[-+](?![-+])", line)]
+    return "  →  ".join(" ".join(line[1:].split()) for line in changed)
+
+
+@click.command()
+@click.option("--per-module", default=12, show_default=True, help="how many mutants of each module are tried; 0: all")
+@click.option("--seed", default=1, show_default=True, help="which sample; the table is over all that were ever tried")
+@click.option("--again", is_flag=True, help="try once more only those that survived")
+def main(per_module: int, seed: int, again: bool) -> None:
+    """Try mutants, and write the table."""
+    copied()
+    if not (PLACE / "mutants" / "mutmut-stats.json").is_file():
+        mutmut("run", "--max-children", "1", "fgbaseline.compare.absolute.*")
+    everything = mutants()
+    survived = [m for m in everything if m.code in (SURVIVED, WITHOUT_TEST)]
+    chosen = survived if again else sampled(everything, per_module or 10**9, seed)
+    untried = chosen if again else [m for m in chosen if m.code is None]
+    if untried:
+        mutmut("run", "--max-children", "1", *(m.name for m in untried))
+    everything = mutants()
+    tried = [m for m in everything if m.code is not None]
+    counts = Counter("died" if m.code in DIED else "survived" if m.code == SURVIVED else "no test" for m in tried)
+    low, high = interval(counts["died"], len(tried))
+    share = 100.0 * counts["died"] / len(tried)
+    said = (
+        f"Of {len(everything):,} mutants {len(tried)} were tried: {counts['died']} died, {counts['survived']} survived,"
+        f" {counts['no test']} are in functions that no selected test runs. {share:.1f} % died (95 % interval {low:.1f}"
+        f" to {high:.1f} %); {weighted(everything):.1f} % where each module counts by its mutants."
+    )
+    text = PAGE.read_text(encoding="utf-8")
+    before, _, behind = text.partition(MARK)
+    behind = behind.partition(END)[2]
+    PAGE.write_text("\n".join([before + MARK, "", said, "", *table(everything), "", END + behind]), encoding="utf-8")
+    for mutant in tried:
+        if mutant.code not in DIED:
+            click.echo(f"{mutant.name}\n    {difference(mutant.name)}")
+
+
+if __name__ == "__main__":
+    main()
