@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fgbaseline.geometry import FloatArray
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -21,7 +23,7 @@ class Row:
 
 
 def row(
-    claim: str, values: Sequence[float], unit: str, *, least: float | None = None, most: float | None = None
+    claim: str, values: Sequence[float] | FloatArray, unit: str, *, least: float | None = None, most: float | None = None
 ) -> Row:
     """Of values over runs, whose median is to be at least or at most something."""
     middle = float(np.median(values))

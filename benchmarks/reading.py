@@ -18,7 +18,7 @@ from fgbaseline import data
 from fgbaseline.geometry import FloatArray, InputError
 
 from .apart import apart
-from .measured import Row, table
+from .measured import Row, row, table
 
 LANDMARKS, FRAMES = 13_289, 3_026
 TRACK = 15
@@ -41,8 +41,8 @@ def rows(runs: int) -> list[Row]:
             taken = [apart("benchmarks.reading:read", str(path)) for _ in range(runs)]
             what = f"reading 4 x {LANDMARKS:,} x {FRAMES} doubles ({GIGABYTES:.2f} GB), {kind} ({size:,.0f} MB on disk)"
             measured += [
-                _row(f"{what}: peak memory", MOST_MEMORY, "MB", [t.peak for t in taken], ".0f"),
-                _row(f"{what}: time", MOST_SECONDS, "s", [t.answer["seconds"] for t in taken], ".1f"),
+                row(f"{what}: peak memory", [t.peak for t in taken], " MB", most=MOST_MEMORY),
+                row(f"{what}: time", [t.answer["seconds"] for t in taken], " s", most=MOST_SECONDS),
             ]
             path.unlink()
         measured.append(_refused(Path(folder) / "lie.npz"))
@@ -84,8 +84,8 @@ def _small(frames: int) -> dict[str, FloatArray]:
 def _block() -> Iterator[FloatArray]:
     """The features in C order: each row of all landmarks, with the same frames in all four rows."""
     first = np.sort(np.random.default_rng(0).integers(0, FRAMES - TRACK, LANDMARKS))
-    for row in range(4):
-        random = np.random.default_rng(row + 1)
+    for of_four in range(4):
+        random = np.random.default_rng(of_four + 1)
         for begin in range(0, LANDMARKS, AT_A_TIME):
             start = first[begin : begin + AT_A_TIME]
             piece = np.full((len(start), FRAMES), -1.0)
@@ -123,11 +123,6 @@ def _refused(path: Path) -> Row:
         said = str(error).partition("features: ")[2] or str(error)
         return Row(what, wanted, f"refused: {said}", "", re.search(r"\d+ bytes|[\d.]+ [GT]B", said) is not None)
     return Row(what, wanted, "read", "", False)
-
-
-def _row(what: str, most: float, unit: str, values: list[float], form: str) -> Row:
-    median, low, high = (f"{value:{form}} {unit}" for value in (np.median(values), min(values), max(values)))
-    return Row(what, f"below {most:.0f} {unit}", median, f"{low} to {high}", bool(np.median(values) < most))
 
 
 @click.command()
