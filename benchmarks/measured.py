@@ -23,7 +23,12 @@ class Row:
 
 
 def row(
-    claim: str, values: Sequence[float] | FloatArray, unit: str, *, least: float | None = None, most: float | None = None
+    claim: str,
+    values: Sequence[float] | FloatArray,
+    unit: str,
+    *,
+    least: float | None = None,
+    most: float | None = None,
 ) -> Row:
     """Of values over runs, whose median is to be at least or at most something."""
     middle = float(np.median(values))

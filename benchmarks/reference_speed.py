@@ -66,22 +66,29 @@ def _shares(problem: Problem) -> tuple[float, float]:
 
 
 def late_against_early(runs: int, frames: int = DRIVE_FRAMES) -> Row:
-    """The cost of a frame at the end of a simulated drive against that at frame 300: medians over 100 frames.
+    """The cost of a frame at the end of a simulated drive against that at frame 300: means over the 100 before each.
 
-    No landmark comes back on these drives once it was lost, so nothing closes a loop.
+    The drive goes round a block at constant speed, and both are at one place of it: on a road that changes, the scene
+    tells more than the frame's number. No landmark comes back once it was lost, so nothing closes a loop.
     """
     ratios = []
     for seed in range(runs):
         seconds = solved(long_drive(frames, seed)).seconds
-        early = seconds[EARLY - WINDOW // 2 : EARLY + WINDOW // 2]
-        ratios.append(float(np.median(seconds[-WINDOW:]) / np.median(early)))
+        ratios.append(float(np.mean(seconds[-WINDOW:]) / np.mean(seconds[EARLY - WINDOW : EARLY])))
     what = f"isam2, a frame at the end of {frames} against frame {EARLY} ({FEATURES:.0f} features a frame, no loops)"
     return row(what, ratios, " times", most=MOST_GROWTH)
 
 
 def long_drive(frames: int, seed: int) -> Problem:
-    """A simulated drive through a town, with the noise that it has."""
-    simulation = Simulation(duration=frames / 10.0, features_per_frame=FEATURES, returning_share=0.0, seed=seed)
+    """A simulated drive round a block, a lap each `EARLY` frames, with the noise that it has."""
+    simulation = Simulation(
+        path="loop",
+        duration=frames / 10.0,
+        return_after=EARLY / 10.0,  # a lap; nothing returns
+        features_per_frame=FEATURES,
+        returning_share=0.0,
+        seed=seed,
+    )
     noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
     return data.calibrated(simulate(simulation), settings=Calibration(noise, shift=Shift.AFTER))
 
@@ -97,7 +104,7 @@ def solved(problem: Problem) -> Estimate:
 @click.command()
 @click.argument("recording", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
-@click.option("--frames", type=click.IntRange(min=500), default=DRIVE_FRAMES, show_default=True)
+@click.option("--frames", type=click.IntRange(min=2 * EARLY), default=DRIVE_FRAMES, show_default=True)
 def main(recording: Path | None, runs: int, frames: int) -> None:
     """Print the table."""
     click.echo(table(rows(recording, runs, frames)))
