@@ -5,7 +5,7 @@ final and online paths are from those of the variant that relinearises at every 
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother import elimination
+from fgbaseline.smoother.elimination import Chronology
 from fgbaseline.smoother.incremental import ISAM2Settings
 from fgbaseline.smoother.starts import restricted
 
@@ -68,12 +69,16 @@ def crowds_above(landmarks: int) -> Iterator[None]:
 
 def by_colamd(problem: Problem) -> Estimate:
     """All that an update touches is ordered by COLAMD, but for what the new factors name, which is last."""
-    before = elimination.Chronology.groups
-    elimination.Chronology.groups = lambda *_, **__: None  # type: ignore[method-assign, assignment, return-value]
+    before = Chronology.groups
+
+    def latest_last(self: Chronology, frame: int, landmarks: Collection[int], *, fresh: bool = False) -> dict[int, int]:
+        return before(self, frame, landmarks, fresh=True)
+
+    Chronology.groups = latest_last  # type: ignore[method-assign]
     try:
         return smoother.isam2(problem)
     finally:
-        elimination.Chronology.groups = before  # type: ignore[method-assign]
+        Chronology.groups = before  # type: ignore[method-assign]
 
 
 VARIANTS = (

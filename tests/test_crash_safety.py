@@ -17,7 +17,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports.exchange_names import exchanged
 from fgbaseline.reports.whole_folder import whole_folder
 
-from .commands import everything_in, fgbaseline, started
+from .commands import COMMAND, everything_in, fgbaseline, started
 from .summaries import estimator, summary
 from .synthetic import drive
 
@@ -144,6 +144,46 @@ def test_on_a_full_disk_what_was_there_survives_and_one_sentence_says_why(folder
     assert "Traceback" not in result.stderr
     assert "cannot be written (File too large)" in result.stderr.splitlines()[-1]
     assert contents(folder) == before
+
+
+def may_mount() -> bool:
+    command = ["unshare", "--map-root-user", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt"]
+    try:
+        return subprocess.run(command, stderr=subprocess.DEVNULL, check=False).returncode == 0
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(not may_mount(), reason="a small disk cannot be mounted here")
+@pytest.mark.parametrize("name", ["run", "export", "repairs", "check"])
+def test_a_disk_of_three_pages_is_left_as_it_was(folder: Path, name: str) -> None:
+    old = folder / "old" / "out"
+    old.mkdir(parents=True)
+    (old / MARKS.get(name, "mine.txt")).write_text("old")
+    if name == "repairs":
+        (old / "repairs.toml").write_text("# mine\n")
+    before = contents(folder / "old")
+    (folder / "disk").mkdir()
+    command = [f"disk/{part}" if part.split("/")[0] == "out" else part for part in COMMANDS[name]]
+    # One page is taken by what is there, and where little is to be written the others are full.
+    script = """
+        mount -t tmpfs -o size=12k tmpfs disk && cp -r old/. disk || exit 99
+        [ "$1" = full ] && head -c 100000 /dev/zero > disk/full 2> /dev/null; shift
+        "$@"; code=$?
+        rm -f disk/full; cp -r disk left
+        exit $code"""
+    fill = "full" if name in ("repairs", "check") else "empty"
+    result = subprocess.run(
+        ["unshare", "--map-root-user", "--mount", "sh", "-c", script, "sh", fill, COMMAND, *command],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    assert "cannot be written (No space left on device)" in result.stderr.splitlines()[-1]
+    assert contents(folder / "left") == before
 
 
 @pytest.mark.parametrize("name", COMMANDS)
