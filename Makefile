@@ -27,7 +27,7 @@ coverage: install
 	$(BIN)/coverage report
 
 # Small errors put into compare and ekf, some in each module: do the tests notice? docs/mutants.md is written anew.
-MUTANTS ?= 12
+MUTANTS ?= 5
 mutants: install
 	$(BIN)/pip install --quiet --group mutants
 	nice -n 10 $(BIN)/python -m benchmarks.mutants --per-module $(MUTANTS)

@@ -25,7 +25,7 @@ PAGE = Path("docs/mutants.md")
 MARK, END = "<!-- python -m benchmarks.mutants -->", "<!-- end -->"
 DIED = (1, 3, 24, -24, 36, 152, 255, -9, -11)
 """exit codes: a test failed, pytest itself did, the time ran out, the process was lost"""
-SURVIVED, WITHOUT_TEST = 0, 33
+SURVIVED = 0
 
 
 @dataclass(frozen=True)
@@ -82,33 +82,24 @@ def interval(died: int, n: int) -> tuple[float, float]:
     return 100.0 * float(low), 100.0 * float(high)
 
 
-def table(everything: list[Mutant]) -> list[str]:
+def table(everything: list[Mutant], tried: list[Mutant]) -> list[str]:
     """A row for each module, each room, and all."""
     rows = ["| module | mutants | tried | died | of those tried |", "|---|---|---|---|---|"]
-    groups = [
-        (module, [m for m in everything if m.module == module]) for module in sorted({m.module for m in everything})
-    ]
-    for room in ("compare", "ekf"):
-        groups.append((f"**{room}**", [m for m in everything if m.module.startswith(room)]))
-    groups.append(("**both**", everything))
-    for name, of in groups:
-        tried = [m for m in of if m.code is not None]
-        died = sum(m.code in DIED for m in tried)
-        if tried:
-            rows.append(f"| {name} | {len(of):,} | {len(tried)} | {died} | {100.0 * died / len(tried):.0f} % |")
+    modules = sorted({mutant.module for mutant in everything})
+    for name in (*modules, "compare/", "ekf/", ""):
+        all_of, of = ([m for m in some if m.module.startswith(name)] for some in (everything, tried))
+        died = sum(m.code in DIED for m in of)
+        title = name if name in modules else f"**{name or 'both'}**"
+        if of:
+            rows.append(f"| {title} | {len(all_of):,} | {len(of)} | {died} | {100.0 * died / len(of):.0f} % |")
     return rows
 
 
-def weighted(everything: list[Mutant]) -> float:
+def weighted(everything: list[Mutant], tried: list[Mutant]) -> float:
     """Per cent of all mutants that would die: each module's share by how many mutants it has."""
-    of, total = 0.0, 0
-    for module in {m.module for m in everything}:
-        its = [m for m in everything if m.module == module]
-        tried = [m for m in its if m.code is not None]
-        if tried:
-            of += len(its) * sum(m.code in DIED for m in tried) / len(tried)
-            total += len(its)
-    return 100.0 * of / total
+    there, died = Counter(m.module for m in everything), Counter(m.module for m in tried if m.code in DIED)
+    of = Counter(m.module for m in tried)
+    return 100.0 * sum(there[name] * died[name] / of[name] for name in of) / sum(there[name] for name in of)
 
 
 def difference(name: str) -> str:
@@ -120,34 +111,30 @@ def difference(name: str) -> str:
 
 
 @click.command()
-@click.option("--per-module", default=12, show_default=True, help="how many mutants of each module are tried; 0: all")
-@click.option("--seed", default=1, show_default=True, help="which sample; the table is over all that were ever tried")
-@click.option("--again", is_flag=True, help="try once more only those that survived")
-def main(per_module: int, seed: int, again: bool) -> None:
-    """Try mutants, and write the table."""
+@click.option("--per-module", default=5, show_default=True, help="how many mutants of each module are tried; 0: all")
+@click.option("--seed", default=1, show_default=True, help="which of them")
+def main(per_module: int, seed: int) -> None:
+    """Try mutants, and write the table; what survives is told with its change."""
     copied()
     if not (PLACE / "mutants" / "mutmut-stats.json").is_file():
         mutmut("run", "--max-children", "1", "fgbaseline.compare.absolute.*")
+    chosen = {mutant.name for mutant in sampled(mutants(), per_module or 10**9, seed)}
+    mutmut("run", "--max-children", "1", *sorted(chosen))
     everything = mutants()
-    survived = [m for m in everything if m.code in (SURVIVED, WITHOUT_TEST)]
-    chosen = survived if again else sampled(everything, per_module or 10**9, seed)
-    untried = chosen if again else [m for m in chosen if m.code is None]
-    if untried:
-        mutmut("run", "--max-children", "1", *(m.name for m in untried))
-    everything = mutants()
-    tried = [m for m in everything if m.code is not None]
+    tried = [mutant for mutant in everything if mutant.name in chosen]
     counts = Counter("died" if m.code in DIED else "survived" if m.code == SURVIVED else "no test" for m in tried)
     low, high = interval(counts["died"], len(tried))
     share = 100.0 * counts["died"] / len(tried)
     said = (
         f"Of {len(everything):,} mutants {len(tried)} were tried: {counts['died']} died, {counts['survived']} survived,"
         f" {counts['no test']} are in functions that no selected test runs. {share:.1f} % died (95 % interval {low:.1f}"
-        f" to {high:.1f} %); {weighted(everything):.1f} % where each module counts by its mutants."
+        f" to {high:.1f} %); {weighted(everything, tried):.1f} % where each module counts by its mutants."
     )
     text = PAGE.read_text(encoding="utf-8")
     before, _, behind = text.partition(MARK)
     behind = behind.partition(END)[2]
-    PAGE.write_text("\n".join([before + MARK, "", said, "", *table(everything), "", END + behind]), encoding="utf-8")
+    lines = [before + MARK, "", said, "", *table(everything, tried), "", END + behind]
+    PAGE.write_text("\n".join(lines), encoding="utf-8")
     for mutant in tried:
         if mutant.code not in DIED:
             click.echo(f"{mutant.name}\n    {difference(mutant.name)}")

@@ -9,6 +9,7 @@ import pytest
 from fgbaseline import data, ekf
 from fgbaseline.data import Problem
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.geometry import FgbaselineError
 
 from .synthetic import drive
 
@@ -47,3 +48,9 @@ def test_it_has_its_name_the_time_of_each_frame_and_tells_how_far_it_is(name: st
 def test_the_textbook_is_in_the_world_at_the_newest_estimate() -> None:
     assert JointSettings.textbook() == JointSettings(Coordinates.WORLD, Linearisation.TEXTBOOK)
     assert ekf.joint_ekf_textbook is OURS["joint-ekf-textbook"]
+
+
+def test_a_state_has_room_for_one_landmark_at_least() -> None:
+    assert JointSettings(max_landmarks=1).max_landmarks == 1
+    with pytest.raises(FgbaselineError, match="max_landmarks: expected at least 1, got 0"):
+        JointSettings(max_landmarks=0)

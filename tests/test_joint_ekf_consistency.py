@@ -41,7 +41,12 @@ def mean_nees(path: PathName, way: str) -> FloatArray:
 @pytest.mark.parametrize("path", ["town", "handheld"])
 def test_the_filter_knows_its_error_and_the_textbook_believes_too_much(path: PathName) -> None:
     print(f"\n{path:38s}" + "".join(f"{f'frame {k}':>11s}" for k in FRAMES) + f"{'all':>11s}")
-    for way in WAYS:
+    for way in (
+        "inverse-depth, invariant",
+        "inverse-depth, textbook",
+        "inverse-depth, first-estimate",
+        "world, textbook",
+    ):
         nees = mean_nees(path, way)
         print(f"{way:38s}" + "".join(f"{nees[k]:11.1f}" for k in FRAMES) + f"{np.nanmean(nees):11.1f}")
     ours = mean_nees(path, "inverse-depth, invariant")
