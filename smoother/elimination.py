@@ -42,18 +42,19 @@ class Chronology:
             seen[key] = frame
         # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
         most = len(landmarks) + (frame > 0)
+        if len(landmarks) > CROWD:
+            return {pose_key(frame): 1, TAIL: 2}
         if fresh:
             last, first = min(1, most), max(0, frame - 1)
             return dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last) | {TAIL: last + 1}
-        if len(landmarks) > CROWD:
-            return {pose_key(frame): 1, TAIL: 2}
         last = min(GROUPS, most)
         groups = dict.fromkeys([pose_key(frame), *landmarks], last) | {TAIL: last + 1}
         oldest = max(0, frame - FRAMES * (last - 1))
-        groups |= {pose_key(k): last - 1 - (frame - 1 - k) // FRAMES for k in range(oldest, frame)}
+        of_frame = [last - 1 - (frame - 1 - k) // FRAMES for k in range(oldest, frame)]
+        groups |= {pose_key(k): group for k, group in enumerate(of_frame, oldest)}
         for key in reversed(seen):
             if seen[key] < oldest:
                 break
             if seen[key] < frame:
-                groups[key] = last - 1 - (frame - 1 - seen[key]) // FRAMES
+                groups[key] = of_frame[seen[key] - oldest]
         return groups

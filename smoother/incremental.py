@@ -106,9 +106,6 @@ class IncrementalSmoother:
 
     def settle(self) -> None:
         """After the last frame: updates without anything new, until every variable is within its threshold."""
-        if self._tail is not None:
-            self._update(gtsam.NonlinearFactorGraph(), gtsam.Values(), (), [self._tail])
-            self._tail = None
         for _ in range(SETTLING_UPDATES):
             try:
                 result = self.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
@@ -205,10 +202,14 @@ class IncrementalSmoother:
         return undone(self.problem, o, poses_of(values, range(self._n_frames)), landmarks_of(values, self.key))
 
     def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """After the last frame: the factors in their slots and the solution. The tree is gone, as large as it is."""
+        """After the last frame: the factors in their slots and the solution, without the tail. The tree is gone, as
+        large as it is."""
         tree = self.isam.tree
         graph = gtsam.NonlinearFactorGraph(tree.getFactorsUnsafe())
         values = tree.calculateEstimate()
+        if self._tail is not None:
+            graph.remove(self._tail)
+            values.erase(TAIL)
         del self.isam
         return graph, values
 

@@ -56,7 +56,6 @@ def thresholds(position: float, rotation: float, landmark: float) -> gtsam.ISAM2
     """Relinearisation thresholds: of poses in m and rad, of landmarks as a share of their distance."""
     by_letter = gtsam.ISAM2ThresholdMap()
     by_letter.insert((POSE, np.array([rotation] * 3 + [position] * 3)))
-    by_letter.insert(("z", np.full(6, 1e9)))
     by_letter.insert((chr(TAIL >> _LETTER_AT), np.full(6, np.inf)))
     for i, letter in enumerate(LETTERS):
         by_letter.insert((letter, np.full(3, landmark * NEAREST * RATIO**i)))

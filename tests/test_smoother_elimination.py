@@ -58,7 +58,9 @@ def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool
 
 
 def test_of_a_crowd_only_the_pose_is_kept_for_the_end() -> None:
-    assert Chronology().groups(5, list(map(key, range(CROWD + 1)))) == {pose_key(5): 1, TAIL: 2}
+    crowd = list(map(key, range(CROWD + 1)))
+    assert Chronology().groups(5, crowd) == {pose_key(5): 1, TAIL: 2}
+    assert Chronology().groups(5, crowd, fresh=True) == {pose_key(5): 1, TAIL: 2}
 
 
 def test_where_all_is_fresh_the_frame_before_is_kept_for_the_end() -> None:
