@@ -10,7 +10,8 @@ from pathlib import Path
 
 import click
 
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+from .rooms import ROOMS
+
 MEASURED = Path("out/coverage/coverage.json")
 
 

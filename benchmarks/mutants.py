@@ -19,7 +19,8 @@ from pathlib import Path
 import click
 from scipy.stats import beta
 
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+from .rooms import ROOMS
+
 PLACE = Path("out/mutants")
 PAGE = Path("docs/mutants.md")
 MARK, END = "<!-- python -m benchmarks.mutants -->", "<!-- end -->"

@@ -1,12 +1,12 @@
 """Repairs set by hand in a TOML file, in place of what the diagnosis finds."""
 
-import sys
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, field_validator
 
 from .axes import AXIS_CONVENTIONS, IDENTITY
+from .finite import is_finite_number
 from .formats.named_file import FilePath
 from .toml_file import read_toml
 
@@ -18,11 +18,6 @@ Vector: TypeAlias = tuple[float, float, float]
 def read_repairs(path: FilePath) -> "Repairs":
     """The repairs in a TOML file. Raises InputError with file, line and key for what cannot be."""
     return read_toml(path, Repairs).content
-
-
-def _number(value: object) -> bool:
-    # An integer too large for a double must not be turned into one to be told from infinity.
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _axes(value: object) -> str:
@@ -40,7 +35,7 @@ def _vector(most: float, unit: str) -> Callable[[object], Vector]:
         if value == AS_RECORDED:
             return 0.0, 0.0, 0.0
         numbers = list(value) if isinstance(value, list | tuple) else []
-        if len(numbers) != 3 or not all(_number(number) and abs(number) <= most for number in numbers):
+        if len(numbers) != 3 or not all(is_finite_number(number) and abs(number) <= most for number in numbers):
             raise ValueError(f"it should be three numbers of at most {most:g} {unit}, or '{AS_RECORDED}'")
         return float(numbers[0]), float(numbers[1]), float(numbers[2])
 
@@ -51,7 +46,7 @@ def _between(low: float, high: float, neutral: float | None = None) -> Callable[
     def number(value: Any) -> float:
         if neutral is not None and value == AS_RECORDED:
             return neutral
-        if not _number(value) or not low <= value <= high:
+        if not is_finite_number(value) or not low <= value <= high:
             word = "" if neutral is None else f", or '{AS_RECORDED}'"
             raise ValueError(f"it should be a number from {low:g} to {high:g}{word}")
         return float(value)

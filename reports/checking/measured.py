@@ -2,7 +2,6 @@
 
 import difflib
 import json
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from fgbaseline.data.finite import is_finite_number
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
@@ -134,7 +134,7 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     found = _at(estimator, metric)
     if found is _ABSENT:
         return None, "it has no such metric"
-    if isinstance(found, int | float) and not isinstance(found, bool) and abs(found) <= sys.float_info.max:
+    if is_finite_number(found):
         return float(found), ""
     notes = estimator.get("notes") or {}
     keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]

@@ -1,0 +1,3 @@
+"""The folders whose packages are measured."""
+
+ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
