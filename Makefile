@@ -28,9 +28,10 @@ coverage: install
 
 # Small errors put into compare and ekf, some in each module: do the tests notice? docs/mutants.md is written anew.
 MUTANTS ?= 5
+MUTANTS_SEED ?= 1
 mutants: install
 	$(BIN)/pip install --quiet --group mutants
-	nice -n 10 $(BIN)/python -m benchmarks.mutants --per-module $(MUTANTS)
+	nice -n 10 $(BIN)/python -m benchmarks.mutants --per-module $(MUTANTS) --seed $(MUTANTS_SEED)
 
 # Are our own estimators as good as they were? `make test` asks it of fewer seeds (tests/test_check_ourselves.py), without
 # the report. QUICK_CHECK=--update-baseline says that they are meant to differ.
