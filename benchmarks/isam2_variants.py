@@ -71,7 +71,7 @@ def by_colamd(problem: Problem) -> Estimate:
     """All that an update touches is ordered by COLAMD, but for what the new factors name, which is last."""
     before = Chronology.groups
 
-    def latest_last(self: Chronology, frame: int, landmarks: Collection[int], **_: bool) -> dict[int, int]:
+    def latest_last(self: Chronology, frame: int, landmarks: Collection[int], **_: int) -> dict[int, int]:
         return before(self, frame, landmarks, fresh=True)
 
     Chronology.groups = latest_last  # type: ignore[method-assign]

@@ -25,7 +25,9 @@ class Arrivals:
     def __init__(self, problem: Problem, rule: EntryRule) -> None:
         self.problem = problem
         self.observations = problem.observations()
-        self._frame, self._pixel = self.observations.frame.tolist(), list(self.observations.pixel)
+        self.frame: list[int] = self.observations.frame.tolist()
+        """of each observation"""
+        self._pixel = list(self.observations.pixel)
         self.factors = Factors(problem)
         self.waiting = WaitingLandmarks(problem, self.observations, rule)
         self._information = np.linalg.inv(problem.increment_covariance)
@@ -76,7 +78,7 @@ class Arrivals:
 
     def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
         """The factor of one observation of the landmark `key`."""
-        return self.factors.stereo(self._frame[observation], key, self._pixel[observation])
+        return self.factors.stereo(self.frame[observation], key, self._pixel[observation])
 
     def landmarks_seen(self, observed: range) -> IntArray:
         """The landmarks of a frame's observations."""

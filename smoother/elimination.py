@@ -29,8 +29,14 @@ class Chronology:
         self._seen: dict[int, int] = {}
         """key of a landmark -> frame that saw it last; those seen last are at the end"""
 
-    def groups(self, frame: int, landmarks: Collection[int], *, fresh: bool = False) -> dict[int, int]:
-        """Key -> group of elimination, for the update that brings a frame and sees some landmarks (keys).
+    def forget(self, landmarks: Collection[int]) -> None:
+        """These (keys) leave the graph: GTSAM takes no group of a variable that it does not have."""
+        for key in landmarks:
+            self._seen.pop(key, None)
+
+    def groups(self, frame: int, landmarks: Collection[int], *, first: int = 0, fresh: bool = False) -> dict[int, int]:
+        """Key -> group of elimination, for the update that brings a frame and sees some landmarks (keys), in a tree
+        that has no pose before `first`.
 
         Every key that is not among them is in group 0, which comes first. Where all landmarks are `fresh`, the frame
         before is kept for the end as well: they may leave the system close to indeterminate, and GTSAM then names a
@@ -45,11 +51,11 @@ class Chronology:
         if len(landmarks) > CROWD:
             return {pose_key(frame): 1, TAIL: 2}
         if fresh:
-            last, first = min(1, most), max(0, frame - 1)
+            last, first = min(1, most), max(first, frame - 1)
             return dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last) | {TAIL: last + 1}
         last = min(GROUPS, most)
         groups = dict.fromkeys([pose_key(frame), *landmarks], last) | {TAIL: last + 1}
-        oldest = max(0, frame - FRAMES * (last - 1))
+        oldest = max(first, frame - FRAMES * (last - 1))
         of_frame = [last - 1 - (frame - 1 - k) // FRAMES for k in range(oldest, frame)]
         groups |= {pose_key(k): group for k, group in enumerate(of_frame, oldest)}
         for key in reversed(seen):
@@ -58,3 +64,14 @@ class Chronology:
             if seen[key] < frame:
                 groups[key] = of_frame[seen[key] - oldest]
         return groups
+
+    def anew(self, first: int, frame: int) -> dict[int, int]:
+        """Key -> group of elimination, for a tree that is built at once over the frames `first` to `frame`, the last
+        one that `groups` has heard of; without the landmarks that were seen before only."""
+        last = 1 + (frame - first) // FRAMES
+        groups = {pose_key(k): (k - first) // FRAMES for k in range(first, frame)} | {pose_key(frame): last}
+        for key in reversed(self._seen):
+            if self._seen[key] < first:
+                break
+            groups[key] = last if self._seen[key] == frame else (self._seen[key] - first) // FRAMES
+        return groups | {TAIL: last + 1}

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Collection
-from collections.abc import Sequence as Listing
 from dataclasses import dataclass, field
 
 import gtsam
@@ -17,16 +16,16 @@ from .arrival import FRAME_LOST, Arrival, add_recovering
 from .arrivals import Arrivals
 from .convention import reordered
 from .elimination import Chronology
-from .journal import IndeterminateSystemError, RestorableISAM2
-from .keys import TAIL, distance_key, landmark_of, pose_key, thresholds
+from .journal import IndeterminateSystemError
+from .keys import distance_key, landmark_of, pose_key, thresholds
+from .moving_tree import NO_POSE, MovingTree
+from .reach import earliest_needed
 from .undone import UNDONE, undone
 from .values import landmarks_of, poses_of
 from .waiting import EntryRule
 
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
-TIE = gtsam.noiseModel.Unit.Create(6)
-"""of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
 UNSETTLED = 4
 """updates that all relinearise, from one on whose landmarks are all new: they and the last poses start far off"""
 SETTLING_UPDATES = 8
@@ -50,6 +49,10 @@ class ISAM2Settings:
     """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
     careful: bool = False
     """QR in place of Cholesky: three times slower, and at ease with pivots of very unequal size"""
+    tree_frames: int = 1200
+    """frames that the tree may be over before those behind the last `kept_frames` leave it for a prior; those before
+    them, as far back as a landmark reaches that will be seen again, stay"""
+    kept_frames: int = 400
 
     def params(self) -> gtsam.ISAM2Params:
         """The same in GTSAM's terms."""
@@ -74,7 +77,8 @@ class IncrementalSmoother:
     """Builds and solves the graph frame by frame, and keeps what was given up on the way."""
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
-        self.isam = RestorableISAM2(settings.params())
+        self.solver = MovingTree(settings.params())
+        self._settings = settings
         self.problem = problem
         self._may_lose_frames = settings.careful or problem.landmark_prior is not None
         self.arrivals = Arrivals(problem, settings.entry)
@@ -82,15 +86,18 @@ class IncrementalSmoother:
         self.key: dict[int, int] = {}
         """of each landmark in the graph"""
         self._slots: dict[int, dict[int, int]] = {}
-        """landmark -> {observation, or PRIOR: factor slot}"""
+        """landmark -> {observation, or PRIOR: slot of its factor in the graph}"""
         self._dropped: set[int] = set()
         self._n_frames = 0
         """in the graph"""
         self._unsettled = 0
         """frames for which every update relinearises"""
         self._chronology = Chronology()
-        self._tail: int | None = None
-        """the slot of its factor"""
+        self._needed = earliest_needed(self.arrivals.observations, problem.n_frames)
+        self._first = 0
+        """frame in the tree"""
+        self._shorten_at = settings.tree_frames
+        """frame"""
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
@@ -108,10 +115,9 @@ class IncrementalSmoother:
         """After the last frame: updates without anything new, until every variable is within its threshold."""
         for _ in range(SETTLING_UPDATES):
             try:
-                result = self.isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
+                if self.solver.relinearised() == 0:
+                    return
             except IndeterminateSystemError:  # the tree is as it was, and so good enough
-                return
-            if result.getVariablesRelinearized() == 0:
                 return
 
     def _frame(self, k: int, observed: range) -> None:
@@ -122,23 +128,32 @@ class IncrementalSmoother:
         self._n_frames = k + 1
         self._dropped |= landmarks
         self.events += events
-        tree = self.isam.tree
+        tree = self.solver.tree
         self.arrivals.path[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
         self.online_covariance[k] = reordered(tree.marginalCovariance(pose_key(k)))
         for j in self.arrivals.landmarks_seen(observed).tolist():
             if j in self.key:
                 self.arrivals.position[j] = tree.calculateEstimatePoint3(self.key[j])
+        if k >= self._shorten_at:
+            self._shorten(k)
+
+    def _shorten(self, k: int) -> None:
+        """After frame k: what is far behind leaves the tree, unless something that will come hangs on it."""
+        kept = self._settings.kept_frames
+        first = min(k + 1 - kept, int(self._needed[k]))
+        self._shorten_at = k + kept
+        if first < self._first + kept:
+            return
+        if self.solver.shortened(first, self._chronology.anew(first, k)):
+            self._first = first
+            self._shorten_at = first + self._settings.tree_frames
 
     def add(self, arrival: Arrival, given_up: Collection[int]) -> None:
         """See `arrival.Graph`."""
         k, factors = arrival.frame, self.arrivals.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        pose = gtsam.Pose3(arrival.guess)
-        values.insert(pose_key(k), pose)
+        values.insert(pose_key(k), gtsam.Pose3(arrival.guess))
         graph.push_back(arrival.motion)
-        if self._tail is None:
-            values.insert(TAIL, pose)
-        graph.push_back(gtsam.BetweenFactorPose3(pose_key(k), TAIL, gtsam.Pose3(), TIE))
         owner: list[tuple[int, int]] = []
         new = {e.landmark: distance_key(e.landmark, _distance(e.start, arrival.guess)) for e in arrival.entries}
         for entry in arrival.entries:
@@ -156,30 +171,22 @@ class IncrementalSmoother:
         if arrival.entries and not arrival.seen:
             self._unsettled = UNSETTLED
         sighted = [*new.values(), *(self.key[j] for j in arrival.seen)]
-        groups = self._chronology.groups(k, sighted, fresh=self._unsettled > 0)
-        tail = [] if self._tail is None else [self._tail]
-        result = self._update(graph, values, given_up, tail, groups, self._unsettled > 0)
-        self._unsettled = max(0, self._unsettled - 1)
-        self.key |= new
-        _, self._tail, *slots = result.getNewFactorsIndices()
-        for (j, i), slot in zip(owner, slots, strict=True):
-            self._slots.setdefault(j, {})[i] = slot
-
-    def _update(
-        self,
-        graph: gtsam.NonlinearFactorGraph,
-        values: gtsam.Values,
-        given_up: Collection[int],
-        removed: Listing[int] = (),
-        groups: dict[int, int] | None = None,
-        relinearise: bool = False,
-    ) -> gtsam.ISAM2Result:
         there = [j for j in given_up if j in self.key]
-        slots = [slot for j in there for slot in self._slots[j].values()]
-        result = self.isam.update(graph, values, [*removed, *slots], groups, relinearise)
+        removed = [slot for j in there for slot in self._slots[j].values()]
+        self._chronology.forget([self.key[j] for j in there])
+        groups = self._chronology.groups(k, sighted, first=self._first, fresh=self._unsettled > 0)
+        frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.arrivals.frame[i] for _, i in owner)]
+        try:
+            slots = self.solver.update(graph, frames, values, pose_key(k), removed, groups, self._unsettled > 0)
+        except IndeterminateSystemError:
+            self._chronology.forget(new.values())
+            raise
+        self._unsettled = max(0, self._unsettled - 1)
         for j in there:
             del self.key[j], self._slots[j]
-        return result
+        self.key |= new
+        for (j, i), slot in zip(owner, slots[1:], strict=True):
+            self._slots.setdefault(j, {})[i] = slot
 
     def suspects(self, error: IndeterminateSystemError, given_up: Collection[int]) -> dict[int, str]:
         """See `arrival.Graph`.
@@ -187,7 +194,7 @@ class IncrementalSmoother:
         GTSAM names a variable near the trouble, seldom the culprit. That is a landmark which the last solution sent
         behind a camera or onto its plane; only where there is none, the named one is taken.
         """
-        culprits = [j for j in self._undone(self.isam.tree.calculateEstimate()) if j not in given_up]
+        culprits = [j for j in self._undone(self.solver.estimate()) if j not in given_up]
         if culprits:
             return dict.fromkeys(culprits, UNDONE)
         named = None if error.key is None else landmark_of(error.key)
@@ -202,15 +209,12 @@ class IncrementalSmoother:
         return undone(self.problem, o, poses_of(values, range(self._n_frames)), landmarks_of(values, self.key))
 
     def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """After the last frame: the factors in their slots and the solution, without the tail. The tree is gone, as
-        large as it is."""
-        tree = self.isam.tree
-        graph = gtsam.NonlinearFactorGraph(tree.getFactorsUnsafe())
-        values = tree.calculateEstimate()
-        if self._tail is not None:
-            graph.remove(self._tail)
-            values.erase(TAIL)
-        del self.isam
+        """After the last frame: the factors in their slots, and the solution. The tree is gone, as large as it is."""
+        graph, values = self.solver.released()
+        there = set(self.key.values())
+        for key in values.keys():  # noqa: SIM118
+            if landmark_of(key) is not None and key not in there:  # given up, and still in the prior
+                values.erase(key)
         return graph, values
 
     def drop_undone(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:

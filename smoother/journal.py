@@ -12,9 +12,6 @@ from .keys import pose_key
 INTERVAL, SHARE = 50, 0.125
 """updates from one copy to the next: at least so many, and this share of all so far"""
 
-FIRST = pose_key(0)
-"""a variable that every tree has"""
-
 
 class Update(NamedTuple):
     """The arguments of one call of `ISAM2.update`."""
@@ -44,8 +41,10 @@ class RestorableISAM2:
     it is, the longer one serves; failures seldom come alone, so one is taken after each of them.
     """
 
-    def __init__(self, params: gtsam.ISAM2Params, interval: int = INTERVAL) -> None:
+    def __init__(self, params: gtsam.ISAM2Params, interval: int = INTERVAL, first: int = 0) -> None:
+        """`first` is the frame of a pose that the tree has after every update."""
         self.tree = gtsam.ISAM2(params)
+        self._first = pose_key(first)
         self._interval = interval
         self._updates = 0
         self._keep()
@@ -71,7 +70,7 @@ class RestorableISAM2:
             self._keep()
         try:
             result = _apply(self.tree, step)
-            self.tree.calculateEstimatePose3(FIRST)  # solves: a pivot of zero may show only here
+            self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
         except (RuntimeError, IndexError) as error:
             self.tree = gtsam.ISAM2(self._copy)
             for past in self._since_copy:

@@ -20,7 +20,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, frame: int, careful_too: bool) -> l
 
     def add_or_fail(self: IncrementalSmoother, arrival: Arrival, given_up: object) -> None:
         tried.append(arrival.frame)
-        careful = self.isam.tree.params().getFactorization() == "QR"
+        careful = self.solver.tree.params().getFactorization() == "QR"
         if arrival.frame == frame and (arrival.seen or arrival.entries) and (careful_too or not careful):
             raise IndeterminateSystemError(None, "made up")
         add(self, arrival, given_up)  # type: ignore[arg-type]

@@ -83,7 +83,7 @@ def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
     ours = smoother.isam2(problem)
     calls = []
 
-    def last(_: Chronology, frame: int, __: list[int], **fresh: bool) -> dict[int, int]:
+    def last(_: Chronology, frame: int, __: list[int], **___: int) -> dict[int, int]:
         calls.append(frame)
         return {pose_key(frame): min(frame, 1), TAIL: 1 + min(frame, 1)}
 
