@@ -189,3 +189,14 @@ def test_where_no_piece_can_be_predicted_the_gate_is_its_smallest() -> None:
     errors = ranking(backwards=backwards)
     assert errors.gate == 3.0
     assert errors.pieces > 50
+
+
+def test_the_ranking_is_the_same_every_time_and_its_intervals_hold_the_median() -> None:
+    errors = ranking(true=true_path(), jumpy=bent(0.0, 0.02))
+    table = compare.held_out_ranking(errors)
+    assert table.equals(compare.held_out_ranking(errors))
+    np.testing.assert_allclose(table["median"], errors.error.median()[table.index])
+    np.testing.assert_allclose(table["under_3px"], (errors.error < 3.0).mean()[table.index])
+    np.testing.assert_allclose(table["behind"], table["median"] - table["median"].iloc[0])
+    assert (table["low"] < table["high"]).all()
+    assert table.loc["jumpy", "behind_low"] < table.loc["jumpy", "behind"] < table.loc["jumpy", "behind_high"]

@@ -1,5 +1,6 @@
 """What the documented filter does where the printed equations lose their digits, and without a landmark prior."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -216,3 +217,19 @@ def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None
     lost = "leaves (I - K H) Sigma as printed with an eigenvalue of -1.0e-12"
     assert _loss_as_printed(-1e-12 * np.eye(6), innovation, weight) == lost
     assert _loss_as_printed(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
+
+
+def test_a_singular_innovation_is_told_in_words_and_figures() -> None:
+    problem, frame = at_camera_plane(1e-5)
+    estimate = ekf.ekf(problem)
+    assert re.fullmatch(
+        r"H Sigma H\^T \+ V, with a condition number of \d\.\de\+\d\d from a landmark near the camera plane, "
+        r"(has no inverse in double precision|leaves \(I - K H\) Sigma as printed with an eigenvalue of -\d\.\de.\d\d)",
+        estimate.events[0].reason,
+    )
+    frames = len({event.frame for event in estimate.events})
+    assert len(estimate.events) == frames
+    assert estimate.reason == (
+        f"the innovation covariance was numerically singular at {frames} of 10 frames, first at frame {frame}: "
+        "the printed equations lose positive definiteness there, the form used here does not"
+    )

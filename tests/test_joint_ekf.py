@@ -439,3 +439,30 @@ def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it
     assert estimate.events[0] == data.Event(5, Rejection.SINGULAR, "12 of 12 observations take no part")
     assert not estimate.used[SCENE.observations.frame == 5].any()
     assert estimate.used[SCENE.observations.frame < 5].all()
+
+
+def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
+    estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
+    put_off = [data.Event(k, Rejection.ENTRY, f"2 of {2 if k else 12} observations take no part") for k in range(10)]
+    never = [data.Event(9, "landmark never determined", "no frame that was believed saw it", j) for j in (0, 1)]
+    assert list(estimate.events) == [*put_off, *never]
+
+
+def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
+    estimate = ekf.joint_ekf(replace(plain_problem(SCENE), initial_covariance=-np.eye(6)))
+    said = "P - W^T W has a negative variance after the update"
+    assert list(estimate.events) == [data.Event(k, Rejection.SINGULAR, said) for k in range(1, 10)]
+    assert estimate.reason == (
+        "at 9 of 10 frames, first at frame 1, the joint covariance was no longer positive definite"
+    )
+
+
+def test_troubles_of_several_kinds_are_told_one_after_another() -> None:
+    problem, _ = garbled(0.9, range(50, 51))
+    estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=10))
+    full = [event for event in estimate.events if event.kind == "state full"]
+    waited = sum(int(event.reason.split(" of ")[0]) for event in full)
+    assert estimate.reason == (
+        "at 1 of 100 frames, first at frame 50, most observations disagreed with the prediction, which took no part; "
+        f"at {len(full)} of 100 frames, first at frame 0, the state was full: {waited} observations were not used"
+    )

@@ -300,3 +300,13 @@ def test_the_intervals_of_shares_depend_on_the_confidence_and_the_seed() -> None
     assert (wide["high"] >= narrow["high"]).all()
     assert (wide["high"] - wide["low"]).sum() > (narrow["high"] - narrow["low"]).sum()
     assert not wide.equals(other)
+
+
+def test_the_intervals_of_drift_depend_on_the_confidence_and_the_seed() -> None:
+    pair = matched(winding(noise=0.5))
+    wide, narrow, other, again = (
+        compare.drift(pair, 20.0, repetitions=200, confidence=c, seed=s).loc["translation", ["low", "high"]].tolist()
+        for c, s in ((0.95, 0), (0.5, 0), (0.95, 1), (0.95, 0))
+    )
+    assert wide[0] < narrow[0] < narrow[1] < wide[1]
+    assert wide == again != other

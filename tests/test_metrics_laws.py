@@ -289,3 +289,18 @@ def test_the_axis_that_is_left_open_is_named() -> None:
     assert done.free == ("the rotation about (0.000, 0.000, 1.000)",)
     with pytest.raises(InputError, match="the first 0 cannot be taken"):
         compare.align(reference, reference, "se3", first=0)
+
+
+def test_yaw_is_about_up_wherever_that_points_and_as_the_first_poses_say() -> None:
+    reference = path("winding", 8)
+    up = np.array([0.0, -0.6, 0.8])
+    turn = np.eye(4)
+    turn[:3, :3] = so3.exp_so3(0.7 * up)
+    pair = matched(reference, turn @ reference).aligned("yaw", up=2.0 * up)
+    assert compare.absolute_errors(pair)["translation"].max() < 1e-9
+    np.testing.assert_allclose(pair.alignment.rotation, turn[:3, :3].T, atol=1e-9)
+    assert pair.alignment.free == ()
+    later = turn @ reference
+    later[:4] = reference[:4]
+    first = matched(reference, later).aligned("se3", first=4)
+    np.testing.assert_allclose(first.alignment.matrix, np.eye(4), atol=1e-9)
