@@ -285,3 +285,17 @@ def test_the_caption_says_how_poses_were_paired() -> None:
         "2 poses paired (truth interpolated, stamps within 0.5 s, ours +0.25 s; "
         "left out: 2 of the reference, 0 of the estimate); not aligned"
     )
+
+
+@pytest.mark.parametrize("sparse", ["reference", "estimate"])
+def test_the_error_with_an_offset_is_in_metres_of_the_reference_also_where_the_scale_is_fitted(sparse: str) -> None:
+    dense, few = path(np.arange(0.0, 20.0, 0.05)), path(np.arange(0.0, 20.0, 0.25))
+    reference, estimate = (few, dense) if sparse == "reference" else (dense, few)
+    errors = 0.1 * np.random.default_rng(1).normal(size=estimate.position.shape)
+
+    def offset(scale: float) -> compare.TimeOffset:
+        poses = np.array(estimate.world_T_body)
+        poses[:, :3, 3] = scale * (poses[:, :3, 3] + errors)
+        return compare.time_offset(reference, estimate.with_poses(poses), 1.0, "sim3")
+
+    assert offset(0.01).rmse == pytest.approx(offset(1.0).rmse, rel=1e-6)
