@@ -290,6 +290,17 @@ def test_one_pose_has_shares_without_intervals_and_two_have_both() -> None:
     assert two[["low", "high"]].notna().all(axis=None)
 
 
+def test_draws_without_any_difference_are_left_out() -> None:
+    # One pose of thirty is off: most draws of few blocks do not hold it.
+    reference = ahead(np.arange(30.0))
+    one_off = reference.copy()
+    one_off[7, 1, 3] += 1.0
+    table = compare.share_intervals(matched(one_off, reference), repetitions=50)
+    assert table.notna().all(axis=None)
+    assert (table["low"] <= table["value"]).all()
+    assert (table["value"] <= table["high"]).all()
+
+
 def test_the_intervals_of_shares_depend_on_the_confidence_and_the_seed() -> None:
     pair = matched(winding(scale=1.001, heading_rate=2e-4, noise=0.5))
     wide, narrow, other = (
