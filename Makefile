@@ -28,7 +28,7 @@ coverage: install
 
 # Small errors put into compare and ekf, some in each module: do the tests notice? docs/mutants.md is written anew.
 MUTANTS ?= 5
-MUTANTS_SEED ?= 1
+MUTANTS_SEED ?= 3
 mutants: install
 	$(BIN)/pip install --quiet --group mutants
 	nice -n 10 $(BIN)/python -m benchmarks.mutants --per-module $(MUTANTS) --seed $(MUTANTS_SEED)

@@ -46,8 +46,9 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
 
     `rank`; `runs` that have an answer; `mean`, `low`, `high`; and, paired run by run with the best one, `behind`,
     `behind_low` and `behind_high`: how much larger the error is on average, over the runs that both answered. `tied`
-    where that interval holds zero: these runs cannot tell the two apart. An estimator with fewer answers ranks behind
-    all with more, whatever its mean: it may have failed where it was hard.
+    where that interval holds zero: these runs cannot tell the two apart; over one run there is no interval, and nobody
+    but the first is. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have failed
+    where it was hard.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}

@@ -43,8 +43,10 @@ def share_intervals(
         rows = np.concatenate([basis / np.where(size > 0, size, 1.0), d[:, :, None] / np.sqrt(squared.sum())], axis=2)
         products = np.einsum("nia,nib->nab", rows, rows).reshape(n, -1)
         drawn = draw_blocks(n, block, repetitions, seed).sums(products).reshape(-1, WHOLE + 1, WHOLE + 1)
-        low, high = tails(_shares(drawn), confidence)
-        table["low"], table["high"] = np.minimum(low, value), np.maximum(high, value)
+        drawn = drawn[drawn[:, -1, -1] > 0.0]  # a draw without any difference has no shares
+        if len(drawn):
+            low, high = tails(_shares(drawn), confidence)
+            table["low"], table["high"] = np.minimum(low, value), np.maximum(high, value)
     return table
 
 

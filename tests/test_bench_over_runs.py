@@ -59,3 +59,46 @@ def test_runs_of_other_lengths_are_averaged_where_all_have_a_value() -> None:
     found = compare.consistency_of(columns)
     assert (found.anees, found.runs) == (5.0, 2)
     assert compare.nees_over_runs(columns)["runs"].to_list() == [0, 2, 1]
+
+
+def test_no_value_has_no_mean_and_no_run_no_consistency() -> None:
+    nothing = pytest.approx((np.nan, np.nan, np.nan, 0), nan_ok=True)
+    assert compare.mean_of(np.array([np.nan, np.inf])) == nothing
+    assert compare.consistency_of([]) == pytest.approx((np.nan,) * 4 + (0,), nan_ok=True)
+    assert compare.consistency_of([np.full(3, np.nan)]) == pytest.approx((np.nan,) * 4 + (0,), nan_ok=True)
+    apart = [np.array([6.0, np.nan]), np.array([np.nan, 6.0])]
+    assert compare.consistency_of(apart) == pytest.approx((np.nan,) * 4 + (2,), nan_ok=True)
+
+
+def test_the_table_over_runs_has_a_row_for_each_frame() -> None:
+    table = compare.nees_over_runs([np.array([np.nan, 6.0, 8.0]), np.array([np.nan, 4.0])])
+    assert table.index.name == "frame"
+    assert table.index.tolist() == [0, 1, 2]
+    assert table.columns.tolist() == ["anees", "runs", "low", "high"]
+    assert table["anees"].tolist() == pytest.approx([np.nan, 5.0, 8.0], nan_ok=True)
+    for column, p in (("low", 0.025), ("high", 0.975)):
+        expected = [np.nan, stats.chi2.ppf(p, 12) / 2, stats.chi2.ppf(p, 6)]
+        assert table[column].tolist() == pytest.approx(expected, nan_ok=True)
+
+
+def test_the_ranking_is_worked_out_by_hand() -> None:
+    table = compare.ranking(pd.DataFrame({"b": [3.0, 5.0], "a": [1.0, 3.0], "twin": [1.0, 3.0], "gone": [np.nan] * 2}))
+    assert table.index.name == "estimator"
+    assert table.index.tolist() == ["a", "twin", "b"]
+    assert table.columns.tolist() == [
+        "rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"
+    ]  # fmt: skip
+    assert table["rank"].tolist() == [1, 2, 3]
+    assert table["runs"].tolist() == [2, 2, 2]
+    assert table["mean"].tolist() == [2.0, 2.0, 4.0]
+    assert table["behind"].tolist() == [0.0, 0.0, 2.0]
+    assert table["behind_low"].tolist() == table["behind_high"].tolist() == [0.0, 0.0, 2.0]  # every run says the same
+    assert table["tied"].tolist() == [True, True, False]
+    half = stats.t.ppf(0.975, 1)  # of two runs, s / sqrt(n) = 1
+    assert table["low"].tolist() == pytest.approx([2.0 - half, 2.0 - half, 4.0 - half])
+    assert table["high"].tolist() == pytest.approx([2.0 + half, 2.0 + half, 4.0 + half])
+
+
+def test_consistency_of_known_figures() -> None:
+    found = compare.consistency_of([np.array([6.0, 6.0, 60.0, 0.0])])
+    assert found == pytest.approx((18.0, *stats.chi2.ppf([0.025, 0.975], 6), 0.5, 1))

@@ -7,6 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
+from fgbaseline.compare.chi_square import bounds, quantile, share_inside
+from fgbaseline.compare.consistency import HELD, CovarianceState, is_positive_definite
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
@@ -63,3 +65,77 @@ def test_a_world_moved_as_a_whole_changes_nothing() -> None:
         replace(estimate, world_T_imu=motion @ estimate.world_T_imu), Truth(motion @ truth.world_T_imu)
     )
     np.testing.assert_allclose(moved, compare.nees(estimate, truth), rtol=1e-6)
+
+
+def test_the_ratio_of_sigmas_is_that_of_the_roots_of_the_variances() -> None:
+    estimate, _ = drawn()
+    assert estimate.covariance is not None
+    larger = estimate.covariance * np.kron(np.array([[4.0, 1.0], [1.0, 0.25]]), np.ones((3, 3)))
+    larger[0], larger[1] = 0.0, -larger[1]
+    reference = replace(
+        estimate, covariance=np.where(np.arange(DRAWS)[:, None, None] == 2, np.nan, estimate.covariance)
+    )
+    table = compare.sigma_ratio(replace(estimate, covariance=larger), reference)
+    assert table.columns.tolist() == ["position", "rotation"]
+    assert table.index.name == "frame"
+    assert table.iloc[:3].isna().all(axis=None)  # held, no covariance, none in the reference
+    np.testing.assert_allclose(table["position"][3:], 2.0)
+    np.testing.assert_allclose(table["rotation"][3:], 0.5)
+    for pair in ((replace(estimate, covariance=None), estimate), (estimate, replace(estimate, covariance=None))):
+        assert compare.sigma_ratio(*pair).isna().all(axis=None)
+
+
+def test_the_table_of_nees_has_a_row_for_each_frame() -> None:
+    estimate, truth = drawn()
+    for each in (estimate, replace(estimate, covariance=None)):
+        table = compare.nees_table(each, truth)
+        assert table.index.name == "frame"
+        assert table.index.tolist() == list(range(DRAWS))
+        assert table.columns.tolist() == ["pose", "position", "rotation"]
+
+
+def test_an_error_is_nan_where_the_pose_or_the_truth_is() -> None:
+    estimate, truth = drawn()
+    poses, true = estimate.world_T_imu.copy(), truth.world_T_imu.copy()
+    poses[0] = np.nan
+    true[1] = np.nan
+    error = compare.body_error(replace(estimate, world_T_imu=poses), Truth(true))
+    assert np.isnan(error[:2]).all()
+    assert np.isfinite(error[2:]).all()
+
+
+@pytest.mark.parametrize(
+    ("matrix", "is_one"),
+    [
+        ([[1.0, 0.5], [0.5, 1.0]], True),
+        ([[1.0, 0.5], [0.5 + 5e-7, 1.0]], True),  # symmetric enough
+        ([[1.0, 0.5], [0.5 + 2e-6, 1.0]], False),
+        ([[1.0, 1.0], [1.0, 1.0]], False),
+        ([[1.0, 1.0 - 1e-9], [1.0 - 1e-9, 1.0]], True),
+        ([[1.0, 2.0], [2.0, 1.0]], False),
+        ([[1.0, 0.0], [0.0, 0.0]], False),
+        ([[1.0, 0.0], [0.0, -1.0]], False),
+        ([[1e-20, 0.0], [0.0, 1e10]], True),  # units do not matter
+        ([[1e-20, 2e-5], [2e-5, 1e10]], False),
+    ],
+)
+def test_positive_definite_is_judged_by_correlations(matrix: list[list[float]], is_one: bool) -> None:
+    assert is_positive_definite(np.array([matrix, np.eye(2).tolist()])).tolist() == [is_one, True]
+
+
+def test_a_pose_is_held_up_to_a_variance_and_not_beyond() -> None:
+    estimate, _ = drawn()
+    P = np.tile(np.eye(6), (DRAWS, 1, 1))
+    P[0] *= HELD
+    P[1] *= 2.0 * HELD
+    state = compare.covariance_state(replace(estimate, covariance=P))
+    assert state[:2].tolist() == [CovarianceState.HELD, CovarianceState.POSITIVE_DEFINITE]
+
+
+def test_bounds_hold_with_the_probability_that_is_asked_for() -> None:
+    low, high = bounds(3.0, 4, 0.5)
+    assert (float(low), float(high)) == pytest.approx(tuple(chi2.ppf([0.25, 0.75], 12) / 4))
+    assert tuple(map(float, bounds(3))) == pytest.approx(tuple(chi2.ppf([0.025, 0.975], 3)))
+    assert float(quantile(0.9, 2)) == pytest.approx(chi2.ppf(0.9, 2))
+    # A value that is not finite takes no part; each is held against its own degrees of freedom.
+    assert share_inside(np.array([3.0, 3.0, 300.0, np.nan]), np.array([3.0, 300.0, 300.0, 3.0])) == pytest.approx(2 / 3)

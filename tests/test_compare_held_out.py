@@ -1,11 +1,14 @@
 """Held-out tracks rank a path below the true one where it is wrong, and say so only where the data can tell."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fgbaseline import compare, data
+from fgbaseline.compare.held_out import HeldOutErrors, half_errors
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
@@ -122,3 +125,78 @@ def test_other_pixels_of_the_held_out_tracks_cannot_change_which_are_held_out() 
     sequence = drive(seconds=12.0, features_per_frame=30.0)
     other = data.hold_out(with_pixels(sequence, sequence.observations.pixel + 1.0), 0.4, seed=1)[1]
     np.testing.assert_array_equal(other.observations.landmark, held()[1].observations.landmark)
+
+
+@pytest.mark.parametrize(
+    ("sights", "spoiled", "touched"),
+    [(4, 1, [1, 2, 3]), (4, 2, [0, 1, 2]), (5, 2, [2, 3, 4]), (5, 3, [0, 1, 2, 3]), (2, 0, [0, 1])],
+)
+def test_a_spoiled_sight_errs_itself_and_the_half_that_is_predicted_from_it(
+    sights: int, spoiled: int, touched: list[int]
+) -> None:
+    """The middle sight of an odd number belongs to the first half."""
+    sequence, out = held()
+    piece = int(np.argmax(np.bincount(out.piece[out.piece >= 0])))
+    chosen = np.flatnonzero(out.piece == piece)[:sights]
+    o = out.observations
+    pixel = o.pixel.copy()
+    pixel[chosen[spoiled]] += [3.0, 1.0, -1.0, 2.0]
+    other = replace(out, observations=data.Observations(o.frame, o.landmark, pixel))
+    before, after = (half_errors(sequence, each, chosen, true_path(), 0.25) for each in (out, other))
+    assert np.flatnonzero(before != after).tolist() == touched
+
+
+def test_the_errors_come_with_where_they_are() -> None:
+    errors = ranking(true=true_path(), bent=bent(0.01))
+    sequence, out = held()
+    assert errors.table.columns.tolist() == ["piece", "landmark", "frame", "start"]
+    assert errors.error.columns.tolist() == ["true", "bent"]
+    assert errors.table.index.tolist() == errors.error.index.tolist() == list(range(len(errors.error)))
+    of_piece = out.piece >= 0
+    rows = sorted(
+        zip(out.piece[of_piece], out.observations.frame[of_piece], out.observations.landmark[of_piece], strict=True)
+    )
+    assert list(zip(*(errors.table[c] for c in ("piece", "frame", "landmark")), strict=True)) == rows  # all are inliers
+    first = errors.table.groupby("piece")["frame"].transform("min")
+    np.testing.assert_array_equal(errors.table["start"], sequence.t[first] - sequence.t[0])
+
+
+def test_the_ranking_is_worked_out_by_hand() -> None:
+    values = pd.DataFrame({"a": [1.0, 2.0, 3.0, 4.0], "b": [2.0, 2.0, 2.0, 2.0]})
+
+    def ranked(start: list[float]) -> pd.DataFrame:
+        table = pd.DataFrame({"piece": 0, "landmark": 0, "frame": 0, "start": start})
+        return compare.held_out_ranking(HeldOutErrors(table, values, 3.0, 1, 1))
+
+    table = ranked([0.0, 1.0, 2.0, 4.9])  # one block of five seconds: every draw is the same
+    assert table.index.name == "estimator"
+    assert table.to_dict("index") == {
+        "b": {"median": 2.0, "low": 2.0, "high": 2.0, "behind": 0.0, "behind_low": 0.0, "behind_high": 0.0,
+              "p95": 2.0, "under_3px": 1.0},
+        "a": {"median": 2.5, "low": 2.5, "high": 2.5, "behind": 0.5, "behind_low": 0.5, "behind_high": 0.5,
+              "p95": 4.0, "under_3px": 0.5},
+    }  # fmt: skip
+    two = ranked([0.0, 1.0, 4.9, 5.0])  # and two, the second one of the last value
+    assert two.loc["a", ["low", "high", "behind_low", "behind_high"]].tolist() == [2.0, 4.0, 0.0, 2.0]
+    empty = compare.held_out_ranking(HeldOutErrors(table.iloc[:0], values.iloc[:0], 3.0, 0, 0))
+    assert empty.columns.tolist() == table.columns.tolist()
+    assert empty.index.name == "estimator"
+
+
+def test_where_no_piece_can_be_predicted_the_gate_is_its_smallest() -> None:
+    backwards = true_path() @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    backwards[1::2] = backwards[1::2] @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.pi])
+    errors = ranking(backwards=backwards)
+    assert errors.gate == 3.0
+    assert errors.pieces > 50
+
+
+def test_the_ranking_is_the_same_every_time_and_its_intervals_hold_the_median() -> None:
+    errors = ranking(true=true_path(), jumpy=bent(0.0, 0.02))
+    table = compare.held_out_ranking(errors)
+    assert table.equals(compare.held_out_ranking(errors))
+    np.testing.assert_allclose(table["median"], errors.error.median()[table.index])
+    np.testing.assert_allclose(table["under_3px"], (errors.error < 3.0).mean()[table.index])
+    np.testing.assert_allclose(table["behind"], table["median"] - table["median"].iloc[0])
+    assert (table["low"] < table["high"]).all()
+    assert table.loc["jumpy", "behind_low"] < table.loc["jumpy", "behind"] < table.loc["jumpy", "behind_high"]

@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fgbaseline import compare, ekf
-from fgbaseline.data import Estimate, Landmarks, Sequence
+from fgbaseline.data import Estimate, Landmarks, Sequence, Status
 from fgbaseline.geometry import se3
 
 from .synthetic import Scene, drive, matched, with_pixels
@@ -158,3 +159,41 @@ def test_commonly_used_is_what_all_that_use_any_have_used() -> None:
     np.testing.assert_array_equal(common, a & b)
     assert compare.commonly_used([none, none]) is None
     assert compare.commonly_used([]) is None
+
+
+def test_a_point_in_the_camera_plane_counts_as_behind_and_three_pixels_as_far() -> None:
+    table = pd.DataFrame({"error": [1.0, 3.0, 5.0], "depth": [1.0, 0.0, -1.0], "frame": [4, 4, 7]})
+    summary = compare.reprojection_summary(table)
+    assert (summary["behind_camera"], summary["n"]) == (2, 3)
+    assert summary["under_3px"] == pytest.approx(1 / 3)
+    by_frame = compare.reprojection_by(table, "frame")
+    assert by_frame.index.name == "frame"
+    assert by_frame.columns.tolist() == ["median", "mean", "rmse", "under_3px", "behind_camera", "n"]
+    assert by_frame.loc[4].tolist() == pytest.approx([2.0, 2.0, 5**0.5, 0.5, 1, 2])
+    assert by_frame.loc[7].tolist() == pytest.approx([5.0, 5.0, 5.0, 0.0, 1, 1])
+
+
+def test_the_columns_of_the_table_are_named() -> None:
+    table = compare.reprojection(EXACT, true_answer(EXACT))
+    assert table.columns.tolist() == [
+        "observation", "frame", "landmark", "uL", "vL", "uR", "vR", "error", "depth", "used"
+    ]  # fmt: skip
+    assert list(compare.component_summary(table)) == ["uL", "vL", "uR", "vR"]
+
+
+def test_an_infinite_residual_has_no_spread_and_raises_no_warning() -> None:
+    table = pd.DataFrame({"uL": [np.inf, 1.0], "vL": 1.0, "uR": [1.0, 3.0], "vR": [-np.inf, np.inf]})
+    found = compare.component_summary(table)
+    assert found["uL"]["bias"] == np.inf
+    assert np.isnan(found["uL"]["spread"])
+    assert found["uR"] == {"bias": 2.0, "spread": 1.0}
+
+
+def test_who_failed_on_the_way_does_not_take_observations_from_the_others() -> None:
+    answer = true_answer(EXACT)
+    half = np.arange(len(EXACT.observations)) % 2 == 0
+    failed = replace(answer, used=half, status=Status.FAILED, reason="it failed")
+    common = compare.commonly_used([answer, failed])
+    assert common is not None
+    assert common.all()
+    assert compare.commonly_used([failed]) is None

@@ -9,9 +9,11 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
-from fgbaseline import compare
+from fgbaseline import compare, data
 from fgbaseline.compare.residual_patterns import _p95
+from fgbaseline.compare.whitened import whitened_rows
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, se3
@@ -188,3 +190,132 @@ def test_a_class_with_infinite_errors_has_a_quantile_and_no_nan(finite: list[flo
     rank = 0.95 * (len(errors) - 1)
     expected = np.inf if math.ceil(rank) >= len(finite) else np.quantile(finite + [1e9] * infinite, 0.95)
     assert _p95(errors.groupby(np.zeros(len(errors)))).to_list() == [pytest.approx(expected)]
+
+
+def test_a_class_of_depth_begins_with_its_lower_edge() -> None:
+    table = pd.DataFrame(
+        {
+            "depth": [0.0, 4.9, 5.0, 80.0, 1e6, -1.0, np.nan],
+            "distance": [1.0, 3.0, 5.0, 7.0, 9.0, 11.0, 13.0],
+            "seen": [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0],
+            "sigmas": [1.0, np.nan, np.nan, 3.0, 5.0, 7.0, 9.0],
+        }
+    )
+    found = compare.map_by_depth(table)
+    assert found.index.tolist() == ["0 to 5 m", "5 to 10 m", "10 to 20 m", "20 to 40 m", "40 to 80 m", "80 m and more"]
+    assert found.index.name == "depth"
+    assert found.columns.tolist() == ["n", "distance", "seen", "sigmas", "with_sigmas"]
+    assert found["n"].tolist() == [2, 1, 0, 0, 0, 2]
+    assert found["distance"].tolist() == pytest.approx([2.0, 5.0, np.nan, np.nan, np.nan, 8.0], nan_ok=True)
+    assert found["seen"].tolist() == pytest.approx([3.0, 6.0, np.nan, np.nan, np.nan, 9.0], nan_ok=True)
+    assert found["sigmas"].tolist() == pytest.approx([1.0, np.nan, np.nan, np.nan, np.nan, 4.0], nan_ok=True)
+    assert found["with_sigmas"].tolist() == [1, 0, 0, 0, 0, 2]
+
+
+def plain_table(**columns: object) -> pd.DataFrame:
+    """The reprojection table of the recording with these columns instead."""
+    problem = plain_problem(recording())
+    return compare.reprojection(problem.sequence, true_answer(problem)).assign(**columns)
+
+
+def test_patterns_of_known_residuals_are_worked_out_by_hand() -> None:
+    depth = np.resize([0.0, 5.0, 79.9, 80.0, -1.0, np.nan], len(recording().observations))
+    table = plain_table(uL=3.0, vL=4.0, uR=6.0, vR=8.0, error=7.0, depth=depth)
+    found = compare.residual_patterns(recording(), table)
+    assert found.columns.tolist() == ["by", "of", "n", "median", "mean", "p95", "u", "v"]
+    assert found.index.tolist() == list(range(len(found)))
+    assert found["by"].drop_duplicates().tolist() == ["distance", "track age", "region", "side"]
+    each = len(table) // 6
+    by_depth = found[found["by"] == "distance"]
+    assert list(zip(by_depth["of"], by_depth["n"], strict=True)) == [
+        (name, each) for name in ("0 to 5 m", "5 to 10 m", "40 to 80 m", "80 m and more")
+    ]
+    both = found[found["by"] != "side"][["median", "mean", "p95", "u", "v"]].to_numpy()
+    np.testing.assert_allclose(both, np.tile([7.0, 7.0, 7.0, 4.5, 6.0], (len(both), 1)))
+    sides = found[found["by"] == "side"]
+    assert sides["of"].tolist() == ["left camera", "right camera"]
+    np.testing.assert_allclose(sides[["median", "mean", "p95", "u", "v"]], [[5, 5, 5, 3, 4], [10, 10, 10, 6, 8]])
+    assert sides["n"].tolist() == [len(table)] * 2
+
+
+def test_the_outermost_observations_are_in_the_outermost_regions() -> None:
+    pixel, table = recording().observations.pixel, plain_table()
+    for column, (lowest, highest) in enumerate((("left", "right"), ("top", "bottom"))):
+        for row, name in ((np.argmin(pixel[:, column]), lowest), (np.argmax(pixel[:, column]), highest)):
+            found = compare.residual_patterns(recording(), table.iloc[[row]])
+            assert name in found.loc[found["by"] == "region", "of"].item().split()
+    nothing = compare.residual_patterns(replace(recording(), observations=data.Observations.none()), table.iloc[:0])
+    assert len(nothing) == 0
+
+
+def test_tracks_of_any_age_have_a_class() -> None:
+    problem = plain_problem(Scene(frames=28, n_points=3).sequence())
+    found = compare.residual_patterns(problem.sequence, compare.reprojection(problem.sequence, true_answer(problem)))
+    ages = found[found["by"] == "track age"]
+    assert dict(zip(ages["of"], ages["n"], strict=True)) == {
+        "1": 3, "2 to 3": 6, "4 to 6": 9, "7 to 12": 18, "13 to 25": 39, "26 and more": 9
+    }  # fmt: skip
+
+
+def test_whitened_rows_are_in_sigmas_and_the_mean_of_both_heights_has_less_noise() -> None:
+    problem = plain_problem(recording(), pixel_sigma=0.5)
+    table = plain_table(uL=1.0, vL=2.0, uR=-3.0, vR=4.0)
+    np.testing.assert_allclose(whitened_rows(problem, table)[0], [2.0, -6.0, 6.0 * np.sqrt(2.0)])
+    summary = compare.whitened_summary(problem, table)
+    spreads = [summary[f"spread_{row}"] for row in ("uL", "uR", "v")]
+    np.testing.assert_allclose(spreads, [2.0, 6.0, 6.0 * np.sqrt(2.0)])
+    assert summary["ratio"] == pytest.approx(112.0 * SCENE.frames / (3 * SCENE.frames - 3))
+    assert summary["beyond_95"] == 1.0
+    assert summary["tracks"] == SCENE.n_points
+
+
+def test_a_track_is_held_against_chi_square_unless_it_was_seen_once() -> None:
+    table = plain_table(uL=0.5, vL=0.0, uR=0.0, vR=0.0)
+    kept = table[(table["landmark"] > 0) | (table["frame"] == 0)]  # landmark 0 is seen once
+    found = compare.track_chi_square(plain_problem(recording()), kept)
+    assert found.index.name == "landmark"
+    assert found.columns.tolist() == ["n", "squared", "degrees", "probability"]
+    assert found.index.tolist() == list(range(1, SCENE.n_points))
+    assert found["n"].tolist() == [SCENE.frames] * (SCENE.n_points - 1)
+    np.testing.assert_allclose(found["squared"], SCENE.frames)
+    np.testing.assert_allclose(found["probability"], chi2.sf(SCENE.frames, 3 * SCENE.frames - 3))
+
+
+@pytest.mark.parametrize("reached", [16, 9])
+def test_maps_are_compared_at_the_sight_nearest_to_the_camera(reached: int) -> None:
+    """Driving towards all points, that is the last one for which there are both poses."""
+    problem = plain_problem(recording())
+    reference = true_answer(problem)
+    poses = reference.world_T_imu.copy()
+    poses[reached:] = np.nan
+    table = compare.map_difference(problem.sequence, replace(reference, world_T_imu=poses), reference)
+    camera = reference.world_T_imu[reached - 1] @ recording().imu_T_cam
+    depth = se3.transform(se3.inverse(camera), reference.landmarks.position)[:, 2]
+    np.testing.assert_allclose(table["depth"], depth)
+    assert table.columns.tolist() == ["landmark", "distance", "seen", "depth", "sigmas", "left_out"]
+
+
+def test_landmarks_that_one_of_the_two_lacks_are_in_no_comparison() -> None:
+    problem = plain_problem(recording())
+    reference = true_answer(problem)
+    position = reference.landmarks.position.copy()
+    position[4] = np.nan
+    mine = replace(reference, landmarks=Landmarks(reference.landmarks.index, position))
+    its = replace(reference, landmarks=Landmarks(reference.landmarks.index[1:], reference.landmarks.position[1:]))
+    for pair in ((mine, its), (its, mine)):
+        found = compare.map_difference(problem.sequence, *pair)["landmark"].tolist()
+        assert found == [j for j in range(SCENE.n_points) if j not in (0, 4)]
+
+
+def test_four_sights_can_tell_of_a_motion_and_three_cannot() -> None:
+    problem = plain_problem(recording())
+    estimate = true_answer(problem)
+    table = compare.reprojection(problem.sequence, estimate)
+    few = table[(table["landmark"] > 1) | (table["frame"] < 4 - table["landmark"])]  # 4 sights of 0 and 3 of 1
+    found = compare.moved_points(problem, estimate, few)
+    assert found.columns.tolist() == ["landmark", "n", "squared", "gain", "speed", "moved"]
+    assert found["landmark"].tolist() == [0, *range(2, SCENE.n_points)]
+    assert found["n"].tolist() == [4, *[SCENE.frames] * (SCENE.n_points - 2)]
+    behind = compare.moved_points(problem, estimate, table.assign(depth=np.where(table["landmark"] == 5, 0.0, 1.0)))
+    assert 5 not in behind["landmark"].tolist()
+    assert len(behind) == SCENE.n_points - 1

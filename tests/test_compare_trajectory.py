@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
+from fgbaseline.compare.travel import distance_travelled, travel_frame
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3
 
@@ -296,3 +297,41 @@ def test_the_summary_of_errors_is_what_numpy_says(errors: list[float]) -> None:
 
 def test_the_summary_of_no_errors_is_nan_throughout() -> None:
     assert all(np.isnan(value) for value in compare.summarised([]).values())
+
+
+def test_the_summary_of_a_divergence_is_worked_out_by_hand() -> None:
+    reference = turning_left(3)
+    estimate = reference.copy()
+    estimate[1] = estimate[1] @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.deg2rad(3.0)])
+    estimate[2] = estimate[2] @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.deg2rad(-4.0)])
+    estimate[1:, 2, 3] += [3.0, 4.0]
+    summary = compare.divergence_summary(compare.pose_errors(estimate, reference, Z_UP))
+    assert summary == pytest.approx(
+        {
+            "rmse": (25 / 3) ** 0.5,
+            "mean": 7 / 3,
+            "median": 3.0,
+            "p95": 3.9,
+            "max": 4.0,
+            "final": 4.0,
+            "rotation_rmse_deg": (25 / 3) ** 0.5,
+            "rotation_final_deg": 4.0,
+        }
+    )
+    assert compare.pose_errors(estimate, reference, Z_UP)["heading_deg"].tolist() == pytest.approx([0.0, 3.0, -4.0])
+
+
+def test_steps_to_and_from_an_unknown_position_count_as_zero() -> None:
+    positions = np.array([[0.0, 0, 0], [np.nan, 0, 0], [2.0, 0, 0], [2.0, 3.0, 4.0]])
+    assert distance_travelled(positions).tolist() == [0.0, 0.0, 0.0, 5.0]
+
+
+def test_a_step_below_a_tenth_of_the_brisk_ones_has_no_direction_of_its_own() -> None:
+    """Driving to +x, the path creeps sideways and drives on to +y."""
+    x = [0.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0]
+    for creep, forward in ((0.05, [1.0, 0.0, 0.0]), (0.2, [0.0, 1.0, 0.0])):
+        y = [0.0, 0.0, 0.0, 0.0, 0.0, creep, 2 * creep, 3 * creep, 4 * creep, 4 * creep + 1.0]
+        directions, left, upward = travel_frame(np.column_stack([x, y, np.zeros(10)]), np.array([0.0, 0.0, 2.0]))
+        np.testing.assert_allclose(directions[6], forward, atol=0.06)
+        np.testing.assert_allclose(left[6], np.cross([0.0, 0.0, 1.0], directions[6]), atol=1e-12)
+        np.testing.assert_allclose(upward, [0.0, 0.0, 1.0])

@@ -9,13 +9,14 @@ import pytest
 from fgbaseline import compare, data, ekf, smoother
 from fgbaseline.compare import Verdict
 from fgbaseline.compare.cost import cost
-from fgbaseline.compare.trust import TrustLimits, motion_ratio, offered, pixel_ratio
+from fgbaseline.compare.trust import TrustLimits, _above, _below, motion_ratio, offered, pixel_ratio
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
+from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import disparity
 from fgbaseline.smoother.whole_graph import values_at, whole_graph
 
-from .synthetic import Scene, drive, matched, plain_problem
+from .synthetic import Scene, drive, matched, plain_problem, with_pixels
 
 
 @cache
@@ -179,3 +180,76 @@ def test_the_cost_is_that_of_the_four_rows_and_of_the_graph(kernel: data.HuberKe
     graph, values = whole_graph(problem), values_at(estimate.world_T_imu, estimate.landmarks)
     expected = graph.error(values) - graph.at(0).error(values)
     assert cost(problem, estimate, problem.mask) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "high", "low"), [(2.0, 0, 1), (2.1, 1, 1), (4.0, 1, 0), (4.1, 2, 0), (1.9, 0, 2), (np.nan, 2, 2)]
+)
+def test_a_figure_at_its_limit_keeps_it_and_none_does_not(value: float, high: int, low: int) -> None:
+    assert _above(value, (2.0, 4.0)) == high
+    assert _below(value, (4.0, 2.0)) == low
+
+
+def true_answer(problem: Problem) -> Estimate:
+    assert problem.sequence.truth is not None
+    path = problem.sequence.truth.world_T_imu
+    return Estimate("true", path, problem.mask, landmarks=landmarks_along(problem, path))
+
+
+def test_six_observations_are_enough_for_a_frame_and_five_are_not() -> None:
+    for n, weak in ((6, "0.0%"), (5, "100.0%")):
+        problem = plain_problem(Scene(n_points=n).sequence())
+        reasons = compare.trust(problem, true_answer(problem)).reasons
+        assert f"{weak} of the frames have fewer than 6 observations" in reasons
+
+
+def test_intervals_that_nothing_ties_are_told() -> None:
+    problem = plain_problem(Scene().sequence())
+    answer = true_answer(problem)
+    frame = problem.sequence.observations.frame
+    said = (
+        "no landmark ties what lies on both sides: only the velocities tell the motion there, and a jump would not show"
+    )
+    for seen, untied in ((3, 7), (8, 2), (10, 0)):
+        reasons = compare.trust(problem, replace(answer, used=answer.used & (frame < seen))).reasons
+        assert (f"over {untied} of 9 intervals {said}" in reasons) == (untied > 0)
+        assert any("no landmark ties" in reason for reason in reasons) == (untied > 0)
+    limits = TrustLimits(*[(np.inf, np.inf)] * 2, (0.0, 0.0), (1.0, 1.0), given_up_frames=(1.0, 1.0))
+    verdicts = [
+        compare.trust(problem, replace(answer, used=answer.used & (frame < seen)), limits=limits).verdict
+        for seen in (8, 7, 3)
+    ]
+    assert verdicts == [Verdict.TRUSTED, Verdict.DOUBTFUL, Verdict.UNTRUSTED]  # 2, 3 and 7 of 9 intervals
+
+
+def test_what_was_found_is_said_in_figures() -> None:
+    problem = clean()
+    pixel, motion = (np.sqrt(ratio(problem, reference())) for ratio in (pixel_ratio, motion_ratio))
+    share = reference().used.sum() / offered(problem).sum()
+    assert set(compare.trust(problem, reference()).reasons) == {
+        f"its pixel residuals are {pixel:.2g} times as large as the noise model says",
+        f"its departures from the measured motion are {motion:.2g} times as large as the noise model says",
+        f"it used {share:.0%} of the observations with a disparity above 1 px",
+        "0.0% of the frames have fewer than 6 observations",
+        "the observations of 0.0% of the frames were given up",
+        "the recording was not diagnosed: its noise is assumed",
+        "not compared with a batch solution",
+    }
+    diagnosed = compare.trust(replace(problem, diagnosed=True), reference())
+    assert not any("not diagnosed" in reason for reason in diagnosed.reasons)
+    failed = Estimate.failed("batch", "indeterminate", problem.n_frames, len(problem.excluded))
+    beside = compare.trust(problem, reference(), failed)
+    assert "not compared with a batch solution: that failed, indeterminate" in beside.reasons
+    assert beside.verdict is Verdict.TRUSTED
+
+
+def test_an_estimate_that_used_nothing_says_so() -> None:
+    nothing = replace(reference(), used=np.zeros_like(reference().used))
+    assert compare.trust(clean(), nothing) == compare.Trust(Verdict.UNTRUSTED, ("it used no observation",))
+
+
+def test_a_disparity_of_one_pixel_is_not_above_it() -> None:
+    sequence = Scene().sequence()
+    pixel = sequence.observations.pixel.copy()
+    pixel[0], pixel[1] = [100.0, 50.0, 99.0, 50.0], [100.0, 50.0, 98.5, 50.0]
+    assert offered(plain_problem(with_pixels(sequence, pixel)))[:2].tolist() == [False, True]

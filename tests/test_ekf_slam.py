@@ -1,5 +1,6 @@
 """What the documented filter does where the printed equations lose their digits, and without a landmark prior."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
 from fgbaseline.ekf.landmark_update import LandmarkBlocks
 from fgbaseline.ekf.mapping import map_along
+from fgbaseline.ekf.pose_update import pose_innovation
+from fgbaseline.ekf.slam import _loss_as_printed
 from fgbaseline.geometry import FloatArray, se3
 
 from .synthetic import Scene, drive, matched, plain_problem, position_errors
@@ -195,3 +198,38 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
     for array, kept in zip(arrays, before, strict=True):
         np.testing.assert_array_equal(array, kept)
     np.testing.assert_array_equal(ekf.ekf(problem).world_T_imu, first.world_T_imu)
+
+
+def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
+    sequence = Scene().sequence()
+    assert sequence.truth is not None
+    assert sequence.truth.landmarks is not None
+    innovation = pose_innovation(
+        sequence.camera,
+        se3.affine_inverse(sequence.imu_T_cam),
+        np.eye(4),
+        sequence.truth.landmarks,
+        sequence.observations.pixel[:12],
+    )
+    weight = np.full(12, 4.0)
+    assert _loss_as_printed(1e-6 * np.eye(6), innovation, weight) == ""
+    # So small beside the noise of the pixels that the gain changes nothing.
+    lost = "leaves (I - K H) Sigma as printed with an eigenvalue of -1.0e-12"
+    assert _loss_as_printed(-1e-12 * np.eye(6), innovation, weight) == lost
+    assert _loss_as_printed(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
+
+
+def test_a_singular_innovation_is_told_in_words_and_figures() -> None:
+    problem, frame = at_camera_plane(1e-5)
+    estimate = ekf.ekf(problem)
+    assert re.fullmatch(
+        r"H Sigma H\^T \+ V, with a condition number of \d\.\de\+\d\d from a landmark near the camera plane, "
+        r"(has no inverse in double precision|leaves \(I - K H\) Sigma as printed with an eigenvalue of -\d\.\de.\d\d)",
+        estimate.events[0].reason,
+    )
+    frames = len({event.frame for event in estimate.events})
+    assert len(estimate.events) == frames
+    assert estimate.reason == (
+        f"the innovation covariance was numerically singular at {frames} of 10 frames, first at frame {frame}: "
+        "the printed equations lose positive definiteness there, the form used here does not"
+    )

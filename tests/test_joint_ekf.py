@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
 from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
+from fgbaseline.ekf.screening import Rejection, screened
 from fgbaseline.ekf.stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
@@ -394,3 +396,73 @@ def test_on_clean_drives_it_is_nearer_to_the_truth_than_the_filter_with_separate
     rmse = {name: np.sqrt(np.mean(each)) for name, each in squares.items()}
     assert rmse["joint"] < 0.8 * rmse["separate"]
     assert rmse["joint"] < 0.35 * rmse["dead reckoning"]
+
+
+WILD, TAME = 1e6, 1.0
+
+
+@pytest.mark.parametrize(
+    ("wild", "tame", "believed"), [(3, 3, True), (4, 3, False), (4, 0, True), (3, 2, False), (0, 6, True)]
+)
+def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
+    wild: int, tame: int, believed: bool
+) -> None:
+    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), None, JointSettings())
+    assert verdict.taken.tolist() == [believed] * (wild + tame)
+    assert verdict.rejection is (None if believed else Rejection.FRAME)
+    always = screened(np.repeat([WILD, TAME], [wild, tame]), None, JointSettings(disagreeing_share=None))
+    assert always.plain
+
+
+def test_what_is_no_number_disagrees() -> None:
+    assert screened(np.full(5, np.nan), None, JointSettings()).rejection is Rejection.FRAME
+
+
+def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
+    at = chi2.ppf(0.99, 3)
+    gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), None, JointSettings(gate=0.99))
+    assert gated.taken.tolist() == [True, True, False]
+    assert gated.rejection is Rejection.GATE
+    assert screened(np.array([0.0, 0.999 * at]), None, JointSettings(gate=0.99)).rejection is None
+    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), HuberKernel(2.0), JointSettings())
+    assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
+    assert not weighted.plain
+    assert screened(np.array([0.0, 4.0]), HuberKernel(2.0), JointSettings()).plain
+    assert not gated.plain
+
+
+def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it_cost() -> None:
+    problem = plain_problem(SCENE)
+    noise = problem.increment_covariance.copy()
+    noise[4] = -np.eye(6)
+    estimate = ekf.joint_ekf(replace(problem, increment_covariance=noise))
+    assert estimate.events[0] == data.Event(5, Rejection.SINGULAR, "12 of 12 observations take no part")
+    assert not estimate.used[SCENE.observations.frame == 5].any()
+    assert estimate.used[SCENE.observations.frame < 5].all()
+
+
+def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
+    estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
+    put_off = [data.Event(k, Rejection.ENTRY, f"2 of {2 if k else 12} observations take no part") for k in range(10)]
+    never = [data.Event(9, "landmark never determined", "no frame that was believed saw it", j) for j in (0, 1)]
+    assert list(estimate.events) == [*put_off, *never]
+
+
+def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
+    estimate = ekf.joint_ekf(replace(plain_problem(SCENE), initial_covariance=-np.eye(6)))
+    said = "P - W^T W has a negative variance after the update"
+    assert list(estimate.events) == [data.Event(k, Rejection.SINGULAR, said) for k in range(1, 10)]
+    assert estimate.reason == (
+        "at 9 of 10 frames, first at frame 1, the joint covariance was no longer positive definite"
+    )
+
+
+def test_troubles_of_several_kinds_are_told_one_after_another() -> None:
+    problem, _ = garbled(0.9, range(50, 51))
+    estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=10))
+    full = [event for event in estimate.events if event.kind == "state full"]
+    waited = sum(int(event.reason.split(" of ")[0]) for event in full)
+    assert estimate.reason == (
+        "at 1 of 100 frames, first at frame 50, most observations disagreed with the prediction, which took no part; "
+        f"at {len(full)} of 100 frames, first at frame 0, the state was full: {waited} observations were not used"
+    )

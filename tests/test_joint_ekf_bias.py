@@ -153,3 +153,15 @@ def test_other_settings_of_the_joint_filter_have_names(name: str) -> None:
     estimate, expected = data.find_estimator(name)(problem, None), ekf.joint_ekf(problem, settings=VARIANTS[name])
     assert estimate.name == name
     np.testing.assert_array_equal(estimate.world_T_imu, expected.world_T_imu)
+
+
+def test_the_bias_is_told_with_its_deviation_on_each_axis() -> None:
+    estimate = ekf.joint_ekf_bias(matched(biased("town", 1, 5.0)))
+    assert estimate.gyro_bias is not None
+    deviation = np.sqrt(np.diagonal(estimate.gyro_bias.covariance[-1]))
+    said = ", ".join(f"{m:+.4f} ± {d:.4f}" for m, d in zip(estimate.gyro_bias.mean[-1], deviation, strict=True))
+    assert estimate.events[-1] == data.Event(
+        49, "gyroscope bias", f"at rest the gyroscope reads ({said}) rad/s on the IMU's axes"
+    )
+    assert estimate.gyro_bias.mean.shape == (50, 3)
+    assert np.isfinite(estimate.gyro_bias.covariance).all()

@@ -208,3 +208,94 @@ def test_absolute_errors_are_those_of_each_pose_at_its_time() -> None:
     assert table["t"].tolist() == [1.0, 2.0, 4.0]
     assert table["translation"].tolist() == [0.0, 5.0, 0.0]
     assert table["rotation_deg"].tolist() == pytest.approx([0.0, 0.0, 30.0])
+
+
+def steady(t: FloatArray | list[float], speed: float, late: float = 0.0, name: str = "path") -> Trajectory:
+    """Straight ahead at `speed` m/s, with stamps that are `late` by so many seconds."""
+    poses = np.tile(np.eye(4), (len(t), 1, 1))
+    poses[:, 0, 3] = speed * np.asarray(t)
+    return Trajectory(np.asarray(t) + late, poses, name)
+
+
+def test_three_common_poses_are_enough_for_an_offset_and_two_are_not() -> None:
+    reference = path(np.arange(0.0, 4.0625, 0.0625))
+    found = compare.time_offset(reference, path([1.0, 2.0, 3.0]), 1.0)  # the ends of the search reach those of the path
+    assert found.seconds == pytest.approx(0.0, abs=1e-3)
+    assert compare.time_offset(path([1.0, 2.0, 3.0]), reference, 1.0).seconds == pytest.approx(0.0, abs=1e-3)
+    with pytest.raises(InputError, match="2 poses of short overlap with path at each of them, 3 are needed"):
+        compare.time_offset(reference, path([1.0, 3.0], "short"), 1.0)
+    assert compare.time_offset(path(np.arange(0.0, 4.0, 0.0625)), path([1.0, 2.0, 2.5]), 1.0).determined
+    with pytest.raises(InputError, match="2 poses"):  # at 3 + 1 s the reference has ended
+        compare.time_offset(path(np.arange(0.0, 4.0, 0.0625)), path([1.0, 2.0, 3.0]), 1.0)
+
+
+def test_without_alignment_the_error_is_speed_times_offset() -> None:
+    found = compare.time_offset(
+        steady(np.arange(0.0, 20.0, 0.1), 2.0), steady(np.arange(0.0, 20.0, 0.5), 2.0, late=0.3), 1.0, "none"
+    )
+    assert found.seconds == pytest.approx(-0.3, abs=1e-5)
+    assert found.rmse == pytest.approx(0.0, abs=1e-5)
+    assert found.rmse_without == pytest.approx(0.6, abs=1e-9)
+    assert (found.low, found.high) == pytest.approx((-0.3, -0.3), abs=1e-4)
+    assert found.determined
+
+
+def test_a_gap_that_is_the_tolerance_is_within_it() -> None:
+    pair = compare.associate(path([0.0, 1.0]), path([0.25, 1.25]), tolerance=0.25)
+    assert (len(pair), pair.tolerance) == (2, 0.25)
+    drawn = compare.associate(path([0.0, 1.0, 2.0]), path([0.0, 0.5, 2.0]), how="interpolated", tolerance=0.5)
+    assert drawn.reference.t.tolist() == [0.0, 0.5, 2.0]  # the ends are inside
+    assert compare.associate(path([1.0]), path([1.0]), tolerance=0.0).caption.startswith("1 poses paired (within 0 s;")
+
+
+def test_stamps_of_five_metres_of_driving_apart_are_not_paired_by_default() -> None:
+    assert compare.associate(path([0.0, 1.0]), path([0.0099, 1.0101])).estimate.t.tolist() == [0.0099]
+
+
+def test_of_two_equally_dense_paths_the_reference_is_interpolated() -> None:
+    reference, estimate = path([0.0, 1.0, 2.0, 3.0, 4.0], "truth"), path([0.5, 1.5, 2.5], "ours")
+    pair = compare.associate(reference, estimate, how="interpolated")
+    assert pair.interpolated == "truth"
+    assert pair.estimate.world_T_body.tobytes() == estimate.world_T_body.tobytes()
+    assert pair.tolerance == 1.0  # one interval
+    # Poses beyond the ends of what is paired are left out; those between were drawn upon.
+    assert (pair.left_out_reference, pair.left_out_estimate) == (3, 0)
+    other = compare.associate(
+        path([1.0, 2.5, 4.5], "truth"), path([0.0, 1.0, 2.0, 3.0, 4.0], "ours"), how="interpolated"
+    )
+    assert other.interpolated == "ours"
+    assert other.reference.t.tolist() == [1.0, 2.5]
+    assert (other.left_out_reference, other.left_out_estimate) == (1, 3)
+
+
+def test_one_pose_is_compared_with_what_is_interpolated_for_it() -> None:
+    many, one = path([0.0, 1.0, 2.0], "many"), path([0.5], "one")
+    for pair in (compare.associate(many, one, how="interpolated"), compare.associate(one, many, how="interpolated")):
+        assert (len(pair), pair.interpolated) == (1, "many")
+    with pytest.raises(InputError, match=r"one\.tum: it has one pose only, which cannot be interpolated"):
+        compare.associate(one, one, how="interpolated")
+
+
+def test_the_caption_says_how_poses_were_paired() -> None:
+    pair = compare.associate(
+        path([0.0, 1.0, 2.0], "truth"), path([0.25, 1.25], "ours"), how="interpolated", offset=0.25, tolerance=0.5
+    )
+    assert pair.estimate.t.tolist() == [0.5, 1.5]
+    assert pair.caption == (
+        "2 poses paired (truth interpolated, stamps within 0.5 s, ours +0.25 s; "
+        "left out: 2 of the reference, 0 of the estimate); not aligned"
+    )
+
+
+@pytest.mark.parametrize("sparse", ["reference", "estimate"])
+def test_the_error_with_an_offset_is_in_metres_of_the_reference_also_where_the_scale_is_fitted(sparse: str) -> None:
+    dense, few = path(np.arange(0.0, 20.0, 0.05)), path(np.arange(0.0, 20.0, 0.25))
+    reference, estimate = (few, dense) if sparse == "reference" else (dense, few)
+    errors = 0.1 * np.random.default_rng(1).normal(size=estimate.position.shape)
+
+    def offset(scale: float) -> compare.TimeOffset:
+        poses = np.array(estimate.world_T_body)
+        poses[:, :3, 3] = scale * (poses[:, :3, 3] + errors)
+        return compare.time_offset(reference, estimate.with_poses(poses), 1.0, "sim3")
+
+    assert offset(0.01).rmse == pytest.approx(offset(1.0).rmse, rel=1e-6)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
-from fgbaseline.compare.block_draws import draw_blocks
+from fgbaseline.compare.block_bootstrap import tails
+from fgbaseline.compare.block_draws import BlockDraws, draw_blocks
 from fgbaseline.compare.block_length import autocovariance, block_length
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -165,3 +166,112 @@ def test_pairs_without_a_difference_settle_nothing() -> None:
     assert (nothing.block, nothing.reliable) == (1, False)
     with pytest.raises(InputError, match="same moments"):
         compare.rmse_difference([1.0, 2.0], [1.0])
+
+
+def politis_and_white(x: FloatArray) -> int:
+    """Politis and White (2004) with the correction of Patton, Politis and White (2009), term by term."""
+    n = len(x)
+    R = autocovariance(x)
+    widest = int(np.ceil(np.sqrt(n))) + 5
+    quiet = [abs(R[k] / R[0]) < 2.0 * np.sqrt(np.log10(n) / n) for k in range(widest + 1)]
+    m = next(m for m in range(widest) if all(quiet[m + 1 : m + 6]))
+    M = min(2 * max(m, 1), widest)
+    flat_top = {k: 1.0 if abs(k) / M <= 0.5 else 2.0 * (1.0 - abs(k) / M) for k in range(-M, M + 1)}
+    g = sum(flat_top[k] * R[abs(k)] for k in flat_top)
+    G = sum(flat_top[k] * abs(k) * R[abs(k)] for k in flat_top)
+    if g <= 0.0:
+        return 1
+    return int(
+        min(np.ceil((2.0 * G**2 / (4.0 / 3.0 * g**2)) ** (1 / 3) * n ** (1 / 3)), np.ceil(min(3 * n**0.5, n / 3)))
+    )
+
+
+@pytest.mark.parametrize("n", [40, 333, 1000])
+@pytest.mark.parametrize("phi", [-0.6, 0.0, 0.4, 0.8])
+def test_the_block_is_that_of_the_published_formula(n: int, phi: float) -> None:
+    checked = 0
+    for seed in range(10):
+        x = autoregressive(n, phi, seed)
+        length, ends = block_length(x)
+        if ends:
+            assert length == politis_and_white(x)
+            checked += 1
+    assert checked >= 4
+
+
+def test_noise_that_takes_itself_back_needs_no_blocks() -> None:
+    """Differences of noise: their autocovariances add up to about zero, and in some series to less."""
+    for seed in range(20):
+        x = np.diff(np.random.default_rng(seed).normal(size=101))
+        assert block_length(x).length == politis_and_white(x)
+    assert block_length(np.diff(np.random.default_rng(3).normal(size=101))) == (1, True)
+
+
+def test_ten_values_are_looked_at_and_nine_are_too_few() -> None:
+    assert block_length(np.arange(9.0)).length == 1
+    assert block_length(np.arange(10.0)).length == politis_and_white(np.arange(10.0)) == 2
+
+
+def test_ten_blocks_are_reliable_and_nine_are_not() -> None:
+    noise = np.random.default_rng(0).normal(size=100)
+    for block, enough in ((10, True), (11, False)):
+        attrs = compare.error_statistics(noise, block=block, repetitions=5, confidence=0.5).attrs
+        assert attrs == {"block": block, "blocks": 100 / block, "confidence": 0.5, "reliable": enough}
+    assert compare.rmse_difference(np.full(10, 2.0), np.ones(10)).reliable
+    assert not compare.rmse_difference(np.full(9, 2.0), np.ones(9)).reliable
+
+
+@pytest.mark.parametrize(("n", "block"), [(10_000, 2), (10_001, 3)])
+def test_a_series_has_five_thousand_blocks_at_most(n: int, block: int) -> None:
+    assert compare.error_statistics(np.ones(n), repetitions=1).attrs["block"] == block
+    assert compare.rmse_difference(np.full(n, 2.0), np.ones(n), repetitions=1).block == block
+
+
+def test_the_table_of_statistics_is_named() -> None:
+    table = compare.error_statistics([1.0, 3.0], repetitions=50)
+    assert table.index.name == "statistic"
+    assert table.index.tolist() == ["rmse", "mean", "median", "std", "p95", "min", "max", "sse", "n"]
+    assert table.columns.tolist() == ["value", "low", "high"]
+    assert table["value"].tolist() == pytest.approx([5**0.5, 2.0, 2.0, 1.0, 2.9, 1.0, 3.0, 10.0, 2.0])
+    # Two values in blocks of one: (1, 1), (1, 3), (3, 1) and (3, 3) are drawn.
+    assert table.loc["mean", ["low", "high"]].tolist() == [1.0, 3.0]
+    assert table.loc["std", ["low", "high"]].tolist() == [0.0, 1.0]
+
+
+def test_an_interval_leaves_out_the_same_share_at_both_ends() -> None:
+    drawn = np.arange(101.0)[:, None] * [1.0, -1.0]
+    np.testing.assert_allclose(tails(drawn, 0.5), [[25.0, -75.0], [75.0, -25.0]])
+    np.testing.assert_allclose(tails(drawn), [[2.5, -97.5], [97.5, -2.5]])
+    errors, others = np.random.default_rng(4).normal(size=(2, 60))
+    wide, narrow = (compare.rmse_difference(errors, others, confidence=c) for c in (0.95, 0.5))
+    assert wide.low < narrow.low < narrow.high < wide.high
+    again, other = (compare.rmse_difference(errors, others, confidence=0.5, seed=s) for s in (0, 1))
+    assert narrow == again != other
+
+
+def test_moments_that_one_of_the_two_lacks_are_left_out() -> None:
+    found = compare.rmse_difference([3.0, np.nan, 3.0, 3.0], [1.0, 1.0, np.inf, 1.0])
+    assert (found.value, found.low, found.high, found.block) == (2.0, 2.0, 2.0, 1)
+    assert found.settled
+    with pytest.raises(InputError, match="same moments"):
+        compare.rmse_difference([[1.0]], [[1.0]])
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "settled"), [(0.1, 2.0, True), (-2.0, -0.1, True), (0.0, 2.0, False), (-2.0, 0.0, False)]
+)
+def test_an_interval_that_touches_zero_has_no_sign(low: float, high: float, settled: bool) -> None:
+    assert compare.RmseDifference(1.0, low, high, 1, True).settled == settled
+
+
+def test_looking_at_a_few_draws_at_a_time_changes_nothing() -> None:
+    x = np.random.default_rng(5).normal(size=120_000)
+    draws = draw_blocks(len(x), 1000, 9, seed=2)  # four of them at a time
+    one_by_one = [BlockDraws(draws.start[k : k + 1], draws.length) for k in range(9)]
+    np.testing.assert_array_equal(
+        draws.quantiles(x, (0.5, 0.95)), np.concatenate([one.quantiles(x, (0.5, 0.95)) for one in one_by_one])
+    )
+    assert (len(draws), draws.n) == (9, 120_000)
+    short = draw_blocks(2000, 1, 600, seed=3)  # 250 at a time
+    sums = short.sums(x[:2000, None])
+    np.testing.assert_allclose(sums[:, 0], x[short.start].sum(axis=1), atol=1e-9)

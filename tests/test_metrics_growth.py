@@ -196,3 +196,128 @@ def test_no_difference_has_no_shares_and_a_standing_reference_only_noise() -> No
     still = compare.difference_shares(matched(winding(), np.tile(np.eye(4), (N, 1, 1))))
     assert (still.scale, still.heading, still.noise) == (0.0, 0.0, 1.0)
     assert still.scale_percent == 0.0
+
+
+def ahead(x: list[float] | FloatArray) -> FloatArray:
+    """Poses straight ahead at these places."""
+    poses = np.tile(np.eye(4), (len(x), 1, 1))
+    poses[:, 0, 3] = x
+    return poses
+
+
+def test_the_table_of_drift_is_named() -> None:
+    rates = compare.drift(matched(ahead(1.1 * np.arange(51)), ahead(np.arange(51.0))))
+    assert rates.index.name == "quantity"
+    assert rates.columns.tolist() == ["value", "low", "high", "unit", "over", "n"]
+    np.testing.assert_allclose(rates.loc["translation", ["value", "low", "high"]].astype(float), 10.0)
+    assert rates.loc["translation", "n"] == 48  # of 5 m, the last two of 4 and 3
+
+
+def test_drift_is_measured_over_a_tenth_of_the_path_or_its_longest_step() -> None:
+    for x, over in ((np.arange(51.0), "5 m"), (np.append(np.arange(41.0), 50.0), "10 m")):
+        rates = compare.drift(matched(ahead(1.1 * x), ahead(x)))
+        assert rates.loc["translation", "over"] == over
+        assert rates.loc["translation per second", "over"] == f"{0.1 * DT * (len(x) - 1):.4g} s"
+        assert rates.loc["end translation", "over"] == "50 m"
+    for metres in (0.0, -1.0):
+        with pytest.raises(InputError, match=f"no two poses are {metres:g} m apart, of 50 m in all"):
+            compare.drift(matched(ahead(x), ahead(x)), metres=metres)
+
+
+def test_drift_over_a_stretch_that_is_missed_by_half_is_still_told() -> None:
+    x = np.array([0.0, 3.0, 6.0])
+    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "n"] == 2
+    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "value"] == pytest.approx(
+        10.0
+    )
+    with pytest.raises(InputError, match=r"no two poses are 1\.9 m apart"):
+        compare.drift(matched(ahead(x), ahead(x)), metres=1.9)
+
+
+def test_growth_is_worked_out_by_hand() -> None:
+    table = compare.growing_divergence(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
+    assert table.index.name == "frame"
+    assert table.columns.tolist()[-2:] == ["t", "percent_of_path"]
+    assert table["percent_of_path"].tolist() == pytest.approx([np.nan, 10.0, 10.0, 10.0, 10.0], nan_ok=True)
+    parts = compare.growth_by_part(table, 2)
+    assert parts.index.name == "part"
+    assert parts.to_dict("list") == {
+        "from_m": [0.0, 2.0],
+        "to_m": [2.0, 4.0],
+        "frames": [2, 3],
+        "rmse": pytest.approx([0.005**0.5, (0.29 / 3) ** 0.5]),
+        "per_metre": pytest.approx([0.1, 0.1]),
+        "per_frame": pytest.approx([0.1, 0.1]),
+        "heading_deg": [0.0, 0.0],
+    }
+    assert compare.growth_by_part(table, 1)["frames"].tolist() == [5]
+    assert len(compare.growth_by_part(table)) == 10
+    assert compare.growth_by_part(table)["frames"].sum() == 5
+    for parts_wanted in (0, -1):
+        with pytest.raises(InputError, match="fewer than 1 part"):
+            compare.growth_by_part(table, parts_wanted)
+
+
+def test_poses_that_are_unknown_take_no_part_in_the_growth() -> None:
+    table = compare.growing_divergence(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
+    table.loc[3, "position"] = np.nan
+    assert compare.growth_by_part(table, 2)["rmse"].tolist() == pytest.approx([0.005**0.5, 0.1**0.5])
+
+
+def test_a_bound_that_is_reached_is_not_passed() -> None:
+    table = compare.growing_divergence(matched(ahead([0.0, 1.5, 3.0]), ahead(np.arange(3.0))))
+    assert compare.first_beyond(table, 1.0) is None
+    assert compare.first_beyond(table, 0.5) == compare.Passing(2, 2 * DT, 2.0, 1.0)
+    assert compare.first_beyond(table, 0.0) == compare.Passing(1, DT, 1.0, 0.5)
+
+
+def test_the_table_of_shares_says_how_it_was_drawn() -> None:
+    """A difference of the same size everywhere has blocks of one pose."""
+    for n, block, reliable in ((10, 1, True), (9, 1, False), (5001, 2, True)):
+        reference = ahead(np.arange(float(n)))
+        beside = reference.copy()
+        beside[:, 1, 3] = 1.0
+        table = compare.share_intervals(matched(beside, reference), repetitions=3)
+        assert table.index.name == "share"
+        assert table.attrs == {"block": block, "reliable": reliable}
+
+
+def test_one_pose_has_shares_without_intervals_and_two_have_both() -> None:
+    one = compare.share_intervals(matched(ahead([1.0]), ahead([0.0])))
+    assert one["value"].tolist() == [0.0, 0.0, 1.0]
+    assert one[["low", "high"]].isna().all(axis=None)
+    two = compare.share_intervals(matched(ahead([1.0, 3.0]), ahead([0.0, 1.0])), repetitions=3)
+    assert two[["low", "high"]].notna().all(axis=None)
+
+
+def test_draws_without_any_difference_are_left_out() -> None:
+    # One pose of thirty is off: most draws of few blocks do not hold it.
+    reference = ahead(np.arange(30.0))
+    one_off = reference.copy()
+    one_off[7, 1, 3] += 1.0
+    table = compare.share_intervals(matched(one_off, reference), repetitions=50)
+    assert table.notna().all(axis=None)
+    assert (table["low"] <= table["value"]).all()
+    assert (table["value"] <= table["high"]).all()
+
+
+def test_the_intervals_of_shares_depend_on_the_confidence_and_the_seed() -> None:
+    pair = matched(winding(scale=1.001, heading_rate=2e-4, noise=0.5))
+    wide, narrow, other = (
+        compare.share_intervals(pair, repetitions=200, confidence=c, seed=s)
+        for c, s in ((0.95, 0), (0.5, 0), (0.95, 1))
+    )
+    assert (wide["low"] <= narrow["low"]).all()
+    assert (wide["high"] >= narrow["high"]).all()
+    assert (wide["high"] - wide["low"]).sum() > (narrow["high"] - narrow["low"]).sum()
+    assert not wide.equals(other)
+
+
+def test_the_intervals_of_drift_depend_on_the_confidence_and_the_seed() -> None:
+    pair = matched(winding(noise=0.5))
+    wide, narrow, other, again = (
+        compare.drift(pair, 20.0, repetitions=200, confidence=c, seed=s).loc["translation", ["low", "high"]].tolist()
+        for c, s in ((0.95, 0), (0.5, 0), (0.95, 1), (0.95, 0))
+    )
+    assert wide[0] < narrow[0] < narrow[1] < wide[1]
+    assert wide == again != other

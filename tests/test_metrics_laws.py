@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Matched
+from fgbaseline.compare.best_rotation import best_rotation
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, se3, so3
 
@@ -219,3 +220,87 @@ def test_no_metric_changes_its_arguments() -> None:
     np.testing.assert_array_equal(estimate, before[1])
     assert pair.caption.endswith("; not aligned")
     assert "Sim(3)-aligned over all 15 poses (scale" in aligned.caption
+
+
+def test_where_neither_positions_nor_orientations_say_anything_nothing_is_turned() -> None:
+    """Standing still, with orientations that are half turns about all three axes: their sum is zero."""
+    half_turns = np.stack([np.diag([1.0, a, b, 1.0]) for a, b in ((1, 1), (-1, -1), (1, -1), (-1, 1))])
+    half_turns[2:, 0, 0] = -1.0
+    standing = np.tile(np.eye(4), (4, 1, 1))
+    done = compare.align(standing, half_turns, Align.SE3)
+    np.testing.assert_array_equal(done.matrix, np.eye(4))
+    assert done.free == ("every rotation",)
+    turned = compare.align(standing, half_turns, Align.YAW)
+    np.testing.assert_array_equal(turned.matrix, np.eye(4))
+    assert turned.free == ("yaw",)
+
+
+def test_no_vectors_at_all_leave_the_whole_rotation_to_the_tie() -> None:
+    turn = so3.exp_so3(np.array([0.1, -0.4, 0.3]))
+    R, axis = best_rotation(np.zeros((3, 3)), lambda: turn, 0.0)
+    np.testing.assert_allclose(R, turn, atol=1e-12)
+    assert axis is not None
+    np.testing.assert_array_equal(axis, np.zeros(3))
+
+
+@pytest.mark.parametrize("length", [0.25, 7.0])
+def test_up_is_a_direction_of_any_length(length: float) -> None:
+    reference = path("winding", 3)
+    pair = matched(reference, motion(4) @ disturbed(reference, 5))
+    unit = all_metrics(pair.aligned("yaw", up=UP), UP)
+    other = all_metrics(pair.aligned("yaw", up=length * UP), length * UP)
+    pd.testing.assert_series_equal(unit, other, rtol=1e-9, atol=1e-9)
+    pd.testing.assert_frame_equal(
+        compare.share_intervals(pair, UP, repetitions=5), compare.share_intervals(pair, length * UP, repetitions=5)
+    )
+
+
+def test_the_scale_of_one_camera_is_found_and_said() -> None:
+    reference = path("winding", 6)
+    half = motion(7) @ reference
+    half[:, :3, 3] *= 0.5
+    done = compare.align(half, reference, "sim3")
+    assert done.scale == pytest.approx(2.0)
+    np.testing.assert_allclose(done.apply(half), reference, atol=1e-9)
+    np.testing.assert_allclose(done.matrix[:3, :3], 2.0 * done.rotation)
+    assert (done.n, done.of, done.free) == (15, 15, ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "n", "caption"),
+    [
+        ("none", None, 0, "not aligned"),
+        ("first-pose", None, 1, "the first pose put on the reference's"),
+        ("yaw", None, 15, "yaw and position aligned over all 15 poses"),
+        ("se3", 15, 15, "SE(3)-aligned over all 15 poses"),
+        ("se3", 1, 1, "SE(3)-aligned over the first 1 poses; their positions leave every rotation open"),
+        ("sim3", 4, 4, "Sim(3)-aligned over the first 4 poses (scale 1)"),
+    ],
+)
+def test_the_caption_says_what_was_done(kind: str, first: int | None, n: int, caption: str) -> None:
+    done = compare.align(path("winding", 0), path("winding", 0), kind, first=first)
+    assert done.caption == caption
+    assert (done.n, done.of) == (n, 15)
+
+
+def test_the_axis_that_is_left_open_is_named() -> None:
+    reference = path("straight up", 0)
+    done = compare.align(reference, reference, "sim3")
+    assert done.free == ("the rotation about (0.000, 0.000, 1.000)",)
+    with pytest.raises(InputError, match="the first 0 cannot be taken"):
+        compare.align(reference, reference, "se3", first=0)
+
+
+def test_yaw_is_about_up_wherever_that_points_and_as_the_first_poses_say() -> None:
+    reference = path("winding", 8)
+    up = np.array([0.0, -0.6, 0.8])
+    turn = np.eye(4)
+    turn[:3, :3] = so3.exp_so3(0.7 * up)
+    pair = matched(reference, turn @ reference).aligned("yaw", up=2.0 * up)
+    assert compare.absolute_errors(pair)["translation"].max() < 1e-9
+    np.testing.assert_allclose(pair.alignment.rotation, turn[:3, :3].T, atol=1e-9)
+    assert pair.alignment.free == ()
+    later = turn @ reference
+    later[:4] = reference[:4]
+    first = matched(reference, later).aligned("se3", first=4)
+    np.testing.assert_allclose(first.alignment.matrix, np.eye(4), atol=1e-9)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare
 from fgbaseline.compare import Unit
+from fgbaseline.compare import pairs as pairs_module
 from fgbaseline.compare.pairs import chained_pairs, nearest_delta_pairs, turned_pairs
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
@@ -148,3 +149,44 @@ def test_a_table_of_motions_says_where_each_begins_and_what_it_spans() -> None:
     assert wide["start"].tolist() == [0, 1, 3]
     own = compare.relative_errors(matched, 3.5, Unit.METRES, all_pairs=True, from_reference=False, tolerance=0.01)
     assert list(zip(own["start"], own["end"], strict=True)) == [(0, 2)]
+
+
+def test_half_a_turn_is_the_largest_delta_there_is() -> None:
+    poses = se3.exp(np.array([[0.0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, np.pi / 2], [0, 0, 0, 0, 0, np.pi]]))
+    for every in (False, True):
+        assert compare.pose_pairs(poses, np.arange(3.0), 180, "deg", all_pairs=every).tolist() == [[0, 2]]
+
+
+@pytest.mark.parametrize("at_once", [1, 30, 100_000])
+def test_however_many_pairs_are_looked_at_together_they_are_the_same(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rotations = so3.exp_so3(np.random.default_rng(0).normal(size=(10, 3)))
+    apart = so3.rotation_angle(np.swapaxes(rotations[:, None], -1, -2) @ rotations)
+    expected = np.argwhere(np.triu(np.abs(apart - 1.5) <= 0.7, 1))
+    assert len(expected) > 5
+    monkeypatch.setattr(pairs_module, "AT_ONCE", at_once)
+    assert turned_pairs(rotations, 1.5, 0.7).tolist() == expected.tolist()
+
+
+def test_the_table_of_motions_is_named() -> None:
+    poses = straight(np.ones(4))
+    pair = compare.associate(Trajectory(np.arange(5.0), poses), Trajectory(np.arange(5.0), poses))
+    table = compare.relative_errors(pair, 1, "frames")
+    assert table.columns.tolist() == [
+        "start", "end", "t", "seconds", "metres",
+        "translation", "rotation_deg", "rotation_chord", "pose", "distance", "distance_percent",
+    ]  # fmt: skip
+
+
+def test_every_difference_of_a_pose_is_what_it_says() -> None:
+    """2 m and a quarter turn: worked out by hand."""
+    wrong = se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2])[None]
+    wrong[0, :3, 3] = [0.0, 2.0, 0.0]
+    expected = {"translation": 2.0, "rotation": np.pi / 2, "rotation_deg": 90.0, "rotation_chord": 2.0, "pose": 8**0.5}
+    both, reference = np.concatenate([np.eye(4)[None], wrong]), np.tile(np.eye(4), (2, 1, 1))
+    for what, value in expected.items():
+        assert compare.absolute_difference(wrong, np.eye(4)[None], what) == pytest.approx([value])
+        assert compare.motion_difference(both, reference, np.array([[0, 1]]), what) == pytest.approx([value])
+    assert compare.motion_difference(both, reference, np.array([[0, 1]]), "distance") == pytest.approx([2.0])
+    assert np.isnan(compare.motion_difference(both, reference, np.array([[0, 1]]), "distance_percent")).all()

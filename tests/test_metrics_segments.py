@@ -138,3 +138,52 @@ def test_lengths_that_do_not_fit_and_standing_still_are_errors() -> None:
     still = np.tile(np.eye(4), (61, 1, 1))
     with pytest.raises(InputError, match="stands still"):
         compare.segment_errors(matched(t, still, result))
+
+
+def test_a_segment_ends_with_the_first_pose_that_is_further_than_its_length() -> None:
+    """One metre a step, straight ahead and 10 % too far: worked out by hand."""
+    truth, result = (np.tile(np.eye(4), (10, 1, 1)) for _ in range(2))
+    truth[:, 0, 3] = np.arange(10.0)
+    result[:, 0, 3] = 1.1 * np.arange(10.0)
+    found = compare.segment_errors(matched(0.5 * np.arange(10.0), truth, result), lengths=(3, 6), step=2)
+    assert found.table.columns.tolist() == [
+        "start", "end", "length", "translation_percent", "rotation_deg_per_m", "speed"
+    ]  # fmt: skip
+    assert found.table[["start", "end", "length"]].to_numpy().tolist() == [
+        [0, 4, 3], [0, 7, 6], [2, 6, 3], [2, 9, 6], [4, 8, 3]
+    ]  # fmt: skip
+    np.testing.assert_allclose(found.table["translation_percent"], 10.0 * np.array([4 / 3, 7 / 6, 4 / 3, 7 / 6, 4 / 3]))
+    np.testing.assert_allclose(found.table["speed"], [3 / 2.0, 6 / 3.5, 3 / 2.0, 6 / 3.5, 3 / 2.0])
+    assert found.caption == "5 segments of 3 to 6 m (lengths fitted to the path, not KITTI's), one begun every 2 poses"
+    assert found.by_length.index.name == "length"
+    assert found.by_length.columns.tolist() == ["translation_percent", "rotation_deg_per_m", "n"]
+    assert found.by_length["n"].tolist() == [3, 2]
+
+
+def test_a_path_of_just_100_m_is_too_short_for_kittis_lengths() -> None:
+    for n, official in ((101, False), (102, True)):
+        straight = np.tile(np.eye(4), (n, 1, 1))
+        straight[:, 0, 3] = np.arange(float(n))
+        found = compare.segment_errors(matched(0.1 * np.arange(n), straight, straight))
+        assert (found.official, found.step) == (official, 10 if official else 1)
+
+
+def test_lengths_are_kittis_own_only_with_kittis_step() -> None:
+    pair = matched(*drive(300))
+    assert compare.segment_errors(pair, lengths=LENGTHS).official
+    assert compare.segment_errors(pair, lengths=LENGTHS).step == 10
+    assert compare.segment_errors(pair, step=10).official
+    assert not compare.segment_errors(pair, step=5).official
+    assert not compare.segment_errors(pair, lengths=LENGTHS[:7]).official
+
+
+def test_the_means_of_the_segments_have_intervals() -> None:
+    found = compare.segment_errors(matched(*drive(300)), step=2)
+    table = found.intervals()
+    assert table.index.tolist() == ["translation_percent", "rotation_deg_per_m"]
+    assert table.columns.tolist() == ["value", "low", "high"]
+    assert table["value"].tolist() == pytest.approx([found.translation_percent, found.rotation_deg_per_m])
+    assert (table["low"] < table["value"]).all()
+    assert (table["value"] < table["high"]).all()
+    assert found.intervals(seed=0).equals(table)
+    assert not found.intervals(seed=1).equals(table)
