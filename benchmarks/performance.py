@@ -24,7 +24,7 @@ from .measured import Row, table
 
 PLACE = Path("docs/performance.md")
 RECORDING = "03.npz"
-QUICK_DRIVE, QUICK_RUN = 450, 100
+QUICK_DRIVE, QUICK_RUN = 600, 100
 """frames"""
 
 
