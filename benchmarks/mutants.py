@@ -19,11 +19,11 @@ from pathlib import Path
 import click
 from scipy.stats import beta
 
+from . import page
 from .rooms import ROOMS
 
 PLACE = Path("out/mutants")
 PAGE = Path("docs/mutants.md")
-MARK, END = "<!-- python -m benchmarks.mutants -->", "<!-- end -->"
 DIED = (1, 3, 24, -24, 36, 152, 255, -9, -11)
 """exit codes: a test failed, pytest itself did, the time ran out, the process was lost"""
 SURVIVED = 0
@@ -131,11 +131,7 @@ def main(per_module: int, seed: int) -> None:
         f" {counts['no test']} are in functions that no selected test runs. {share:.1f} % died (95 % interval {low:.1f}"
         f" to {high:.1f} %); {weighted(everything, tried):.1f} % where each module counts by its mutants."
     )
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, behind = text.partition(MARK)
-    behind = behind.partition(END)[2]
-    lines = [before + MARK, "", said, "", *table(everything, tried), "", END + behind]
-    PAGE.write_text("\n".join(lines), encoding="utf-8")
+    page.write(PAGE, "mutants", [said, "", *table(everything, tried)])
     for mutant in tried:
         if mutant.code not in DIED:
             click.echo(f"{mutant.name}\n    {difference(mutant.name)}")

@@ -19,13 +19,12 @@ from pathlib import Path
 
 import click
 
-from . import filters, growth, growth_figure, long_run, reading, reference_speed, rest_of_run
+from . import filters, growth, growth_figure, long_run, page, reading, reference_speed, rest_of_run
 from .measured import Row, table
 
 PLACE = Path("docs/performance.md")
-MARK, END = "<!-- python -m benchmarks.performance -->", "<!-- end -->"
 RECORDING = "03.npz"
-QUICK_DRIVE, QUICK_RUN = 450, 100
+QUICK_DRIVE, QUICK_RUN = 600, 100
 """frames"""
 
 
@@ -63,13 +62,6 @@ def _memory() -> str:
     return f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.0f} GB"
 
 
-def write(text: str) -> None:
-    """Between the marks of docs/performance.md."""
-    before, _, behind = PLACE.read_text(encoding="utf-8").partition(MARK)
-    _, _, behind = behind.partition(END)
-    PLACE.write_text(f"{before}{MARK}\n\n{text}\n\n{END}{behind}", encoding="utf-8")
-
-
 @click.command()
 @click.option("--recordings", type=click.Path(file_okay=False, path_type=Path), default="../shared/data")
 @click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
@@ -96,7 +88,7 @@ def main(recordings: Path, runs: int, quick: bool, wanted: bool | None, figure: 
     text = "\n\n".join([" ".join(told), table(rows), growth.tables(points, growth.axes(quick))])
     click.echo(text)
     if wanted or (wanted is None and not quick):
-        write(text)
+        page.write(PLACE, "performance", [text])
         click.echo(f"\n{PLACE} is written", err=True)
         if figure is not None:
             figure.write_bytes(growth_figure.drawn(points))

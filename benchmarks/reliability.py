@@ -18,8 +18,9 @@ import click
 from fgbaseline.reports.comparison import Result, Run
 from tests.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
 
+from . import page
+
 PLACE = Path("docs/reliability.md")
-MARK = "<!-- python -m benchmarks.reliability -->"
 
 
 def told(result: Result) -> str:
@@ -42,17 +43,14 @@ def row(recording: Hostile, run: Run) -> str:
 @click.command()
 def main() -> None:
     """Solve every recording and write the table."""
-    lines = [MARK, "", f"| recording | {' | '.join(ESTIMATORS)} | reference |", "|" + "---|" * (len(ESTIMATORS) + 2)]
+    lines = [f"| recording | {' | '.join(ESTIMATORS)} | reference |", "|" + "---|" * (len(ESTIMATORS) + 2)]
     for recording in RECORDINGS:
         start = time.monotonic()
         lines.append(row(recording, solved(recording)))
         click.echo(f"{recording.name}: {time.monotonic() - start:.0f} s", err=True)
     lines += [f"| {name} | {' | '.join(['refused'] * len(ESTIMATORS))} | |" for name in REFUSED]
     notes = [f"- **{recording.name}**: {recording.note}." for recording in RECORDINGS if recording.note]
-    text = PLACE.read_text(encoding="utf-8")
-    before, _, behind = text.partition(MARK)
-    _, end, behind = behind.partition("<!-- end -->")
-    PLACE.write_text("\n".join([before + lines[0], *lines[1:], "", *notes, "", end + behind]), encoding="utf-8")
+    page.write(PLACE, "reliability", [*lines, "", *notes])
 
 
 if __name__ == "__main__":
