@@ -82,13 +82,13 @@ def test_the_sdist_holds_what_the_wheel_is_made_of_and_no_tests(built: Built) ->
 
 @dataclass(frozen=True)
 class Environment:
-    """A virtual environment with nothing in it but pip."""
+    """A virtual environment with nothing in it, served by the pip of this one."""
 
     folder: Path
 
     @staticmethod
     def make(folder: Path) -> "Environment":
-        run(sys.executable, "-m", "venv", folder, cwd=folder.parent)
+        run(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder.parent)
         return Environment(folder)
 
     @property
@@ -101,7 +101,14 @@ class Environment:
         return folder
 
     def pip(self, *arguments: str | Path) -> None:
-        run(self.python, "-m", "pip", *arguments, cwd=self.folder)
+        run(sys.executable, "-m", "pip", "--python", self.python, *arguments, cwd=self.folder)
+
+    def fill(self, wheel: Path) -> None:
+        """Installs a wheel with all that it asks for: by uv, in a tenth of pip's time, or by pip where uv cannot."""
+        uv = Path(sys.executable).with_name("uv")
+        command = [uv, "pip", "install", "--quiet", "--system-certs", "--python", self.python, wheel]
+        if subprocess.run(command, cwd=self.folder, stdin=subprocess.DEVNULL, check=False).returncode != 0:
+            self.pip("install", "--quiet", "--no-compile", wheel)
 
 
 USERS_OWN = 'OWNER = "the user"\n'
@@ -149,7 +156,7 @@ def test_each_installs_into_an_empty_environment_and_works_beside_the_users_own_
     built: Built, tmp_path: Path
 ) -> None:
     with_wheel = Environment.make(tmp_path / "wheel")
-    with_wheel.pip("install", "--quiet", "--no-compile", built.wheel)
+    with_wheel.fill(built.wheel)
     with_wheel.pip("check")
     use_beside_the_users_own_modules(with_wheel, tmp_path / "project", with_a_report=True)
 
