@@ -69,6 +69,19 @@ def test_everything_is_inside_the_figure_and_nothing_overlaps(make: Any) -> None
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
+def test_ticks_that_change_with_the_size_of_a_panel_are_inside_too() -> None:
+    # At its final height a panel may have ticks at halves where it had them at wholes, and needs room for them.
+    with in_style():
+        for low in np.linspace(2.0, 9.0, 25):
+            figure, (panel,) = sheet(3.4)
+            panel.set_ylim(-low, 0.6)
+            panel.set_ylabel("height, m")
+            panel.set_xlabel("time, s")
+            head(figure, "Height", panel.plot([0.0, 60.0], [0.0, -low], label="path"))
+            lay_out(figure)
+            assert everything_of(panel).x0 >= 0.0, f"from {-low:.2f} m on"
+
+
 @pytest.mark.parametrize("make", FIGURES)
 def test_constrained_layout_would_place_them_alike(make: Any) -> None:
     with in_style():

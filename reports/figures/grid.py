@@ -2,7 +2,7 @@
 
 matplotlib's constrained layout in closed form, for figures that are one grid of panels below one legend: it solves for
 sizes, looks, and solves again, and looking at every label of every tick is most of what it does. Here it is done once,
-at sizes near those that come of it.
+at sizes near those that come of it, and again only where that changed the ticks.
 """
 
 import numpy as np
@@ -21,6 +21,8 @@ USUAL = (0.6, 0.12, 0.25)
 """inches to the left and right of a panel and above it, by which it is sized before anything is measured"""
 BELOW, BELOW_INNER = 0.5, 0.1
 """inches under a panel of the lowest row, and of those above"""
+PASSES = 3
+"""at most, of measuring and placing; a second one is needed where a panel has other ticks at its new size"""
 LEFT, RIGHT, BOTTOM, TOP = range(4)
 
 
@@ -33,7 +35,16 @@ def fill_grid(figure: Figure) -> None:
     size = figure.get_size_inches()
     head = max((legend.get_window_extent().height / figure.dpi + 2.0 * PAD for legend in figure.legends), default=0.0)
     _place(panels, np.array([_usual(spec) for _, spec in panels]), size, head)
-    _place(panels, np.array([_around(axes) for axes, _ in panels]) / figure.dpi, size, head)
+    for _ in range(PASSES):
+        ticks = _ticks(panels)
+        _place(panels, np.array([_around(axes) for axes, _ in panels]) / figure.dpi, size, head)
+        if _ticks(panels) == ticks:
+            break
+
+
+def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:
+    """Where they are: a panel of another size may have others, whose labels take another space."""
+    return [axis.get_majorticklocs().tolist() for axes, _ in panels for axis in (axes.xaxis, axes.yaxis)]
 
 
 def _usual(spec: SubplotSpec) -> tuple[float, float, float, float]:

@@ -108,7 +108,7 @@ def _mark_near(axes: Axes, *, vertical: bool) -> None:
     letters: dict[str, Any] = {"fontsize": 8.5, "color": "#555555"}
     if vertical:
         axes.axvline(NEAR, **style)
-        axes.text(NEAR, 1.0, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="top", **letters)
+        axes.text(NEAR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="bottom", **letters)
     else:
         axes.axhline(NEAR, **style)
         axes.text(1.003, NEAR, "3 px", transform=axes.get_yaxis_transform(), ha="left", va="center", **letters)
