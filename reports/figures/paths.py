@@ -70,7 +70,8 @@ def paths_side_by_side(run: Run) -> Figure:
             note(axes, outside[0] + " outside")
     for axes in panels[len(results) :]:
         axes.set_visible(False)
-    head(figure, "Paths from above, side by side", behind)
+    apart = f", and the greatest distance of each from {plain(run.reference)}" if run.reference is not None else ""
+    head(figure, f"Paths from above, side by side{apart}", behind)
     return figure
 
 
@@ -177,7 +178,7 @@ def _draw_ends(axes: Axes, path: FloatArray) -> list[Line2D]:
 def _parting(run: Run, result: Result) -> str:
     if result.divergence is None or result.name == run.reference:
         return ""
-    return f", ≤ {result.divergence['position'].max():.3g} m from {plain(run.reference or '')}"
+    return f": {result.divergence['position'].max():.3g} m"
 
 
 def _outside(box: Window, points: FloatArray, what: str) -> list[str]:
