@@ -13,6 +13,8 @@ LONGEST = 64.0
 
 def compact(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
     """The factors of a graph without the empty slots that removals leave."""
+    if graph.nrFactors() == graph.size():
+        return gtsam.NonlinearFactorGraph(graph)
     result = gtsam.NonlinearFactorGraph()
     for i in range(graph.size()):
         factor = graph.at(i)
