@@ -21,7 +21,7 @@ from fgbaseline.data.simulate import Simulation, simulate
 from .apart import StoppedError, apart, forget_peak, memory, peak_memory
 
 ESTIMATORS = ("dead-reckoning", "ekf", "joint-ekf", "isam2", "fixed-lag", "batch")
-PATIENCE = 25.0
+PATIENCE = 100.0
 """processor seconds: a size that would take longer is left out"""
 LAST_STRAW = 250
 """processor seconds, after which a process is stopped that takes longer than was expected"""
