@@ -49,10 +49,10 @@ class ISAM2Settings:
     """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
     careful: bool = False
     """QR in place of Cholesky: three times slower, and at ease with pivots of very unequal size"""
-    tree_frames: int = 1200
+    tree_frames: int = 600
     """frames that the tree may be over before those behind the last `kept_frames` leave it for a prior; those before
     them, as far back as a landmark reaches that will be seen again, stay"""
-    kept_frames: int = 400
+    kept_frames: int = 200
 
     def params(self) -> gtsam.ISAM2Params:
         """The same in GTSAM's terms."""
