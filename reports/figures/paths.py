@@ -118,10 +118,11 @@ def _frame(axes: Axes, box: Window, *, labelled: bool = True) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(box.low[0], box.high[0])
     axes.set_ylim(box.low[1], box.high[1])
+    of_start = " of the start" if labelled else ""  # small panels have no room for it
     if labelled or axes.get_subplotspec().is_last_row():  # type: ignore[union-attr]
-        axes.set_xlabel("ahead of the start, m")
+        axes.set_xlabel(f"ahead{of_start}, m")
     if labelled or axes.get_subplotspec().is_first_col():  # type: ignore[union-attr]
-        axes.set_ylabel("left of the start, m")
+        axes.set_ylabel(f"left{of_start}, m")
 
 
 def _padded(box: Window) -> Window:
