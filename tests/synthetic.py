@@ -10,6 +10,7 @@ from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Probl
 from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
+from fgbaseline.ekf.pose_update import PoseInnovation, pose_innovation
 from fgbaseline.geometry import FloatArray, se3
 
 DT = 0.1
@@ -68,6 +69,14 @@ def with_pixels(sequence: Sequence, pixel: FloatArray) -> Sequence:
     """The recording with other pixels (n, 4)."""
     o = sequence.observations
     return replace(sequence, observations=Observations(o.frame.copy(), o.landmark.copy(), pixel))
+
+
+def first_innovation(sequence: Sequence, world_T_imu: FloatArray) -> PoseInnovation:
+    """That of all that frame 0 of a `Scene` sees, at a pose (4, 4), the landmarks being known."""
+    assert sequence.truth is not None
+    assert sequence.truth.landmarks is not None
+    points, pixel = sequence.truth.landmarks, sequence.observations.pixel[: sequence.n_landmarks]
+    return pose_innovation(sequence.camera, se3.inverse(sequence.imu_T_cam), world_T_imu, points, pixel)
 
 
 def plain_problem(sequence: Sequence, kernel: HuberKernel | None = None, pixel_sigma: float = 0.5) -> Problem:

@@ -14,11 +14,10 @@ from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
 from fgbaseline.ekf.landmark_update import LandmarkBlocks
 from fgbaseline.ekf.mapping import map_along
-from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.ekf.slam import _loss_as_printed
 from fgbaseline.geometry import FloatArray, se3
 
-from .synthetic import Scene, drive, matched, plain_problem, position_errors
+from .synthetic import Scene, drive, first_innovation, matched, plain_problem, position_errors
 
 
 def moved_start(problem: Problem, landmark: int, start: FloatArray) -> Problem:
@@ -201,16 +200,7 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
 
 
 def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
-    sequence = Scene().sequence()
-    assert sequence.truth is not None
-    assert sequence.truth.landmarks is not None
-    innovation = pose_innovation(
-        sequence.camera,
-        se3.affine_inverse(sequence.imu_T_cam),
-        np.eye(4),
-        sequence.truth.landmarks,
-        sequence.observations.pixel[:12],
-    )
+    innovation = first_innovation(Scene().sequence(), np.eye(4))
     weight = np.full(12, 4.0)
     assert _loss_as_printed(1e-6 * np.eye(6), innovation, weight) == ""
     # So small beside the noise of the pixels that the gain changes nothing.

@@ -10,10 +10,9 @@ from fgbaseline.data import HuberKernel
 from fgbaseline.ekf import ekf, joint_ekf
 from fgbaseline.ekf.innovation_norm import squared_norm_of_known
 from fgbaseline.ekf.joint_update import Factor, NotPositiveDefiniteError
-from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
 
-from .synthetic import Scene, plain_problem
+from .synthetic import Scene, first_innovation, plain_problem
 
 
 def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
@@ -30,14 +29,8 @@ def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
 
 
 def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
-    sequence = Scene().sequence()
-    assert sequence.truth is not None
-    assert sequence.truth.landmarks is not None
-    o = sequence.observations
     pose = se3.exp([0.05, 0.02, -0.03, 0.01, 0.0, 0.02])
-    innovation = pose_innovation(
-        sequence.camera, se3.inverse(sequence.imu_T_cam), pose, sequence.truth.landmarks, o.pixel[:12]
-    )
+    innovation = first_innovation(Scene().sequence(), pose)
     A = np.random.default_rng(3).normal(size=(6, 6)) * 0.05
     sigma = A @ A.T
     three = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, 0.5, 0, 0.5]])
@@ -47,16 +40,7 @@ def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
 
 
 def test_what_is_no_covariance_has_no_norm() -> None:
-    sequence = Scene().sequence()
-    assert sequence.truth is not None
-    assert sequence.truth.landmarks is not None
-    innovation = pose_innovation(
-        sequence.camera,
-        se3.inverse(sequence.imu_T_cam),
-        np.eye(4),
-        sequence.truth.landmarks,
-        sequence.observations.pixel[:12],
-    )
+    innovation = first_innovation(Scene().sequence(), np.eye(4))
     assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan), 0.25))
 
 
