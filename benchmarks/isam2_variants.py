@@ -30,8 +30,8 @@ EVERY = ISAM2Settings(relinearize_skip=1)
 class PartialCheck(ISAM2Settings):
     """Looks for variables to relinearise from the root of the tree down, no further than they moved."""
 
-    def params(self) -> gtsam.ISAM2Params:
-        params = super().params()
+    def params(self, baseline: float) -> gtsam.ISAM2Params:
+        params = super().params(baseline)
         params.enablePartialRelinearizationCheck = True
         return params
 

@@ -19,10 +19,7 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
     table = table[taken[table["observation"].to_numpy()]]
     if len(table) < taken.sum():
         return float("nan")
-    squared = pixel_squares(problem, table[list(ROWS)].to_numpy())
-    if problem.kernel is not None:
-        k = problem.kernel.threshold
-        squared = np.where(squared > k**2, 2.0 * k * np.sqrt(squared) - k**2, squared)
+    squared = problem.measurement.loss(pixel_squares(problem, table[list(ROWS)].to_numpy()))
     return 0.5 * float(
         squared.sum() + motion_squares(problem, estimate).sum() + _prior_squares(problem, estimate, taken)
     )
@@ -30,8 +27,7 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
 
 def pixel_squares(problem: Problem, residual: FloatArray) -> FloatArray:
     """(n,) whitened squares of residuals (n, 4) in px: of the three rows (uL, uR, (vL + vR) / 2)."""
-    rows = np.stack([residual[:, 0], residual[:, 2], (residual[:, 1] + residual[:, 3]) / np.sqrt(2.0)], axis=1)
-    return np.asarray(np.sum(rows**2, axis=1) / problem.pixel_variance)
+    return np.asarray(np.sum(problem.measurement.whitened(residual) ** 2, axis=1))
 
 
 def motion_squares(problem: Problem, estimate: Estimate) -> FloatArray:

@@ -17,7 +17,7 @@ import pandas as pd
 
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.data.observations import BoolArray, IntArray
-from fgbaseline.geometry import FgbaselineError, FloatArray, se3
+from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, StereoMeasurement, se3
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from .reprojection import NEAR
@@ -25,8 +25,6 @@ from .reprojection import NEAR
 GATE = 6.0
 GATE_RANGE = (3.0, 12.0)
 """px"""
-HUBER = 2.5
-"""sigmas, of the triangulation"""
 BLOCK = 5.0
 """s: tracks that begin in the same stretch of so long share the errors of a path, and are drawn together"""
 RESAMPLES = 400
@@ -103,10 +101,9 @@ def half_errors(
     late = position >= (count[piece] + 1) // 2
     world_T_cam, pixel = (path @ sequence.imu_T_cam)[o.frame[chosen]], o.pixel[chosen]
     error = np.full(len(piece), np.inf)
+    measurement = StereoMeasurement(sequence.camera, pixel_variance, HuberKernel())
     for seen in (~late, late):
-        points = triangulate_tracks(
-            sequence.camera, world_T_cam[seen], piece[seen], pixel[seen], n, pixel_variance, HUBER
-        )
+        points = triangulate_tracks(measurement, world_T_cam[seen], piece[seen], pixel[seen], n)
         p_cam = se3.transform(se3.inverse(world_T_cam[~seen]), points.position[piece[~seen]])
         with np.errstate(divide="ignore", invalid="ignore"):
             norm = np.linalg.norm(pixel[~seen] - sequence.camera.project(p_cam), axis=1)

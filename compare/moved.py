@@ -8,7 +8,8 @@ import pandas as pd
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray, IntArray
-from fgbaseline.geometry import FloatArray, StereoCamera, se3
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import measured_rows
 
 from .chi_square import probability_beyond
 from .whitened import judged
@@ -36,18 +37,17 @@ class _Sights(NamedTuple):
     """n sights of m points, sorted by point; every point has one. Each coordinate is in an array of its own: stacks of
     small matrices take several times as long."""
 
-    camera: StereoCamera
+    measurement: StereoMeasurement
     turn: FloatArray
     """(3, 3, n) the rotation of cam_T_world"""
     shift: FloatArray
     """(3, n) m, its translation"""
     row: IntArray
     """(n,) the point, 0 to m - 1, rising"""
-    pixel: FloatArray
-    """(4, n)"""
+    measured: FloatArray
+    """(3, n) uL, uR and v, px"""
     seconds: FloatArray
     """(n,) since the middle of the track's sights"""
-    variance: float
 
     def of(self, points: IntArray, m: int) -> "_Sights":
         """Those of some of the m points, given in rising order, which are numbered anew."""
@@ -56,13 +56,12 @@ class _Sights(NamedTuple):
         row = number[self.row]
         kept = np.flatnonzero(row >= 0)
         return _Sights(
-            self.camera,
+            self.measurement,
             self.turn[:, :, kept],
             self.shift[:, kept],
             row[kept],
-            self.pixel[:, kept],
+            self.measured[:, kept],
             self.seconds[kept],
-            self.variance,
         )
 
 
@@ -109,13 +108,12 @@ def _sights(problem: Problem, estimate: Estimate, rows: pd.DataFrame, row: IntAr
     seconds = sequence.t[frame] - sequence.t[0]
     cam_T_world = np.moveaxis(se3.inverse(estimate.world_T_imu @ sequence.imu_T_cam)[:, :3], 0, 2)
     return _Sights(
-        sequence.camera,
+        problem.measurement,
         np.take(cam_T_world[:, :3], frame, axis=2),
         np.take(cam_T_world[:, 3], frame, axis=1),
         row,
-        np.ascontiguousarray(sequence.observations.pixel[rows["observation"].to_numpy()[order]].T),
+        np.ascontiguousarray(measured_rows(sequence.observations.pixel[rows["observation"].to_numpy()[order]]).T),
         seconds - (np.bincount(row, weights=seconds) / count)[row],
-        problem.pixel_variance,
     )
 
 
@@ -146,28 +144,22 @@ def _fitted(sights: _Sights, start: FloatArray, settled: FloatArray) -> tuple[Fl
 
 def _linearised(sights: _Sights, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cost (m,), infinite behind a camera, and normal equations (m, d, d), (m, d)."""
-    camera, R, s, moves = sights.camera, sights.turn, sights.seconds, state.shape[1] > 3
+    model, R, s, moves = sights.measurement, sights.turn, sights.seconds, state.shape[1] > 3
     points = np.take(state[:, :3].T, sights.row, axis=1)
     if moves:
         points = points + s * np.take(state[:, 3:].T, sights.row, axis=1)
     p_cam = (R * points).sum(axis=1) + sights.shift
     front = p_cam[2] > 0.0
     p_cam[:, ~front] = [[0.0], [0.0], [1.0]]
-    near = 1.0 / p_cam[2]
-    u, v, apart = p_cam[0] * near, p_cam[1] * near, camera.fu * camera.baseline * near
-    left, height = camera.fu * u + camera.cu, camera.fv * v + camera.cv
-    residual = sights.pixel - np.stack([left, height, left - apart, height])
-    # vL and vR have the same derivatives and count as one row of twice the weight: columns are d/dp, then the residual
-    A, both = np.empty((3, 4, len(s))), np.sqrt(2.0)
-    A[0, :3] = (camera.fu * near) * (R[0] - u * R[2])
-    A[1, :3] = A[0, :3] + (apart * near) * R[2]
-    A[2, :3] = (both * camera.fv * near) * (R[1] - v * R[2])
-    A[0, 3], A[1, 3], A[2, 3] = residual[0], residual[2], (residual[1] + residual[3]) / both
-    squared = np.where(front, (residual * residual).sum(axis=0), np.inf)
+    seen, white = model.camera.rows(p_cam), model.white_scale[:, None]
+    A = np.empty((3, 4, len(s)))  # columns are d/dp, then the residual
+    A[:, :3] = model.camera.rows_along(seen, R) * white[:, None]
+    A[:, 3] = (sights.measured - seen.pixel) * white
+    squared = np.where(front, (A[:, 3] * A[:, 3]).sum(axis=0), np.inf)
     products = np.concatenate([(A[:, i : i + 1] * A[:, i:]).sum(axis=0) for i in range(3)])
     weighted = [squared[None], products, *((s * products, s * s * products[SYMMETRIC]) if moves else ())]
     starts = np.flatnonzero(np.diff(sights.row, prepend=-1))
-    sums = np.add.reduceat(np.concatenate(weighted), starts, axis=1).T / sights.variance
+    sums = np.add.reduceat(np.concatenate(weighted), starts, axis=1).T
     cost, information, pull = sums[:, 0], sums[:, 1:10], sums[:, 1:10][:, PULL]
     normal = information[:, SQUARE]
     if not moves:

@@ -12,8 +12,6 @@ from .consistency import CovarianceState, covariance_state, is_positive_definite
 
 NEGLIGIBLE = 1e-6
 """of the filter's own variance: a direction in which the difference claims less has no covariance to speak of"""
-TERMS = 28
-"""of the series of the right Jacobian; the rest is below rounding for rotations up to pi"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,7 +46,7 @@ def difference_nees(estimate: Estimate, reference: Estimate) -> DifferenceNees:
     if estimate.covariance is None or reference.covariance is None or len(k) == 0:
         return result
     d = se3.log(se3.inverse(estimate.world_T_imu[k]) @ reference.world_T_imu[k])
-    P, J = estimate.covariance[k], inverse_right_jacobian(d)
+    P, J = estimate.covariance[k], se3.inverse_right_jacobian(d)
     difference = difference_covariance(P, J @ reference.covariance[k] @ np.swapaxes(J, 1, 2))
     positive = np.isfinite(difference).all(axis=(1, 2))
     result.nees[k[positive]] = squared_norm(d[positive], difference[positive])
@@ -67,17 +65,3 @@ def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
     share = np.linalg.eigvalsh(inverse @ difference @ np.swapaxes(inverse, 1, 2))[:, 0]
     difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
     return np.asarray(difference, dtype=np.float64)
-
-
-def inverse_right_jacobian(d: FloatArray) -> FloatArray:
-    """(n, 6, 6) J with log(exp(d) exp(e)) = d + J e for small e, of twists d (n, 6) with rotations of at most pi.
-
-    The inverse of the right Jacobian of SE(3), the sum of (-ad)^k / (k + 1)! (Barfoot 2017, section 7.1.5).
-    """
-    curly = se3.curly_hat(d)
-    term = np.broadcast_to(np.eye(6), curly.shape)
-    total = term.copy()
-    for k in range(1, TERMS):
-        term = -term @ curly / (k + 1)
-        total += term
-    return np.asarray(np.linalg.inv(total), dtype=np.float64)

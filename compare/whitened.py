@@ -13,9 +13,7 @@ WHITE_ROWS = ("uL", "uR", "v")
 
 def whitened_rows(problem: Problem, table: pd.DataFrame) -> FloatArray:
     """(n, 3) residuals of (uL, uR, (vL + vR) / 2) of a reprojection table over the problem's sigma of each."""
-    r = table[["uL", "vL", "uR", "vR"]].to_numpy(dtype=np.float64)
-    rows = np.stack([r[:, 0], r[:, 2], (r[:, 1] + r[:, 3]) / np.sqrt(2.0)], axis=1)
-    return np.asarray(rows / np.sqrt(problem.pixel_variance))
+    return problem.measurement.whitened(table[["uL", "vL", "uR", "vR"]].to_numpy(dtype=np.float64))
 
 
 def judged(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:

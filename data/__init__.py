@@ -1,5 +1,7 @@
 """Recordings, the problem they pose, the answers to it, and the estimators that give them."""
 
+from fgbaseline.geometry import HuberKernel
+
 from .calibrated import Calibration, NoiseSettings, calibrated
 from .diagnose import Diagnosis, diagnose
 from .documented import documented
@@ -20,7 +22,7 @@ from .formats import (
 )
 from .held_out import HeldOut, hold_out
 from .observations import Observations
-from .problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
+from .problem import Excluded, LandmarkPrior, Problem, Reading
 from .registry import estimator_names, find_estimator
 from .repairs import Repairs, read_repairs
 from .repairs_text import repairs_text

@@ -5,14 +5,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import HuberKernel, InputError
 
 from .by_hand import ASSUMED, mask_settings, overridden, told
 from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair, track_state
 from .documented import most_observed
 from .gaps import admit_gaps
 from .motion import Shift, dead_reckoned_path, increments
-from .problem import Excluded, HuberKernel, Problem
+from .problem import Excluded, Problem
 from .repairs import Repairs
 from .sequence import Sequence
 from .track_mask import MaskSettings, exclusions

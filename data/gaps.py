@@ -38,7 +38,7 @@ def admit_gaps(problem: Problem) -> Problem:
         return problem
     density = wandering(problem, long)
     covariance = problem.increment_covariance.copy()
-    J = np.stack([_right_jacobian(twist) for twist in problem.increment[long]])
+    J = se3.right_jacobian(problem.increment[long])
     strayed = (density * dt[long, None] ** 3 / 3.0)[:, :, None] * np.eye(6)
     covariance[long] += J @ strayed @ np.swapaxes(J, 1, 2)
     deviation = np.sqrt(np.einsum("nii->ni", covariance[long]))
@@ -66,15 +66,3 @@ def wandering(problem: Problem, long: BoolArray) -> FloatArray:
             change = np.mean((twist[lag:] - twist[:-lag])[together] ** 2, axis=0)
             density = np.maximum(density, (change - 2.0 * noise) / (lag * usual))
     return density
-
-
-def _right_jacobian(twist: FloatArray) -> FloatArray:
-    """(6, 6) of exp at a twist (6,) of any size: the integral of exp(-s ad) over s from 0 to 1.
-
-    It is the corner of one matrix exponential (Van Loan, 1978); `se3.right_jacobian` is a series for short motions.
-    """
-    from scipy.linalg import expm
-
-    block = np.zeros((12, 12))
-    block[:6, :6], block[:6, 6:] = -se3.curly_hat(twist), np.eye(6)
-    return np.asarray(expm(block)[:6, 6:], dtype=np.float64)

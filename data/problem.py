@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 
 from .observations import BoolArray, IntArray, Observations
 from .sequence import Sequence
@@ -43,13 +43,6 @@ class Reading(StrEnum):
 
     IN_TURN = "in-turn"
     HELD = "held"
-
-
-@dataclass(frozen=True, slots=True)
-class HuberKernel:
-    """Huber's loss on the whitened norm of an observation's three rows: quadratic up to `threshold` sigmas."""
-
-    threshold: float = 2.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -107,6 +100,16 @@ class Problem:
     def n_frames(self) -> int:
         """How many frames there are: T."""
         return self.sequence.n_frames
+
+    @property
+    def measurement(self) -> StereoMeasurement:
+        """What an observation measures, with its noise and kernel."""
+        return StereoMeasurement(self.sequence.camera, self.pixel_variance, self.kernel)
+
+    @property
+    def mapping_measurement(self) -> StereoMeasurement:
+        """The same with the noise that landmarks are mapped with along given poses."""
+        return self.measurement.with_variance(self.mapping_pixel_variance or self.pixel_variance)
 
     @property
     def mask(self) -> BoolArray:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, disparity, se3
+from fgbaseline.geometry.measurement import measured_rows
 
 from .observations import BoolArray, IntArray
 from .problem import Excluded
@@ -117,8 +118,7 @@ class TrackLinks:
         motion = se3.inverse(self.world_T_cam[o.frame[after]]) @ self.world_T_cam[o.frame[before]]
         predicted = se3.transform(motion, camera.triangulate(o.pixel[before]))
         residual = camera.project(predicted) - o.pixel[after]
-        row = 0.5 * (residual[:, 1] + residual[:, 3])
-        error = np.sqrt(residual[:, 0] ** 2 + residual[:, 2] ** 2 + row**2)
+        error = np.linalg.norm(measured_rows(residual), axis=1)
         return np.where(predicted[:, 2] > 0, error, np.inf)
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:

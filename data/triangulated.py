@@ -20,13 +20,11 @@ def landmarks_along(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
     o = problem.observations()
     world_T_cam = (world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
     points = triangulate_tracks(
-        problem.sequence.camera,
+        problem.measurement,
         world_T_cam,
         problem.feature_row(o.landmark),
         o.pixel,
         len(problem.features),
-        problem.pixel_variance,
-        None if problem.kernel is None else problem.kernel.threshold,
     )
     determined = np.flatnonzero(np.isfinite(points.position).all(axis=1))
     determined = determined[np.linalg.cond(points.information[determined]) < SINGULAR_CONDITION]

@@ -8,27 +8,29 @@ filter that knows its errors it is chi-square with 3n degrees of freedom (Bar-Sh
 import numpy as np
 
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import ROWS
 
 from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 
 
-def squared_norm_of_known(innovation: PoseInnovation, covariance: FloatArray, pixel_variance: float) -> float:
+def squared_norm_of_known(innovation: PoseInnovation, covariance: FloatArray) -> float:
     """The same of landmarks that count as known, as in the documented filter: S = H Sigma H^T + R, Sigma the pose's.
 
     NaN where it is not finite.
     """
-    weight = np.full(len(innovation.residual), 1.0 / pixel_variance)
     try:
-        posterior = pose_posterior(covariance, innovation, weight)
+        posterior = pose_posterior(covariance, innovation, np.ones(len(innovation.residual)))
     except np.linalg.LinAlgError:
         return float("nan")
-    return over_three_rows(posterior, innovation, pixel_variance)
+    return over_three_rows(posterior, innovation)
 
 
-def over_three_rows(posterior: PosePosterior, innovation: PoseInnovation, pixel_variance: float) -> float:
+def over_three_rows(posterior: PosePosterior, innovation: PoseInnovation) -> float:
     """That of a pose update in which every observation had its full weight.
 
-    The camera predicts one v for both images: of the four rows' squared norm, (vL - vR)^2 / (2 V) tells nothing.
+    Of the printed four rows' squared norm, (vL - vR)^2 / (2 V) is the same whatever the state.
     """
+    if innovation.residual.shape[1] == len(ROWS):
+        return posterior.squared_norm
     apart = innovation.residual[:, 1] - innovation.residual[:, 3]
-    return posterior.squared_norm - 0.5 * float(apart @ apart) / pixel_variance
+    return posterior.squared_norm - 0.5 * float(apart @ apart) / float(innovation.variance[1])

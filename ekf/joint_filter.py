@@ -8,6 +8,7 @@ from fgbaseline.data.estimate import Event, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.measurement import back_projected, measured_rows, predict
 
 from .admission import admitted
 from .joint_settings import JointSettings, Linearisation
@@ -15,7 +16,6 @@ from .joint_state import ABSENT, POSE, JointState
 from .joint_update import Factor, Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from .landmark_chart import Coordinates, chart, coordinates_of, homogeneous
 from .screening import Rejection, screened
-from .stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
 
 MIN_COSINE = 0.05
 """of the angle between the optical axis and the ray to a landmark: beyond it (87 degrees) it counts as behind the
@@ -45,7 +45,8 @@ class JointFilter:
         self.camera = problem.sequence.camera
         self.imu_T_cam = problem.sequence.imu_T_cam
         self.cam_T_imu = se3.affine_inverse(problem.sequence.imu_T_cam)
-        self.row_variance = problem.pixel_variance * ROW_VARIANCE
+        self.measurement = problem.measurement
+        self.row_variance = self.measurement.row_variance
         self.row = problem.feature_row(o.landmark)
         self.measured = measured_rows(o.pixel)
         self.last_frame = np.full(m, -1, dtype=np.int64)
@@ -127,7 +128,7 @@ class JointFilter:
         state = self.state
         innovation = Innovation.of(seen.H, seen.residual, state.P)
         factor = self._as_expected(k, innovation)
-        verdict = screened(innovation.squared_norm(self.row_variance), self.problem.kernel, self.settings)
+        verdict = screened(innovation.squared_norms(self.row_variance), self.measurement, self.settings)
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.taken)
             if not verdict.taken.any():
@@ -158,11 +159,11 @@ class JointFilter:
     def _linearised(self, index: IntArray) -> _Seen:
         state, slot = self.state, self.state.slot_of[self.row[index]]
         charts = state.charts[slot]
-        seen = now = sight(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
+        seen = now = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
         if self.settings.linearisation is Linearisation.FIRST_ESTIMATE:
-            seen = sight(self.camera, self.cam_T_imu, state.predicted_pose, homogeneous(charts, state.first[slot]))
-        H = StackedJacobian(slot, seen.by_pose, seen.by_point @ charts[:, :, :3], state.body)
-        return _Seen(index, H, self.measured[index] - now.predicted, np.minimum(now.cosine, seen.cosine))
+            seen = predict(self.camera, self.cam_T_imu, state.predicted_pose, homogeneous(charts, state.first[slot]))
+        H = StackedJacobian(slot, seen.by_pose(), seen.by_point() @ charts[:, :, :3], state.body)
+        return _Seen(index, H, self.measured[index] - now.pixel, np.minimum(now.cosine, seen.cosine))
 
     def _in_front(self, k: int, seen: _Seen) -> _Seen:
         front = seen.cosine > MIN_COSINE
@@ -208,10 +209,10 @@ class JointFilter:
         shared = chart(self.settings.coordinates, world_T_cam)
         xi = coordinates_of(shared, points)
         at = state.predicted_pose if first_estimate else state.pose
-        seen = sight(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
-        inverse = np.linalg.inv((seen.by_point.reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
+        seen = predict(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
+        inverse = np.linalg.inv((seen.by_point().reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
         covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
-        state.enter(self.row[index], shared, xi, -inverse @ seen.by_pose, covariance)
+        state.enter(self.row[index], shared, xi, -inverse @ seen.by_pose(), covariance)
         self.used[index] = True
 
     def _leave(self, k: int, row: IntArray) -> None:

@@ -17,6 +17,7 @@ from scipy.linalg.lapack import dpotrf
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import squared_norm
 
 from .joint_state import POSE
 
@@ -99,22 +100,11 @@ class Innovation:
     def __len__(self) -> int:
         return len(self.residual)
 
-    def squared_norm(self, variance: FloatArray) -> FloatArray:
-        """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,)): chi-square with 3 degrees
-        of freedom, where all is as assumed."""
-        # S = L D L^T written out: a third of the time of LAPACK, which is called for each.
-        rows = 3 * len(self)
-        block = np.arange(0, rows * rows, 3 * rows + 3)  # where each begins on the diagonal
-        upper = np.array([0, 1, 2, rows + 1, rows + 2, 2 * rows + 2])
-        a, b, c, d, e, f = self.HPHt.reshape(-1)[upper[:, None] + block]
-        a, d, f = a + variance[0], d + variance[1], f + variance[2]
-        x, y, z = self.residual.T
-        by_a, to_e = b / a, e - c * b / a
-        d1, y1 = d - by_a * b, y - by_a * x
-        by_c, by_e = c / a, to_e / d1
-        d2, y2 = f - by_c * c - by_e * to_e, z - by_c * x - by_e * y1
-        norm: FloatArray = x * x / a + y1 * y1 / d1 + y2 * y2 / d2
-        return norm
+    def squared_norms(self, variance: FloatArray) -> FloatArray:
+        """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,))."""
+        n = np.arange(len(self))
+        own = self.HPHt.reshape(len(self), 3, len(self), 3)[n, :, n]  # the blocks on the diagonal
+        return squared_norm(self.residual, own + np.diag(variance))
 
     def factorised(self, variance: FloatArray) -> Factor:
         """S = L L^T with R = diag(variance (n, 3)), or (3,) for each. Raises NotPositiveDefiniteError."""

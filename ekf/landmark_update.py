@@ -13,16 +13,17 @@ import numpy as np
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, StereoCamera, se3
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import predict
 
 
 class LandmarkBlocks:
     """The means (m, 3) and covariances (m, 3, 3) of m independent landmarks, in the world frame."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, measurement: StereoMeasurement) -> None:
         m = len(problem.features)
         prior = problem.landmark_prior
-        self.camera: StereoCamera = problem.sequence.camera
+        self.measurement = measurement
         self.cam_T_imu = se3.affine_inverse(problem.sequence.imu_T_cam)
         self.imu_T_cam = problem.sequence.imu_T_cam
         self.known: BoolArray = np.full(m, prior is not None)
@@ -37,22 +38,24 @@ class LandmarkBlocks:
     def update(self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray) -> None:
         """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
 
-        `weight` (n,) is 1 / V of each observation, in 1/px^2. Landmarks that are not yet known start at their
+        `weight` (n,) multiplies V^-1 of each observation. Landmarks that are not yet known start at their
         back-projection, with the information that this one observation gives.
         """
-        cam_T_world = self.cam_T_imu @ se3.inverse(world_T_imu)
+        model = self.measurement
         fresh = ~self.known[row]
         if fresh.any():
             world_T_cam = world_T_imu @ self.imu_T_cam
-            self.mean[row[fresh]] = se3.transform(world_T_cam, self.camera.triangulate(pixel[fresh]))
+            self.mean[row[fresh]] = se3.transform(world_T_cam, model.camera.triangulate(pixel[fresh]))
             self.known[row[fresh]] = True
-        p_cam = se3.transform(cam_T_world, self.mean[row])
-        whiten = np.sqrt(weight)[:, None]
+        predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
+        residual, rows, variance = model.documented_rows(pixel, predicted.pixel)
+        whiten = np.sqrt(weight[:, None] / variance)
         # The right-hand side as a fourth column: its first three rows in R are Q^T times it, and Q is never formed.
-        stacked = np.zeros((len(row), 7, 4))
-        stacked[:, :4, :3] = whiten[:, :, None] * self.camera.jacobian(p_cam) @ cam_T_world[:3, :3]
-        stacked[:, :4, 3] = whiten * (pixel - self.camera.project(p_cam))
-        stacked[:, 4:, :3] = self.root_information[row]
+        r = len(variance)
+        stacked = np.zeros((len(row), r + 3, 4))
+        stacked[:, :r, :3] = whiten[:, :, None] * predicted.by_point()[:, rows, :3]
+        stacked[:, :r, 3] = whiten * residual
+        stacked[:, r:, :3] = self.root_information[row]
         R: FloatArray = np.asarray(np.linalg.qr(stacked, mode="r"))
         self.mean[row] += _solved(R)
         self.root_information[row] = R[:, :3, :3]

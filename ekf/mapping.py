@@ -36,9 +36,8 @@ def map_along(
     """The landmarks mapped along given poses (T, 4, 4), and the seconds (T,) each frame took."""
     o = problem.observations()
     rows = problem.feature_row(o.landmark)
-    variance = problem.mapping_pixel_variance or problem.pixel_variance
-    weight = np.full(len(o), 1.0 / variance)
-    blocks = LandmarkBlocks(problem)
+    weight = np.ones(len(o))
+    blocks = LandmarkBlocks(problem, problem.mapping_measurement)
     seconds = np.empty(problem.n_frames)
     for k, seen in enumerate(o.by_frame(problem.n_frames)):
         frame_start = time.perf_counter()

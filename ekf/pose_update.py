@@ -5,31 +5,40 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
-from fgbaseline.data.problem import HuberKernel
-from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import predict, squared_norm
 
 
 class PoseInnovation(NamedTuple):
-    """What n observations of known landmarks say of a pose."""
+    """What n observations of known landmarks say of a pose, in r rows each."""
 
     residual: FloatArray
-    """(n, 4) z - z~, px"""
+    """(n, r) z - z~, px"""
     jacobian: FloatArray
-    """(n, 4, 6) of the predicted pixels by the right perturbation [v, w] of the pose: H of equation 13"""
+    """(n, r, 6) of the predicted rows by the right perturbation [v, w] of the pose: H of equation 13"""
+    variance: FloatArray
+    """(r,) of each row, px^2"""
+
+    def squared_norms(self, covariance: FloatArray) -> FloatArray:
+        """(n,) r^T (H Sigma H^T + V)^-1 r of each observation alone, for three rows and a Sigma (6, 6)."""
+        H = self.jacobian
+        return squared_norm(self.residual, H @ covariance @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
 
 
 def pose_innovation(
-    camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray, pixel: FloatArray
+    measurement: StereoMeasurement,
+    cam_T_imu: FloatArray,
+    world_T_imu: FloatArray,
+    points: FloatArray,
+    pixel: FloatArray,
 ) -> PoseInnovation:
     """Residuals and Jacobians of world points (n, 3) seen at pixels (n, 4) from a pose (4, 4) (equation 13).
 
-    H = -K_s dpi/dq cam_T_imu (s)^odot with s the point in the IMU's frame and s^odot = [I, -hat(s)].
+    In the rows of `StereoMeasurement.documented_rows`.
     """
-    s = se3.transform(se3.inverse(world_T_imu), points)
-    p_cam = se3.transform(cam_T_imu, s)
-    J = camera.jacobian(p_cam) @ cam_T_imu[:3, :3]
-    H = np.concatenate([-J, J @ so3.hat3(s)], axis=2)
-    return PoseInnovation(pixel - camera.project(p_cam), H)
+    predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
+    residual, rows, variance = measurement.documented_rows(pixel, predicted.pixel)
+    return PoseInnovation(residual, predicted.by_pose()[:, rows], variance)
 
 
 class PosePosterior(NamedTuple):
@@ -42,7 +51,7 @@ class PosePosterior(NamedTuple):
     innovation_condition: float
     """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
     squared_norm: float
-    """(z - z~)^T (H Sigma H^T + V)^-1 (z - z~), over all four rows of each observation"""
+    """(z - z~)^T (H Sigma H^T + V)^-1 (z - z~), over all rows of each observation"""
 
 
 def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
@@ -55,13 +64,13 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
     (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance. What is
     left of the least squares, its residual, has the squared norm of the innovation.
 
-    `weight` (n,) is 1 / V of each observation. Raises numpy's LinAlgError where `covariance` is not positive definite
-    or the innovation not finite.
+    `weight` (n,) multiplies V^-1 of each observation. Raises numpy's LinAlgError where `covariance` is not positive
+    definite or the innovation not finite.
     """
     if not (np.isfinite(innovation.jacobian).all() and np.isfinite(innovation.residual).all()):
         raise np.linalg.LinAlgError("the innovation is not finite")
     L = np.linalg.cholesky(covariance)
-    root = np.repeat(np.sqrt(weight), 4)
+    root = np.sqrt(weight[:, None] / innovation.variance).reshape(-1)
     stacked = np.vstack([(root[:, None] * innovation.jacobian.reshape(-1, 6)) @ L, np.eye(6)])
     right = np.concatenate([root * innovation.residual.reshape(-1), np.zeros(6)])
     by_size = np.argsort(-np.abs(stacked).max(axis=1), kind="stable")
@@ -80,7 +89,11 @@ def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weigh
     Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
     """
     H = innovation.jacobian.reshape(-1, 6)
-    gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + np.diag(np.repeat(1.0 / weight, 4)))
+    gain = (
+        covariance
+        @ H.T
+        @ np.linalg.inv(H @ covariance @ H.T + np.diag((innovation.variance / weight[:, None]).reshape(-1)))
+    )
     return np.asarray((np.eye(6) - gain @ H) @ covariance, dtype=np.float64)
 
 
@@ -89,22 +102,3 @@ def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatA
     F = se3.adjoint(se3.inverse(step))
     predicted: FloatArray = F @ covariance @ F.T + noise
     return 0.5 * (predicted + predicted.T)
-
-
-def robust_weight(
-    innovation: PoseInnovation, covariance: FloatArray, pixel_variance: float, kernel: HuberKernel | None
-) -> FloatArray:
-    """(n,) 1 / V of each observation, reduced by the kernel where the whitened innovation is beyond its threshold.
-
-    Whitened by the innovation's own covariance H Sigma H^T + V, so that an uncertain prediction is not taken for a
-    bad match.
-    """
-    n = len(innovation.residual)
-    if kernel is None:
-        return np.full(n, 1.0 / pixel_variance)
-    H = innovation.jacobian
-    S = H @ covariance @ np.swapaxes(H, 1, 2) + pixel_variance * np.eye(4)
-    whitened = np.linalg.solve(S, innovation.residual[:, :, None])[:, :, 0]
-    norm = np.sqrt(np.einsum("ni,ni->n", innovation.residual, whitened))
-    weight: FloatArray = kernel.threshold / np.maximum(norm, kernel.threshold) / pixel_variance
-    return weight

@@ -8,13 +8,11 @@ import numpy as np
 from scipy.special import chdtri
 
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.problem import HuberKernel
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, StereoMeasurement
+from fgbaseline.geometry.measurement import ROWS
 
 from .joint_settings import JointSettings
 
-ROWS = 3
-"""degrees of freedom of an observation: uL, uR, (vL + vR) / 2"""
 DISAGREEMENT = 1.0 - 1e-6
 """chi-square probability (5.5 sigma) beyond which an observation disagrees, when it is asked whether a whole frame
 does: so far out that noise assumed too small by half does not silence the filter, and matches that are wrong do"""
@@ -52,16 +50,14 @@ class Screened:
         return bool(self.taken.all() and (self.weight == 1.0).all())
 
 
-def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: JointSettings) -> Screened:
+def screened(squared_norm: FloatArray, measurement: StereoMeasurement, settings: JointSettings) -> Screened:
     """The verdict on observations whose innovations have squared norms (n,), whitened by their own covariance.
 
     A burst of bad matches costs its frame's matches: where most of them disagree none is believed, since the few that
     agree do so by chance.
     """
     n = len(squared_norm)
-    weight = np.ones(n)
-    if kernel is not None:
-        weight = kernel.threshold / np.maximum(np.sqrt(squared_norm), kernel.threshold)
+    weight = measurement.weight(squared_norm)
     if settings.disagreeing_share is not None and n >= MIN_VOTES:
         disagreeing = np.count_nonzero(~(squared_norm <= quantile(DISAGREEMENT)))
         if disagreeing > settings.disagreeing_share * n:
@@ -75,4 +71,4 @@ def screened(squared_norm: FloatArray, kernel: HuberKernel | None, settings: Joi
 @cache
 def quantile(probability: float) -> float:
     """The chi-square quantile with the degrees of freedom of one observation."""
-    return float(chdtri(ROWS, 1.0 - probability))
+    return float(chdtri(len(ROWS), 1.0 - probability))

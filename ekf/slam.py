@@ -19,7 +19,6 @@ from .pose_update import (
     pose_posterior,
     predicted_covariance,
     printed_covariance,
-    robust_weight,
 )
 
 SUSPECT_CONDITION = 1.0 / np.sqrt(np.finfo(np.float64).eps)
@@ -48,10 +47,10 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     T = problem.n_frames
     in_turn = problem.reading is Reading.IN_TURN
     if in_turn:
-        blocks = LandmarkBlocks(problem)
+        blocks = LandmarkBlocks(problem, problem.measurement)
     else:
         blocks, _ = map_along(problem, dead_reckoned_path(problem.increment, problem.initial_pose))
-    camera, cam_T_imu = problem.sequence.camera, se3.affine_inverse(problem.sequence.imu_T_cam)
+    measurement, cam_T_imu = problem.measurement, se3.affine_inverse(problem.sequence.imu_T_cam)
     steps = se3.exp(problem.increment)
     poses = np.full((T, 4, 4), np.nan)
     covariances = np.full((T, 6, 6), np.nan)
@@ -59,19 +58,20 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     events: list[Event] = []
     innovations = Innovations.none(T)
     pose, covariance = problem.initial_pose, problem.initial_covariance
-    failure, full_weight = "", 1.0 / problem.pixel_variance
+    failure = ""
     for k, seen in enumerate(o.by_frame(T)):
         frame_start = time.perf_counter()
         row, pixel = rows[seen], o.pixel[seen]
-        weight = np.full(len(row), full_weight)
+        weight = np.ones(len(row))
         if k > 0:
             pose = pose @ steps[k - 1]
             covariance = predicted_covariance(covariance, steps[k - 1], problem.increment_covariance[k - 1])
             known = blocks.known[row]
             if known.any():
-                innovation = pose_innovation(camera, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
+                innovation = pose_innovation(measurement, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
                 innovations.degrees[k] = 3 * len(innovation.residual)
-                weight[known] = robust_weight(innovation, covariance, problem.pixel_variance, problem.kernel)
+                if measurement.kernel is not None:
+                    weight[known] = measurement.kernel.weight(innovation.squared_norms(covariance))
                 try:
                     posterior = pose_posterior(covariance, innovation, weight[known])
                 except np.linalg.LinAlgError as error:
@@ -79,9 +79,9 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                     break
                 predicted = covariance
                 innovations.nis[k] = (
-                    over_three_rows(posterior, innovation, problem.pixel_variance)
-                    if np.all(weight[known] == full_weight)
-                    else squared_norm_of_known(innovation, predicted, problem.pixel_variance)
+                    over_three_rows(posterior, innovation)
+                    if np.all(weight[known] == 1.0)
+                    else squared_norm_of_known(innovation, predicted)
                 )
                 pose, covariance = pose @ se3.exp_one(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:

@@ -1,8 +1,19 @@
-"""Rotations, rigid motions and the stereo camera on stacked arrays; the error base class."""
+"""Rotations, rigid motions, the stereo camera and its measurement model on stacked arrays; the error base class."""
 
 from . import se3, so3
 from .errors import FgbaselineError, InputError
+from .measurement import HuberKernel, StereoMeasurement
 from .so3 import FloatArray
 from .stereo import StereoCamera, disparity
 
-__all__ = ["FgbaselineError", "FloatArray", "InputError", "StereoCamera", "disparity", "se3", "so3"]
+__all__ = [
+    "FgbaselineError",
+    "FloatArray",
+    "HuberKernel",
+    "InputError",
+    "StereoCamera",
+    "StereoMeasurement",
+    "disparity",
+    "se3",
+    "so3",
+]

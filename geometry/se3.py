@@ -12,9 +12,6 @@ from numpy.typing import ArrayLike
 
 from .so3 import SMALL_ANGLE, FloatArray, angle_coefficients, hat3, log_so3
 
-_TERMS = 24
-"""of the series of the right Jacobian: pi^25 / 26! is 1e-14"""
-
 
 def hat(twist: ArrayLike) -> FloatArray:
     """4x4 matrices (..., 4, 4) of twists (..., 6): [[hat3(w), v], [0, 0]] (equation 9)."""
@@ -132,15 +129,42 @@ def adjoint(pose: ArrayLike) -> FloatArray:
 
 
 def right_jacobian(twist: ArrayLike) -> FloatArray:
-    """J (..., 6, 6) of twists (..., 6) with exp(xi + d) = exp(xi) exp(J d) for small d.
+    """J (..., 6, 6) of twists (..., 6) of any size with exp(xi + d) = exp(xi) exp(J d) for small d.
 
-    The series sum of (-curly_hat(xi))^n / (n + 1)!, which is exact to rounding for rotations of at most pi.
+    The closed form of the sum of (-ad)^n / (n + 1)!: Barfoot (2017), equations 7.77b and 7.86b, at -xi.
     """
-    ad = curly_hat(twist)
-    jacobian = np.broadcast_to(np.eye(6), ad.shape)
-    for n in range(_TERMS, 0, -1):
-        jacobian = np.eye(6) - ad @ jacobian / (n + 1)
-    return np.array(jacobian)
+    xi = -np.asarray(twist, dtype=np.float64)
+    V, W = hat3(xi[..., :3]), hat3(xi[..., 3:])
+    angle = np.linalg.norm(xi[..., 3:], axis=-1)
+    c, square, WV, VW = angle_coefficients(angle), W @ W, W @ V, V @ W
+    quartic, quintic = (coefficient[..., None, None] for coefficient in _higher_coefficients(angle))
+    J = np.zeros((*xi.shape[:-1], 6, 6))
+    J[..., :3, :3] = J[..., 3:, 3:] = np.eye(3) + c.cosine[..., None, None] * W + c.cubic[..., None, None] * square
+    WVW = WV @ W
+    J[..., :3, 3:] = (
+        0.5 * V
+        + c.cubic[..., None, None] * (WV + VW + WVW)
+        + quartic * (W @ WV + VW @ W - 3.0 * WVW)
+        + quintic * (WVW @ W + W @ WVW)
+    )
+    return J
+
+
+def inverse_right_jacobian(twist: ArrayLike) -> FloatArray:
+    """J (..., 6, 6) with log(exp(xi) exp(d)) = xi + J d for small d, of twists xi (..., 6) with angles below 2 pi."""
+    return np.asarray(np.linalg.inv(right_jacobian(twist)), dtype=np.float64)
+
+
+def _higher_coefficients(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(x^2 / 2 + cos x - 1) / x^4 and (2 x - 3 sin x + x cos x) / (2 x^5) of angles x (...,); series below 0.3."""
+    small = angle < 0.3
+    x, y = np.where(small, 1.0, angle), np.where(small, angle, 0.0) ** 2
+    quartic = 1 / 24 - y * (1 / 720 - y * (1 / 40320 - y * (1 / 3628800 - y / 479001600)))
+    quintic = 1 / 120 - y * (1 / 2520 - y * (1 / 120960 - y * (1 / 9979200 - y / 1245404160)))
+    return (
+        np.where(small, quartic, (0.5 * x * x + np.cos(x) - 1.0) / x**4),
+        np.where(small, quintic, (2.0 * x - 3.0 * np.sin(x) + x * np.cos(x)) / (2.0 * x**5)),
+    )
 
 
 def transform(pose: ArrayLike, points: ArrayLike) -> FloatArray:

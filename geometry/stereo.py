@@ -1,11 +1,38 @@
-"""The rectified stereo camera: pixel rows `[uL, vL, uR, vR]` of a point in the left camera's frame (equation 10)."""
+"""The rectified stereo camera: pixel rows `[uL, vL, uR, vR]` of a point in the left camera's frame (equation 10).
+
+The pair sees the homogeneous point q = (x, y, z, w), w being 1 for a point at a finite distance, at
+
+    uL = fu x/z + cu,    uR = uL - fu b w/z,    v = fv y/z + cv,
+
+with vL = vR = v. `StereoCamera.rows` and `rows_along` are these three rows and their derivatives; every prediction and
+every Jacobian of the toolkit is made of them. Coordinates are the first axis: with stacks of small matrices what runs
+over many observations takes several times as long.
+"""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .so3 import FloatArray
+
+PRINTED = (0, 2, 1, 2)
+"""which of the three rows (uL, uR, v) predicts each of the printed four, uL, vL, uR, vR"""
+MIN_DEPTH = 0.5
+"""baselines: a nearer point is in both images only of cameras that see more than 90 degrees; at the camera's plane the
+Jacobian is without bound"""
+
+
+class StereoRows(NamedTuple):
+    """Where a pair sees points; every array has its coordinate first, then the points (...)."""
+
+    pixel: FloatArray
+    """(3, ...) uL, uR and v, px"""
+    slope: FloatArray
+    """(3, ...) x/z, y/z and w/z (1/m)"""
+    near: FloatArray
+    """(...) 1/z, 1/m"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,29 +46,52 @@ class StereoCamera:
     baseline: float
     """distance from the left to the right camera, m"""
 
-    def project(self, points: ArrayLike) -> FloatArray:
-        """Pixels (..., 4) of points (..., 3) in the left camera's frame, m (equation 10).
+    @property
+    def min_depth(self) -> float:
+        """m: a point nearer to the camera's plane than `MIN_DEPTH` baselines does not count as in front of it."""
+        return MIN_DEPTH * self.baseline
 
-        Points behind the camera are projected by the same formula, as the report does; `points[..., 2] > 0` tells
-        which were in front.
+    def rows(self, q: FloatArray) -> StereoRows:
+        """The rows of points q (3, ...) in the left camera's frame in m, or of homogeneous ones (4, ...).
+
+        Points behind the camera are projected by the same formula, as the report does; divides by zero at its plane.
         """
-        p = np.asarray(points, dtype=np.float64)
-        x, y, z = p[..., 0], p[..., 1], p[..., 2]
-        uL = self.fu * x / z + self.cu
-        v = self.fv * y / z + self.cv
-        return np.stack([uL, v, uL - self.fu * self.baseline / z, v], axis=-1)
+        near = 1.0 / q[2]
+        slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
+        pixel = np.empty_like(slope)
+        pixel[0] = self.fu * slope[0] + self.cu
+        pixel[1] = pixel[0] - (self.fu * self.baseline) * slope[2]
+        pixel[2] = self.fv * slope[1] + self.cv
+        return StereoRows(pixel, slope, near)
+
+    def rows_along(self, seen: StereoRows, along: FloatArray) -> FloatArray:
+        """Derivatives (3, k, ...) of the rows along k motions of the points, `along` (3 or 4, k, ...) in m.
+
+        `along[i]` is how the coordinate i of q changes with each of the k parameters; a point at a finite distance has
+        three coordinates, its w does not change.
+        """
+        x, y, w = seen.slope
+        left = (self.fu * seen.near) * (along[0] - x * along[2])
+        farther = -w * along[2] if len(along) == 3 else along[3] - w * along[2]
+        right = left - (self.fu * self.baseline * seen.near) * farther
+        return np.stack([left, right, (self.fv * seen.near) * (along[1] - y * along[2])])
+
+    def project(self, points: ArrayLike) -> FloatArray:
+        """Pixels (..., 4), uL, vL, uR, vR, of points (..., 3) in the left camera's frame, m (equation 10).
+
+        Points behind the camera are projected by the same formula, as the report does; `points[..., 2] > 0` are those
+        in front.
+        """
+        q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
+        return np.ascontiguousarray(np.moveaxis(self.rows(q).pixel[list(PRINTED)], 0, -1))
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
         """Derivatives (..., 4, 3) of `project` with respect to points (..., 3): K_s dpi/dq in equations 11, 13."""
-        p = np.asarray(points, dtype=np.float64)
-        x, y, z = p[..., 0], p[..., 1], p[..., 2]
-        J = np.zeros((*p.shape[:-1], 4, 3))
-        J[..., 0, 0] = J[..., 2, 0] = self.fu / z
-        J[..., 1, 1] = J[..., 3, 1] = self.fv / z
-        J[..., 0, 2] = -self.fu * x / z**2
-        J[..., 2, 2] = -self.fu * (x - self.baseline) / z**2
-        J[..., 1, 2] = J[..., 3, 2] = -self.fv * y / z**2
-        return J
+        q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
+        identity = np.eye(3).reshape(3, 3, *([1] * (q.ndim - 1)))
+        along = np.broadcast_to(identity, (3, 3, *q.shape[1:]))
+        J = self.rows_along(self.rows(q), along)[list(PRINTED)]
+        return np.ascontiguousarray(np.moveaxis(J, (0, 1), (-2, -1)))
 
     def triangulate(self, pixels: ArrayLike) -> FloatArray:
         """Points (..., 3) in the left camera's frame, m, of pixels (..., 4).

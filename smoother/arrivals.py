@@ -8,6 +8,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import measured_rows
 
 from .arrival import Arrival
 from .factors import Factors
@@ -27,7 +28,7 @@ class Arrivals:
         self.observations = problem.observations()
         self.frame: list[int] = self.observations.frame.tolist()
         """of each observation"""
-        self._pixel = list(self.observations.pixel)
+        self._rows = list(measured_rows(self.observations.pixel))
         self.factors = Factors(problem)
         self.waiting = WaitingLandmarks(problem, self.observations, rule)
         self._information = np.linalg.inv(problem.increment_covariance)
@@ -78,7 +79,7 @@ class Arrivals:
 
     def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
         """The factor of one observation of the landmark `key`."""
-        return self.factors.stereo(self.frame[observation], key, self._pixel[observation])
+        return self.factors.stereo(self.frame[observation], key, self._rows[observation])
 
     def landmarks_seen(self, observed: range) -> IntArray:
         """The landmarks of a frame's observations."""

@@ -13,7 +13,7 @@ from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .convention import reordered
+from .convention import pose_covariances
 from .covariances import covariances
 from .keys import landmark_key, pose_key
 from .minimum import Minimum, from_answer, from_path
@@ -127,7 +127,8 @@ def _marginals(kept: Problem, best: Minimum, events: list[Event]) -> tuple[Float
     except RuntimeError:
         events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
         return np.full((T, 6, 6), np.nan), landmarks_of(best.values, keys)
-    return reordered([covariance[pose_key(k)] for k in range(T)]), landmarks_of(best.values, keys, covariance)
+    poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
+    return poses, landmarks_of(best.values, keys, covariance)
 
 
 def _keys(problem: Problem) -> dict[int, int]:

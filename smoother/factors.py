@@ -1,8 +1,6 @@
 """The terms of a problem as GTSAM factors, with the same likelihood as the filters have.
 
-The report's measurement has four rows of variance V; `StereoPoint2` has one v. Feeding v = (vL + vR) / 2 with
-standard deviations (s, s, s / sqrt(2)), s^2 = V, for (uL, uR, v) leaves out only the constant
-sum of (vL - vR)^2 / (4 s^2) of the half cost.
+`StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances.
 """
 
 import gtsam
@@ -15,7 +13,7 @@ from .convention import reordered
 from .keys import pose_key
 
 HELD_SIGMA = 1e-6
-"""m and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
+"""baselines and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
 
 
 class Factors:
@@ -30,9 +28,14 @@ class Factors:
         self.steps = se3.exp(problem.increment)
         self.step_covariance = reordered(problem.increment_covariance)
 
+    @property
+    def held_sigmas(self) -> FloatArray:
+        """(6,) rad and m: the standard deviations of a pose that is held."""
+        return HELD_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
+
     def first_pose(self) -> gtsam.PriorFactorPose3:
         """The prior on the pose of frame 0."""
-        covariance = reordered(self.problem.initial_covariance) + HELD_SIGMA**2 * np.eye(6)
+        covariance = reordered(self.problem.initial_covariance) + np.diag(self.held_sigmas**2)
         noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
         return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(self.problem.initial_pose), noise)
 
@@ -42,11 +45,11 @@ class Factors:
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
-    def stereo(self, frame: int, key: int, pixel: FloatArray) -> gtsam.GenericStereoFactor3D:
-        """One stereo observation (4,) of the landmark `key`; no throw where the point is behind the camera."""
-        uL, vL, uR, vR = pixel.tolist()
+    def stereo(self, frame: int, key: int, rows: FloatArray) -> gtsam.GenericStereoFactor3D:
+        """One observation, `rows` (3,) uL, uR, v, of the landmark `key`; no throw where that is behind the camera."""
+        uL, uR, v = rows.tolist()
         return gtsam.GenericStereoFactor3D(
-            gtsam.StereoPoint2(uL, uR, 0.5 * (vL + vR)),
+            gtsam.StereoPoint2(uL, uR, v),
             self.stereo_noise,
             pose_key(frame),
             key,
@@ -67,8 +70,7 @@ class Factors:
 
 def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:
     """The noise model of (uL, uR, v), under the problem's kernel."""
-    s = np.sqrt(problem.pixel_variance)
-    gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.array([s, s, s / np.sqrt(2.0)]))
+    gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.sqrt(problem.measurement.row_variance))
     if problem.kernel is None:
         return gaussian
     huber = gtsam.noiseModel.mEstimator.Huber.Create(problem.kernel.threshold)

@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray
 
 from .arrival import FRAME_LOST, Arrival, add_recovering
 from .arrivals import Arrivals
-from .convention import reordered
+from .convention import pose_covariances
 from .elimination import Chronology
 from .journal import IndeterminateSystemError
 from .keys import distance_key, landmark_of, pose_key, thresholds
@@ -36,8 +36,8 @@ SETTLING_UPDATES = 8
 class ISAM2Settings:
     """How the graph is solved; only `entry` moves its optimum."""
 
-    relinearize_position: float = 0.02
-    """m, of a pose"""
+    relinearize_position: float = 0.04
+    """baselines of the rig, of a pose: what is seen moves by no more than this share of its disparity"""
     relinearize_rotation: float = 0.002
     """rad, of a pose"""
     relinearize_landmark: float = 0.002
@@ -54,11 +54,11 @@ class ISAM2Settings:
     them, as far back as a landmark reaches that will be seen again, stay"""
     kept_frames: int = 200
 
-    def params(self) -> gtsam.ISAM2Params:
-        """The same in GTSAM's terms."""
+    def params(self, baseline: float) -> gtsam.ISAM2Params:
+        """The same in GTSAM's terms, for a rig with this baseline (m)."""
         params = gtsam.ISAM2Params()
         params.setRelinearizeThreshold(
-            thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark)
+            thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark, baseline)
         )
         params.relinearizeSkip = self.relinearize_skip
         params.setFactorization("QR" if self.careful else "CHOLESKY")
@@ -77,7 +77,7 @@ class IncrementalSmoother:
     """Builds and solves the graph frame by frame, and keeps what was given up on the way."""
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
-        self.solver = MovingTree(settings.params())
+        self.solver = MovingTree(settings.params(problem.sequence.camera.baseline))
         self._settings = settings
         self.problem = problem
         self._may_lose_frames = settings.careful or problem.landmark_prior is not None
@@ -130,7 +130,7 @@ class IncrementalSmoother:
         self.events += events
         tree = self.solver.tree
         self.arrivals.path[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
-        self.online_covariance[k] = reordered(tree.marginalCovariance(pose_key(k)))
+        self.online_covariance[k] = pose_covariances(self.problem, [tree.marginalCovariance(pose_key(k))], k)[0]
         for j in self.arrivals.landmarks_seen(observed).tolist():
             if j in self.key:
                 self.arrivals.position[j] = tree.calculateEstimatePoint3(self.key[j])
@@ -155,7 +155,7 @@ class IncrementalSmoother:
         values.insert(pose_key(k), gtsam.Pose3(arrival.guess))
         graph.push_back(arrival.motion)
         owner: list[tuple[int, int]] = []
-        new = {e.landmark: distance_key(e.landmark, _distance(e.start, arrival.guess)) for e in arrival.entries}
+        new = {e.landmark: distance_key(e.landmark, self._baselines(e.start, arrival.guess)) for e in arrival.entries}
         for entry in arrival.entries:
             j, key = entry.landmark, new[entry.landmark]
             values.insert(key, entry.start)
@@ -243,6 +243,5 @@ class IncrementalSmoother:
         index = np.sort(np.fromiter(position, dtype=np.int64))
         return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))
 
-
-def _distance(point: FloatArray, world_T_imu: FloatArray) -> float:
-    return float(np.linalg.norm(point - world_T_imu[:3, 3]))
+    def _baselines(self, point: FloatArray, world_T_imu: FloatArray) -> float:
+        return float(np.linalg.norm(point - world_T_imu[:3, 3])) / self.problem.sequence.camera.baseline

@@ -15,8 +15,8 @@ POSE = "x"
 LANDMARK = "l"
 """the letter where no thresholds are at work"""
 LETTERS = "abcdefghijk"
-NEAREST, RATIO = 5.0, 1.6
-"""m; a class reaches RATIO times as far as the one before it"""
+NEAREST, RATIO = 10.0, 1.6
+"""baselines of the rig; a class reaches RATIO times as far as the one before it"""
 
 
 _LETTER_AT = 56
@@ -42,7 +42,7 @@ def landmark_key(landmark: int) -> int:
 
 
 def distance_key(landmark: int, distance: float) -> int:
-    """The key of a landmark that enters an incremental graph when it is `distance` (m) away."""
+    """The key of a landmark that enters an incremental graph when it is `distance` (baselines) away."""
     steps = math.log(max(distance, NEAREST) / NEAREST) / math.log(RATIO)
     return (ord(LETTERS[min(int(steps), len(LETTERS) - 1)]) << _LETTER_AT) | landmark
 
@@ -52,11 +52,11 @@ def landmark_of(key: int) -> int | None:
     return None if key == TAIL or key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
 
 
-def thresholds(position: float, rotation: float, landmark: float) -> gtsam.ISAM2ThresholdMap:
-    """Relinearisation thresholds: of poses in m and rad, of landmarks as a share of their distance."""
+def thresholds(position: float, rotation: float, landmark: float, baseline: float) -> gtsam.ISAM2ThresholdMap:
+    """Relinearisation thresholds: of poses in baselines (m) and rad, of landmarks as a share of their distance."""
     by_letter = gtsam.ISAM2ThresholdMap()
-    by_letter.insert((POSE, np.array([rotation] * 3 + [position] * 3)))
+    by_letter.insert((POSE, np.array([rotation] * 3 + [position * baseline] * 3)))
     by_letter.insert((chr(TAIL >> _LETTER_AT), np.full(6, np.inf)))
     for i, letter in enumerate(LETTERS):
-        by_letter.insert((letter, np.full(3, landmark * NEAREST * RATIO**i)))
+        by_letter.insert((letter, np.full(3, landmark * baseline * NEAREST * RATIO**i)))
     return by_letter

@@ -11,8 +11,9 @@ import numpy as np
 from fgbaseline.data.observations import Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.measurement import measured_rows
 
-from .factors import HELD_SIGMA, Factors
+from .factors import Factors
 from .keys import landmark_key, pose_key
 from .starts import triangulated
 from .values import poses_of
@@ -41,14 +42,14 @@ def solved(factors: Factors, observations: Observations, world_T_imu: FloatArray
     landmarks = triangulated(factors.problem, o.select(often[o.landmark]), world_T_imu)
     o = o.select(np.isin(o.landmark, landmarks.index))
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    held = gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+    held = gtsam.noiseModel.Diagonal.Sigmas(factors.held_sigmas)
     graph.push_back(gtsam.PriorFactorPose3(pose_key(first), gtsam.Pose3(world_T_imu[first]), held))
     for k in range(first, last):
         graph.push_back(factors.motion(k))
     for k in range(first, last + 1):
         values.insert(pose_key(k), gtsam.Pose3(world_T_imu[k]))
-    for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
-        graph.push_back(factors.stereo(k, landmark_key(j), pixel))
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), rows))
     for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
         values.insert(landmark_key(j), position)
     params = gtsam.LevenbergMarquardtParams()

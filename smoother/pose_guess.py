@@ -7,9 +7,8 @@ wrong and are weighted down, until the pose is relinearised; so the first linear
 import numpy as np
 
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3, so3
-
-from .undone import MIN_DEPTH
+from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.measurement import measured_rows, predict
 
 MAX_STEPS = 4
 SMALL_STEP = 0.1
@@ -19,16 +18,16 @@ SMALL_STEP = 0.1
 def corrected(
     problem: Problem, information: FloatArray, pose: FloatArray, points: FloatArray, pixel: FloatArray
 ) -> FloatArray:
-    """The pose (4, 4) of a frame that its prediction and n sights (n, 4) of points (n, 3) agree on.
+    """The pose (4, 4) of a frame that its prediction and n observations (n, 4) of points (n, 3) agree on.
 
     Gauss-Newton on the problem's cost, kernel included, with the frame before and the points held: what is uncertain
     of the two together does not move one against the other. `information` (6, 6) is the increment's, order [v, w].
     Only a start.
     """
-    sights = _Sights(problem, points, pixel)
+    observed = _Observed(problem, points, pixel)
     guess, correction = pose, np.zeros(6)
     for _ in range(MAX_STEPS):
-        linearised = sights.linearised(guess)
+        linearised = observed.linearised(guess)
         if linearised is None:
             return pose
         J, residual = linearised
@@ -41,39 +40,25 @@ def corrected(
     return guess
 
 
-class _Sights:
-    """What one frame sees of known points, in rows (uL, uR, sqrt(2) v), which are of one variance."""
+class _Observed:
+    """What one frame sees of known points."""
 
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
-        camera, root2 = problem.sequence.camera, np.sqrt(2.0)
-        self._points, self._variance = points, problem.pixel_variance
-        self._threshold = np.inf if problem.kernel is None else problem.kernel.threshold
+        self._points, self._model = points, problem.measurement
         self._cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
-        self._focal = np.array([camera.fu, camera.fu, root2 * camera.fv])
-        centre = np.array([camera.cu, camera.cu, root2 * camera.cv])
-        self._measured = np.column_stack([pixel[:, 0], pixel[:, 2], (pixel[:, 1] + pixel[:, 3]) / root2]) - centre
-        self._baseline = camera.baseline
+        self._measured = measured_rows(pixel)
 
     def linearised(self, pose: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Jacobian (3m, 6) for a perturbation of the pose and residuals (3m,), whitened and weighted by the kernel, of
-        the m points that are ahead; None if none is."""
-        p_imu = (self._points - pose[:3, 3]) @ pose[:3, :3]
-        R_cam_imu = self._cam_T_imu[:3, :3]
-        p_cam = p_imu @ R_cam_imu.T + self._cam_T_imu[:3, 3]
-        ahead = p_cam[:, 2] > MIN_DEPTH
-        if not ahead.any():
+        the m points that are in front of the camera; None if none is."""
+        model = self._model
+        with np.errstate(divide="ignore", invalid="ignore"):  # at the camera's plane
+            predicted = predict(model.camera, self._cam_T_imu, pose, self._points)
+            J = predicted.by_pose()
+        front = predicted.depth > model.camera.min_depth
+        if not front.any():
             return None
-        x, y, z = p_cam[ahead].T
-        slope = np.stack([x, x - self._baseline, y], axis=1) / z[:, None]
-        residual = self._measured[ahead] - self._focal * slope
-        J_point = np.zeros((len(z), 3, 3))
-        J_point[:, 0, 0] = J_point[:, 1, 0] = J_point[:, 2, 1] = 1.0
-        J_point[:, :, 2] = -slope
-        J_point *= self._focal[:, None] / z[:, None, None]
-        squared = np.einsum("ni,ni->n", residual, residual) / self._variance
-        weight = np.minimum(self._threshold / np.sqrt(np.maximum(squared, 1e-12)), 1.0)
-        scale = np.sqrt(weight / self._variance)[:, None]
-        J_point = J_point @ R_cam_imu * scale[:, :, None]
-        # The point in the IMU's frame moves by -v - w x p.
-        J = np.concatenate([-J_point, J_point @ so3.hat3(p_imu[ahead])], axis=2)
-        return J.reshape(-1, 6), (residual * scale).ravel()
+        residual = (self._measured - predicted.pixel)[front] * model.white_scale
+        root = np.sqrt(model.weight(np.einsum("ni,ni->n", residual, residual)))[:, None]
+        J = J[front] * (model.white_scale * root)[:, :, None]
+        return J.reshape(-1, 6), (residual * root).ravel()

@@ -13,7 +13,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from .arrival import GivenUpError
-from .convention import reordered
+from .convention import pose_covariances
 from .covariances import covariances
 from .incremental import FrameLostError, IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
@@ -136,7 +136,7 @@ def _marginals(
     except RuntimeError:
         smoother.events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
         return np.full((T, 6, 6), np.nan), landmarks_of(values, smoother.key)
-    poses = reordered([covariance[pose_key(k)] for k in range(T)])
+    poses = pose_covariances(smoother.problem, [covariance[pose_key(k)] for k in range(T)])
     return poses, landmarks_of(values, smoother.key, covariance)
 
 

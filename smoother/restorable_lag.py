@@ -15,8 +15,8 @@ from .journal import IndeterminateSystemError, named_variable
 from .keys import landmark_of
 from .relinearised import compact
 
-LOOSE = 1e3
-"""m; keeps a landmark determined that marginals still speak of, but no observation"""
+LOOSE = 2e3
+"""baselines; keeps a landmark determined that marginals still speak of, but no observation"""
 
 
 CAREFUL_UPDATES = 30
@@ -52,8 +52,8 @@ class RestorableLag:
     path is long. QR does not; after an update by QR it is kept for some frames.
     """
 
-    def __init__(self, lag: float, settings: ISAM2Settings) -> None:
-        self._lag, self._settings = lag, settings
+    def __init__(self, lag: float, settings: ISAM2Settings, baseline: float) -> None:
+        self._lag, self._settings, self._baseline = lag, settings, baseline
         self._careful_updates = 0
         """still to be made by QR"""
         self.smoother = self._new(careful=False)
@@ -79,7 +79,7 @@ class RestorableLag:
             if careful:
                 self._careful_updates = CAREFUL_UPDATES
             if careful or forgotten:
-                snapshot = _without(self.snapshot, forgotten) if forgotten else self.snapshot
+                snapshot = self._without(self.snapshot, forgotten) if forgotten else self.snapshot
                 self.smoother = self._built(snapshot, careful=self._careful_updates > 0)
             self.smoother.update(factors, values, _plain(times))
         except (RuntimeError, IndexError) as error:
@@ -90,7 +90,7 @@ class RestorableLag:
 
     def _restore(self) -> None:
         """Back to the snapshot, the more carefully the less it can be done."""
-        held = _loosely_held(self.snapshot, {key for key in self.snapshot.times if landmark_of(key) is not None})
+        held = self._loosely_held(self.snapshot, {key for key in self.snapshot.times if landmark_of(key) is not None})
         for snapshot, careful in ((self.snapshot, self._careful_updates > 0), (self.snapshot, True), (held, True)):
             try:
                 self.smoother = self._built(snapshot, careful=careful)
@@ -116,7 +116,7 @@ class RestorableLag:
         )
 
     def _new(self, *, careful: bool) -> gtsam.IncrementalFixedLagSmoother:
-        params = self._settings.params()
+        params = self._settings.params(self._baseline)
         params.findUnusedFactorSlots = True
         params.relinearizeSkip = 1  # what leaves the window has no later chance, and most of the time goes elsewhere
         if careful:
@@ -137,33 +137,32 @@ class RestorableLag:
             smoother.update(graph, snapshot.linearization_point, _plain(snapshot.times))
         return smoother
 
+    def _without(self, snapshot: Snapshot, forgotten: Collection[int]) -> Snapshot:
+        graph, factors, in_marginals = gtsam.NonlinearFactorGraph(), compact(snapshot.factors), set[int]()
+        for i in range(factors.size()):
+            factor = factors.at(i)
+            if isinstance(factor, gtsam.LinearContainerFactor):
+                in_marginals |= {key for key in factor.keys() if key in forgotten}  # noqa: SIM118
+            elif any(key in forgotten for key in factor.keys()):  # noqa: SIM118
+                continue
+            graph.push_back(factor)
+        times = {key: time for key, time in snapshot.times.items() if key not in forgotten or key in in_marginals}
+        values = gtsam.Values()
+        for key in times:
+            if landmark_of(key) is None:
+                values.insert(key, snapshot.linearization_point.atPose3(key))
+            else:
+                values.insert(key, snapshot.linearization_point.atPoint3(key))
+        return self._loosely_held(Snapshot(graph, values, times), in_marginals)
+
+    def _loosely_held(self, snapshot: Snapshot, landmarks: Collection[int]) -> Snapshot:
+        graph, point = compact(snapshot.factors), snapshot.linearization_point
+        loose = gtsam.noiseModel.Isotropic.Sigma(3, LOOSE * self._baseline)
+        for key in landmarks:
+            graph.push_back(gtsam.PriorFactorPoint3(key, point.atPoint3(key), loose))
+        return snapshot._replace(factors=graph)
+
 
 def _plain(times: Mapping[int, float]) -> Mapping[SupportsInt | SupportsIndex, SupportsFloat | SupportsIndex]:
     # The stubs of GTSAM ask for exactly that type.
     return {key: time for key, time in times.items()}  # noqa: C416
-
-
-def _without(snapshot: Snapshot, forgotten: Collection[int]) -> Snapshot:
-    graph, factors, in_marginals = gtsam.NonlinearFactorGraph(), compact(snapshot.factors), set[int]()
-    for i in range(factors.size()):
-        factor = factors.at(i)
-        if isinstance(factor, gtsam.LinearContainerFactor):
-            in_marginals |= {key for key in factor.keys() if key in forgotten}  # noqa: SIM118
-        elif any(key in forgotten for key in factor.keys()):  # noqa: SIM118
-            continue
-        graph.push_back(factor)
-    times = {key: time for key, time in snapshot.times.items() if key not in forgotten or key in in_marginals}
-    values = gtsam.Values()
-    for key in times:
-        if landmark_of(key) is None:
-            values.insert(key, snapshot.linearization_point.atPose3(key))
-        else:
-            values.insert(key, snapshot.linearization_point.atPoint3(key))
-    return _loosely_held(Snapshot(graph, values, times), in_marginals)
-
-
-def _loosely_held(snapshot: Snapshot, landmarks: Collection[int]) -> Snapshot:
-    graph, point = compact(snapshot.factors), snapshot.linearization_point
-    for key in landmarks:
-        graph.push_back(gtsam.PriorFactorPoint3(key, point.atPoint3(key), gtsam.noiseModel.Isotropic.Sigma(3, LOOSE)))
-    return snapshot._replace(factors=graph)

@@ -37,9 +37,7 @@ def triangulated(problem: Problem, o: Observations, world_T_imu: FloatArray) -> 
     """
     index, row = np.unique(o.landmark, return_inverse=True)
     world_T_cam = world_T_imu[o.frame] @ problem.sequence.imu_T_cam
-    kernel = None if problem.kernel is None else problem.kernel.threshold
-    camera, variance = problem.sequence.camera, problem.pixel_variance
-    position = triangulate_tracks(camera, world_T_cam, row, o.pixel, len(index), variance, kernel).position
+    position = triangulate_tracks(problem.measurement, world_T_cam, row, o.pixel, len(index)).position
     placed = np.isfinite(position).all(axis=1)
     return Landmarks(index[placed], position[placed])
 

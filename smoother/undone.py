@@ -7,11 +7,9 @@ from fgbaseline.data.observations import BoolArray, Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
-MIN_DEPTH = 0.3
-"""m; a landmark nearer to the plane of a camera that saw it, or behind it, makes a system indeterminate: its Jacobian
-is unbounded, or zero"""
 MIN_DISPARITY = 0.05
-"""px; so does one so far away that no step along its ray changes what the camera sees"""
+"""px; a landmark so far away that no step along its ray changes what the camera sees makes a system indeterminate, as
+does one at the plane of a camera that saw it, or behind it, whose Jacobian is unbounded, or zero"""
 UNDONE = "it came to lie behind a camera that saw it, at its plane or at infinity"
 
 
@@ -27,5 +25,5 @@ def seen_well(problem: Problem, o: Observations, world_T_imu: FloatArray, landma
     cam_T_world = se3.inverse(world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
     points = landmarks.position[np.searchsorted(landmarks.index, o.landmark)]
     depth = se3.transform(cam_T_world, points)[:, 2]
-    well: BoolArray = (depth > MIN_DEPTH) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
+    well: BoolArray = (depth > camera.min_depth) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
     return well

@@ -93,13 +93,11 @@ class WaitingLandmarks:
         """Positions (n, 3) and the standard deviation (n,) of the worst-known direction, m; infinite where unknown."""
         problem, o = self._problem, self._observations
         points = triangulate_tracks(
-            problem.sequence.camera,
+            problem.measurement,
             world_T_imu[o.frame[index]] @ problem.sequence.imu_T_cam,
             row,
             o.pixel[index],
             n,
-            problem.pixel_variance,
-            None if problem.kernel is None else problem.kernel.threshold,
             START_TOLERANCE,
         )
         weakest = np.linalg.eigvalsh(points.information)[:, 0]

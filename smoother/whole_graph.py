@@ -6,6 +6,7 @@ import numpy as np
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import measured_rows
 
 from .factors import Factors
 from .keys import landmark_key, pose_key
@@ -18,8 +19,8 @@ def whole_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
     for k in range(problem.n_frames - 1):
         graph.push_back(factors.motion(k))
     o = problem.observations()
-    for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
-        graph.push_back(factors.stereo(k, landmark_key(j), pixel))
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), rows))
     if problem.landmark_prior is not None:
         for j in np.unique(o.landmark).tolist():
             graph.push_back(factors.landmark_prior(j, landmark_key(j)))

@@ -12,7 +12,7 @@ from fgbaseline.geometry import FloatArray
 
 from .arrival import Arrival
 from .arrivals import Arrivals
-from .convention import reordered
+from .convention import pose_covariances
 from .incremental import ISAM2Settings
 from .journal import IndeterminateSystemError
 from .keys import distance_key, landmark_of, pose_key
@@ -25,8 +25,8 @@ class Window:
     """Frames and landmarks of the last `lag` seconds; a landmark's time is that of the frame that saw it last."""
 
     def __init__(self, problem: Problem, arrivals: Arrivals, lag: float, settings: ISAM2Settings) -> None:
-        self._problem, self._arrivals = problem, arrivals
-        self._lag = RestorableLag(lag, settings)
+        self._problem, self._arrivals, self._baseline = problem, arrivals, problem.sequence.camera.baseline
+        self._lag = RestorableLag(lag, settings, self._baseline)
         self._seconds = lag
         self._seen_at: dict[int, float] = {}
         """of each landmark in the window"""
@@ -54,7 +54,7 @@ class Window:
         new: dict[int, int] = {}
         for entry in arrival.entries:
             j = entry.landmark
-            distance = float(np.linalg.norm(entry.start - arrival.guess[:3, 3]))
+            distance = float(np.linalg.norm(entry.start - arrival.guess[:3, 3])) / self._baseline
             name = j + self._problem.sequence.n_landmarks * self._times_entered[j]
             new[j] = distance_key(name, distance)
             values.insert(new[j], entry.start)
@@ -138,7 +138,8 @@ class Window:
             return
         covariance = self._covariances([*map(pose_key, frames), *(self.key[j] for j in leaving)])
         for frame in frames:
-            self.path[frame], self.covariance[frame] = self.pose(frame), reordered(covariance[pose_key(frame)])
+            self.path[frame] = self.pose(frame)
+            self.covariance[frame] = pose_covariances(self._problem, [covariance[pose_key(frame)]], frame)[0]
         lost = self.undone(leaving)
         self.lost += lost
         for j in leaving:

@@ -11,7 +11,7 @@ from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.ekf.pose_update import PoseInnovation, pose_innovation
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 
 DT = 0.1
 
@@ -76,7 +76,8 @@ def first_innovation(sequence: Sequence, world_T_imu: FloatArray) -> PoseInnovat
     assert sequence.truth is not None
     assert sequence.truth.landmarks is not None
     points, pixel = sequence.truth.landmarks, sequence.observations.pixel[: sequence.n_landmarks]
-    return pose_innovation(sequence.camera, se3.inverse(sequence.imu_T_cam), world_T_imu, points, pixel)
+    model = StereoMeasurement(sequence.camera, 0.25)
+    return pose_innovation(model, se3.inverse(sequence.imu_T_cam), world_T_imu, points, pixel)
 
 
 def plain_problem(sequence: Sequence, kernel: HuberKernel | None = None, pixel_sigma: float = 0.5) -> Problem:

@@ -11,10 +11,10 @@ import pytest
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.ekf import joint_filter, slam
+from fgbaseline.ekf import slam
 from fgbaseline.ekf.pose_update import PoseInnovation
-from fgbaseline.ekf.stereo_rows import Sight
 from fgbaseline.geometry import StereoCamera
+from fgbaseline.geometry.measurement import Prediction
 from fgbaseline.reports import job
 from fgbaseline.reports.checking.command import Outputs, check
 from fgbaseline.reports.comparison import compare_all
@@ -94,19 +94,14 @@ def pose_jacobian(patch: pytest.MonkeyPatch) -> None:
 
 def camera_jacobian(patch: pytest.MonkeyPatch) -> None:
     """Of the pixels by the point in the camera's frame."""
-    right = StereoCamera.jacobian
-    patch.setattr(StereoCamera, "jacobian", lambda camera, points: -right(camera, points))
+    right = StereoCamera.rows_along
+    patch.setattr(StereoCamera, "rows_along", lambda camera, seen, along: -right(camera, seen, along))
 
 
 def joint_jacobian(patch: pytest.MonkeyPatch) -> None:
     """Of the three rows by the pose, in the joint filter."""
-    right = joint_filter.sight
-
-    def wrong(*arguments: Any) -> Sight:
-        seen = right(*arguments)
-        return seen._replace(by_pose=-seen.by_pose)
-
-    patch.setattr(joint_filter, "sight", wrong)
+    right = Prediction.by_pose
+    patch.setattr(Prediction, "by_pose", lambda seen: -right(seen))
 
 
 @pytest.mark.parametrize(

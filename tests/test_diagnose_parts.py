@@ -13,13 +13,11 @@ from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.axes import axes_matrix
 from fgbaseline.data.diagnose import window as adjustment
 from fgbaseline.data.diagnose.axes import linear_axes
-from fgbaseline.data.diagnose.links import three_rows
 from fgbaseline.data.diagnose.regression import regress
 from fgbaseline.data.diagnose.spline import spline_through
 from fgbaseline.data.diagnose.timing import timing
 from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_windows_alike
 from fgbaseline.data.diagnose.window_terms import (
-    HUBER,
     SHARED,
     Sigmas,
     WindowData,
@@ -29,11 +27,13 @@ from fgbaseline.data.diagnose.window_terms import (
 )
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.data.track_mask import MaskSettings, exclusions, split_tracks
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import measured_rows
 
 from .synthetic import Scene
 
 SIGMAS = Sigmas(0.5, 0.1, 0.01)
+KERNEL = HuberKernel()
 
 
 def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArray, FloatArray]:
@@ -43,7 +43,7 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
     o, truth = sequence.observations, sequence.truth
     assert truth is not None
     assert truth.landmarks is not None
-    data = WindowData(o.frame, o.landmark, three_rows(o.pixel), held_twist(sequence), sequence.dt)
+    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), held_twist(sequence), sequence.dt)
     random = np.random.default_rng(seed)
     off = 0.01 * random.normal(size=(frames, 6))
     off[0] = 0.0
@@ -87,14 +87,15 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
     shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
     one = joined([(data, poses, points)])
     _, before, after, by_shared = motion_terms(one, poses, SIGMAS, shared[None])
-    terms = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, 0.5, shared[None])
+    model = StereoMeasurement(sequence.camera, 0.5**2, KERNEL)
+    terms = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
     by_point = np.moveaxis(terms.by_point, 2, 0)
 
     def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
         return motion_terms(one, p, SIGMAS, s[None]).residual
 
     def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
-        return pixel_terms(sequence.camera, sequence.imu_T_cam, one, p, x, 0.5, shared[None]).residual.T
+        return pixel_terms(model, sequence.imu_T_cam, one, p, x, shared[None]).residual.T
 
     k = 3
     for axis in range(6):
@@ -120,6 +121,7 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
 def test_a_window_ends_where_scipy_ends() -> None:
     fit, data = fitted()
     sequence = window()[0].sequence()
+    model = StereoMeasurement(sequence.camera, SIGMAS.pixel**2, KERNEL)
     W, m = len(fit.poses), len(fit.points)
     root, one = np.sqrt(np.diag(SHARED_PRIOR)), joined([(data, fit.poses, fit.points)])
 
@@ -127,11 +129,11 @@ def test_a_window_ends_where_scipy_ends() -> None:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
         shared = fit.shared + x[-SHARED:]
-        pixels = pixel_terms(sequence.camera, sequence.imu_T_cam, one, poses, points, SIGMAS.pixel, shared[None])
+        pixels = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
         r = pixels.residual.T
-        norm = np.linalg.norm(r, axis=1)
-        beyond = np.maximum(norm, HUBER)  # the squared norm becomes Huber's cost
-        r = r * np.sqrt(2.0 * HUBER * beyond - HUBER**2)[:, None] / beyond[:, None]
+        norm, k = np.linalg.norm(r, axis=1), KERNEL.threshold
+        beyond = np.maximum(norm, k)  # the squared norm becomes Huber's cost
+        r = r * np.sqrt(2.0 * k * beyond - k**2)[:, None] / beyond[:, None]
         return np.concatenate(
             [r.ravel(), motion_terms(one, poses, SIGMAS, shared[None]).residual.ravel(), root * shared]
         )
@@ -179,7 +181,7 @@ def test_a_noisy_forward_speed_is_seen_and_a_delayed_one_too(noise: float) -> No
     rate = 0.2 * np.column_stack([0.05 * np.sin(k / 6), 0.05 * np.sin(k / 4), np.sin(k / 30)])
     recorded = np.roll(seen, 2, axis=0) @ axes_matrix("-y,x,z") + noise * random.normal(size=(800, 3))
     seen = seen + 0.03 * random.normal(size=(800, 3))
-    axes = linear_axes(seen, recorded, rate, np.ones(800, dtype=np.bool_), "x,y,z")
+    axes = linear_axes(seen, recorded, rate, np.ones(800, dtype=np.bool_), "x,y,z", baseline=0.5)
     assert axes.seen == (True, False, False)
     assert axes.name.split(",")[0] == "-y"
 

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import data
-from fgbaseline.data import HuberKernel
 from fgbaseline.data.simulate import KITTI
 from fgbaseline.ekf.dead_reckoning import propagated_covariance
 from fgbaseline.ekf.pose_update import (
@@ -17,14 +16,15 @@ from fgbaseline.ekf.pose_update import (
     pose_posterior,
     predicted_covariance,
     printed_covariance,
-    robust_weight,
 )
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
 
 from .dense_filter import DenseFilter
 from .synthetic import Scene, drive, plain_problem
 
 CAM_T_IMU = se3.inverse(KITTI.imu_T_cam)
+V = 15.0
+PRINTED = StereoMeasurement(KITTI.camera, V)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -44,10 +44,10 @@ def covariance_of(random: np.random.Generator, scale: float = 1.0) -> FloatArray
 @given(SEEDS)
 def test_the_pose_jacobian_is_the_slope_along_the_right_perturbation(seed: int) -> None:
     world_T_imu, points, pixel = sight(np.random.default_rng(seed))
-    H = pose_innovation(KITTI.camera, CAM_T_IMU, world_T_imu, points, pixel).jacobian
+    H = pose_innovation(PRINTED, CAM_T_IMU, world_T_imu, points, pixel).jacobian
 
     def predicted(delta: FloatArray) -> FloatArray:
-        return pixel - pose_innovation(KITTI.camera, CAM_T_IMU, world_T_imu @ se3.exp(delta), points, pixel).residual
+        return pixel - pose_innovation(PRINTED, CAM_T_IMU, world_T_imu @ se3.exp(delta), points, pixel).residual
 
     h = 1e-5
     slope = np.stack([(predicted(h * e) - predicted(-h * e)) / (2.0 * h) for e in np.eye(6)], axis=2)
@@ -57,9 +57,9 @@ def test_the_pose_jacobian_is_the_slope_along_the_right_perturbation(seed: int) 
 @given(SEEDS)
 def test_the_posterior_is_that_of_the_printed_gain(seed: int) -> None:
     random = np.random.default_rng(seed)
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(random))
-    sigma, V = covariance_of(random, 0.01), 15.0
-    posterior = pose_posterior(sigma, innovation, np.full(8, 1.0 / V))
+    innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
+    sigma = covariance_of(random, 0.01)
+    posterior = pose_posterior(sigma, innovation, np.ones(8))
     H = innovation.jacobian.reshape(-1, 6)
     S = H @ sigma @ H.T + V * np.eye(32)
     gain = sigma @ H.T @ np.linalg.inv(S)
@@ -78,7 +78,8 @@ def test_a_posterior_is_positive_and_no_worse_than_the_prior_however_awful_the_j
     rows = 10.0 ** random.uniform(-3.0, max(log_jacobian, -3.0), (n, 1, 1))
     H = rows * random.normal(size=(n, 4, 6))
     sigma = covariance_of(random, 10.0**log_sigma)
-    posterior = pose_posterior(sigma, PoseInnovation(random.normal(size=(n, 4)), H), np.full(n, 1.0 / 15.0))
+    innovation = PoseInnovation(random.normal(size=(n, 4)), H, np.full(4, V))
+    posterior = pose_posterior(sigma, innovation, np.ones(n))
     S = posterior.covariance
     np.testing.assert_array_equal(S, S.T)
     assert np.isfinite(posterior.correction).all()
@@ -92,9 +93,9 @@ def test_a_posterior_is_positive_and_no_worse_than_the_prior_however_awful_the_j
 
 def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> None:
     random = np.random.default_rng(4)
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(random))
-    sigma, V = covariance_of(random, 0.01), 15.0
-    one = pose_posterior(sigma, innovation, np.full(8, 1.0 / V))
+    innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
+    sigma = covariance_of(random, 0.01)
+    one = pose_posterior(sigma, innovation, np.ones(8))
     for size in (1e8, 1e12, 1e16):
         # Says exactly, but along one direction only, what is already known: nothing else may change.
         direction = random.normal(size=6)
@@ -102,7 +103,7 @@ def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> No
         H[-1, 0] = size * direction
         r = np.vstack([innovation.residual, np.zeros((1, 4))])
         r[-1, 0] = H[-1, 0] @ one.correction
-        both = pose_posterior(sigma, PoseInnovation(r, H), np.full(9, 1.0 / V))
+        both = pose_posterior(sigma, PoseInnovation(r, H, innovation.variance), np.ones(9))
         np.testing.assert_allclose(both.correction, one.correction, rtol=1e-6)
         known = one.covariance @ direction
         expected = one.covariance - np.outer(known, known) / (direction @ known)
@@ -111,8 +112,8 @@ def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> No
 
 def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite() -> None:
     random = np.random.default_rng(5)
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(random))
-    sigma, weight = covariance_of(random, 0.01), np.full(8, 1.0 / 15.0)
+    innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
+    sigma, weight = covariance_of(random, 0.01), np.ones(8)
     ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
     np.testing.assert_allclose(printed, ours, rtol=0.0, atol=1e-9 * sigma.max())
     innovation.jacobian[0] *= 1e8
@@ -128,7 +129,7 @@ def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite()
 @given(SEEDS)
 def test_observations_of_no_weight_change_nothing(seed: int) -> None:
     random = np.random.default_rng(seed)
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(random))
+    innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
     sigma = covariance_of(random)
     posterior = pose_posterior(sigma, innovation, np.zeros(8))
     np.testing.assert_allclose(posterior.covariance, sigma, rtol=1e-9, atol=1e-12)
@@ -136,7 +137,7 @@ def test_observations_of_no_weight_change_nothing(seed: int) -> None:
 
 
 def test_a_covariance_that_is_none_is_refused() -> None:
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, *sight(np.random.default_rng(0)))
+    innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(np.random.default_rng(0)))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         pose_posterior(np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -1e-3]), innovation, np.ones(8))
     innovation.jacobian[0, 0, 0] = np.inf
@@ -182,10 +183,10 @@ def test_the_kernel_lowers_the_weight_beyond_its_threshold_only(seed: int, thres
     random = np.random.default_rng(seed)
     world_T_imu, points, pixel = sight(random)
     pixel[::2] += 100.0 * random.normal(size=pixel[::2].shape)
-    innovation = pose_innovation(KITTI.camera, CAM_T_IMU, world_T_imu, points, pixel)
-    sigma, V = covariance_of(random, 1e-4), 2.25
-    weight = robust_weight(innovation, sigma, V, HuberKernel(threshold))
+    kernel, sigma = HuberKernel(threshold), covariance_of(random, 1e-4)
+    innovation = pose_innovation(StereoMeasurement(KITTI.camera, 2.25, kernel), CAM_T_IMU, world_T_imu, points, pixel)
+    weight = kernel.weight(innovation.squared_norms(sigma))
+    R = np.diag([2.25, 2.25, 1.125])
     for r, H, w in zip(innovation.residual, innovation.jacobian, weight, strict=True):
-        whitened = np.sqrt(r @ np.linalg.inv(H @ sigma @ H.T + V * np.eye(4)) @ r)
-        assert w * V == pytest.approx(min(1.0, threshold / whitened), rel=1e-6)
-    np.testing.assert_array_equal(robust_weight(innovation, sigma, V, None), 1.0 / V)
+        whitened = np.sqrt(r @ np.linalg.inv(H @ sigma @ H.T + R) @ r)
+        assert w == pytest.approx(min(1.0, threshold / whitened), rel=1e-6)

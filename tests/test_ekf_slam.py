@@ -142,8 +142,8 @@ def test_a_landmark_without_prior_starts_where_it_is_first_seen_with_what_that_s
     problem = plain_problem(Scene(frames=2, n_points=5, seed=seed).sequence())
     pose = se3.exp(np.random.default_rng(seed).normal(size=6))
     pixel = problem.sequence.observations.pixel[:5]
-    blocks = LandmarkBlocks(problem)
-    blocks.update(pose, np.arange(5), pixel, np.full(5, 4.0))
+    blocks = LandmarkBlocks(problem, problem.measurement)  # V = 0.25 px^2
+    blocks.update(pose, np.arange(5), pixel, np.ones(5))
     in_camera = problem.sequence.camera.triangulate(pixel)
     # The right image's row moves the point a little, since depth and height come from uL, vL, uR only.
     start = se3.transform(pose @ KITTI.imu_T_cam, in_camera)
@@ -201,7 +201,7 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
 
 def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
-    weight = np.full(12, 4.0)
+    weight = np.ones(12)
     assert _loss_as_printed(1e-6 * np.eye(6), innovation, weight) == ""
     # So small beside the noise of the pixels that the gain changes nothing.
     lost = "leaves (I - K H) Sigma as printed with an eigenvalue of -1.0e-12"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.gaps import _right_jacobian, admit_gaps, gaps, wandering
+from fgbaseline.data.gaps import admit_gaps, gaps, wandering
 from fgbaseline.data.motion import Shift
 from fgbaseline.geometry import se3
 
@@ -74,4 +74,4 @@ def test_its_jacobian_is_the_derivative_of_the_motion_however_far_that_goes() ->
         (se3.log(there @ se3.exp(twist + d)) - se3.log(there @ se3.exp(twist - d))) / (2 * step)
         for d in step * np.eye(6)
     ]
-    np.testing.assert_allclose(_right_jacobian(twist), np.column_stack(columns), atol=1e-5)
+    np.testing.assert_allclose(se3.right_jacobian(twist), np.column_stack(columns), atol=1e-5)

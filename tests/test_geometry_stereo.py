@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from fgbaseline.geometry import FloatArray, StereoCamera, disparity, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, StereoMeasurement, disparity, se3
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from .dense_filter import K_s, homogeneous, pi
@@ -64,9 +64,10 @@ class Track:
             self.pixel[wrong] += [9.0, -6.0, 9.0, -6.0]
 
     def whitened(self, point: FloatArray) -> FloatArray:
-        """(6, 4) residuals in sigmas."""
+        """(6, 3) residuals of uL, uR and v in sigmas."""
         seen = CAMERA.project(se3.transform(se3.inverse(self.world_T_cam), point))
-        return (self.pixel - seen) / np.sqrt(self.variance)
+        uL, vL, uR, vR = (self.pixel - seen).T / np.sqrt(self.variance)
+        return np.stack([uL, uR, (vL + vR) / np.sqrt(2.0)], axis=1)
 
     def cost(self, point: FloatArray, huber: float | None) -> float:
         """Huber's loss of the norm of each observation, or the sum of squares."""
@@ -94,7 +95,8 @@ def several(tracks: list[Track], huber: float | None) -> tuple[FloatArray, Float
     row = np.repeat(np.arange(len(tracks)), 6)
     poses, pixel = np.concatenate([t.world_T_cam for t in tracks]), np.concatenate([t.pixel for t in tracks])
     mixed = np.random.default_rng(0).permutation(len(row))
-    found = triangulate_tracks(CAMERA, poses[mixed], row[mixed], pixel[mixed], len(tracks), Track.variance, huber)
+    model = StereoMeasurement(CAMERA, Track.variance, None if huber is None else HuberKernel(huber))
+    found = triangulate_tracks(model, poses[mixed], row[mixed], pixel[mixed], len(tracks))
     return found.position, found.information
 
 
@@ -126,7 +128,7 @@ def test_the_kernel_keeps_one_wrong_match_from_moving_the_point() -> None:
 def test_the_information_is_the_curvature_of_the_cost(seed: int) -> None:
     # Gauss-Newton's matrix equals half the Hessian where the residuals vanish.
     track = Track(seed)
-    track.pixel = track.pixel + (track.whitened(track.point) * -np.sqrt(track.variance))
+    track.pixel = CAMERA.project(se3.transform(se3.inverse(track.world_T_cam), track.point))
     position, information = several([track], None)
     np.testing.assert_allclose(position[0], track.point, rtol=1e-9)
     h = 1e-3
@@ -143,7 +145,8 @@ def test_a_point_without_a_positive_disparity_is_not_determined() -> None:
     flipped = track.pixel[:, [2, 1, 0, 3]]
     row = np.repeat([0, 1], 6)
     poses = np.concatenate([track.world_T_cam] * 2)
-    found = triangulate_tracks(CAMERA, poses, row, np.concatenate([flipped, track.pixel]), 3, Track.variance)
+    model = StereoMeasurement(CAMERA, Track.variance)
+    found = triangulate_tracks(model, poses, row, np.concatenate([flipped, track.pixel]), 3)
     assert np.isnan(found.position[[0, 2]]).all()
     np.testing.assert_allclose(found.position[1], several([track], None)[0][0], rtol=1e-9)
     np.testing.assert_array_equal(found.information[[0, 2]], 0.0)

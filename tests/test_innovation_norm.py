@@ -36,12 +36,12 @@ def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
     three = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, 0.5, 0, 0.5]])
     H, nu = (three @ innovation.jacobian).reshape(-1, 6), (innovation.residual @ three.T).reshape(-1)
     S = H @ sigma @ H.T + 0.25 * np.diag(np.tile([1.0, 1.0, 0.5], 12))
-    assert squared_norm_of_known(innovation, sigma, 0.25) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
+    assert squared_norm_of_known(innovation, sigma) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
 
 
 def test_what_is_no_covariance_has_no_norm() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
-    assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan), 0.25))
+    assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan)))
 
 
 @pytest.mark.parametrize("told", [1.0, 0.5])

@@ -15,8 +15,8 @@ from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
 from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
 from fgbaseline.ekf.screening import Rejection, screened
-from fgbaseline.ekf.stereo_rows import ROW_VARIANCE, back_projected, measured_rows, sight
-from fgbaseline.geometry import FgbaselineError, FloatArray, se3
+from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
 
 from .synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 
@@ -50,16 +50,16 @@ def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: 
     cam_T_imu = se3.inverse(SCENE.imu_T_cam)
 
     def predicted(delta: FloatArray, step: FloatArray) -> FloatArray:
-        return sight(camera, cam_T_imu, T @ se3.exp(delta), homogeneous(charts, xi + step)).predicted
+        return predict(camera, cam_T_imu, T @ se3.exp(delta), homogeneous(charts, xi + step)).pixel
 
     np.testing.assert_allclose(predicted(np.zeros(6), np.zeros(3)), rows, rtol=1e-9)
-    seen = sight(camera, cam_T_imu, T, homogeneous(charts, xi))
+    seen = predict(camera, cam_T_imu, T, homogeneous(charts, xi))
     h = 1e-6
     by_pose = [(predicted(h * e, np.zeros(3)) - predicted(-h * e, np.zeros(3))) / (2 * h) for e in np.eye(6)]
-    np.testing.assert_allclose(seen.by_pose, np.stack(by_pose, axis=2), rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(seen.by_pose(), np.stack(by_pose, axis=2), rtol=1e-5, atol=1e-3)
     unit = np.abs(xi).min() * h
     by_xi = [(predicted(np.zeros(6), unit * e) - predicted(np.zeros(6), -unit * e)) / (2 * unit) for e in np.eye(3)]
-    analytic = seen.by_point @ charts[:, :, :3]
+    analytic = seen.by_point() @ charts[:, :, :3]
     np.testing.assert_allclose(analytic, np.stack(by_xi, axis=2), rtol=1e-4, atol=1e-4 * np.abs(analytic).max())
 
 
@@ -107,10 +107,10 @@ def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: 
     world_T_cam = T @ SCENE.imu_T_cam
     charts = np.tile(chart(coordinates, world_T_cam @ se3.exp(0.1 * random.normal(size=6))), (6, 1, 1))
     xi = coordinates_of(charts, points @ world_T_cam.T)
-    seen = sight(SCENE.camera, se3.inverse(SCENE.imu_T_cam), T, homogeneous(charts, xi))
+    seen = predict(SCENE.camera, se3.inverse(SCENE.imu_T_cam), T, homogeneous(charts, xi))
     nu = moved_by(generators(charts), xi)
-    moved = seen.by_pose @ se3.adjoint(se3.inverse(T)) + seen.by_point @ charts[:, :, :3] @ nu
-    assert np.abs(moved).max() < 1e-9 * np.abs(seen.by_pose).max()
+    moved = seen.by_pose() @ se3.adjoint(se3.inverse(T)) + seen.by_point() @ charts[:, :, :3] @ nu
+    assert np.abs(moved).max() < 1e-9 * np.abs(seen.by_pose()).max()
     # and nu is what the name says
     g = 1e-6 * random.normal(size=6)
     there = coordinates_of(charts, homogeneous(charts, xi) @ se3.exp(g).T)
@@ -401,33 +401,37 @@ def test_on_clean_drives_it_is_nearer_to_the_truth_than_the_filter_with_separate
 WILD, TAME = 1e6, 1.0
 
 
+def measured(kernel: HuberKernel | None) -> StereoMeasurement:
+    return StereoMeasurement(SCENE.camera, 1.0, kernel)
+
+
 @pytest.mark.parametrize(
     ("wild", "tame", "believed"), [(3, 3, True), (4, 3, False), (4, 0, True), (3, 2, False), (0, 6, True)]
 )
 def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
     wild: int, tame: int, believed: bool
 ) -> None:
-    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), None, JointSettings())
+    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings())
     assert verdict.taken.tolist() == [believed] * (wild + tame)
     assert verdict.rejection is (None if believed else Rejection.FRAME)
-    always = screened(np.repeat([WILD, TAME], [wild, tame]), None, JointSettings(disagreeing_share=None))
+    always = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(disagreeing_share=None))
     assert always.plain
 
 
 def test_what_is_no_number_disagrees() -> None:
-    assert screened(np.full(5, np.nan), None, JointSettings()).rejection is Rejection.FRAME
+    assert screened(np.full(5, np.nan), measured(None), JointSettings()).rejection is Rejection.FRAME
 
 
 def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
     at = chi2.ppf(0.99, 3)
-    gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), None, JointSettings(gate=0.99))
+    gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), measured(None), JointSettings(gate=0.99))
     assert gated.taken.tolist() == [True, True, False]
     assert gated.rejection is Rejection.GATE
-    assert screened(np.array([0.0, 0.999 * at]), None, JointSettings(gate=0.99)).rejection is None
-    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), HuberKernel(2.0), JointSettings())
+    assert screened(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
+    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings())
     assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
     assert not weighted.plain
-    assert screened(np.array([0.0, 4.0]), HuberKernel(2.0), JointSettings()).plain
+    assert screened(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).plain
     assert not gated.plain
 
 

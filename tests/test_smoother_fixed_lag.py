@@ -9,6 +9,7 @@ import pytest
 from fgbaseline import smoother
 from fgbaseline.data import HuberKernel, Observations, Status
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.smoother import FixedLagSettings
 from fgbaseline.smoother.factors import Factors
 from fgbaseline.smoother.incremental import ISAM2Settings
@@ -131,7 +132,7 @@ def test_frames_that_see_nothing_are_dead_reckoned() -> None:
 
 
 def window(lag: float = 0.45) -> RestorableLag:
-    return RestorableLag(lag, TIGHT)
+    return RestorableLag(lag, TIGHT, SCENE.camera.baseline)
 
 
 PROBLEM = plain_problem(Scene(frames=12, n_points=6).sequence(), HuberKernel())
@@ -152,7 +153,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values, dict[int, f
     times = {pose_key(k): now}
     for i in np.flatnonzero(o.frame == k):
         key = near_key(int(o.landmark[i]))
-        graph.push_back(FACTORS.stereo(k, key, o.pixel[i]))
+        graph.push_back(FACTORS.stereo(k, key, measured_rows(o.pixel[i])))
         times[key] = now
         if k == 0:
             values.insert(key, truth.landmarks[o.landmark[i]])
@@ -171,7 +172,7 @@ def test_after_a_failure_the_window_is_what_it_was_and_goes_on_as_if_nothing_had
         if k in (3, 8, 9):
             before = everything(troubled)
             graph, values, times = frame(k)
-            graph.push_back(FACTORS.stereo(k, near_key(99), np.array([600.0, 180.0, 590.0, 180.0])))
+            graph.push_back(FACTORS.stereo(k, near_key(99), np.array([600.0, 590.0, 180.0])))
             values.insert(near_key(99), np.array([-500.0, 0.0, 0.0]))
             with pytest.raises(IndeterminateSystemError):
                 troubled.update(graph, values, times | {near_key(99): 0.1 * k})

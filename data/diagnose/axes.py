@@ -15,8 +15,9 @@ LAGS = (-2, -1, 0, 1, 2)
 """frames, tried with every convention so that a delay is not taken for another axis"""
 ENOUGH = 25.0
 """log-likelihood by which a convention must lead for the data to have decided"""
-MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.15, 0.05
-"""rad, m and share: how wrong an honest calibration may be; what it explains is no evidence for another convention"""
+MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.3, 0.05
+"""rad, baselines and share: how wrong an honest calibration may be; what it explains is no evidence for another
+convention"""
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
 MAX_BIAS = 1.0
@@ -70,8 +71,11 @@ def angular_axes(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Ax
     return _decided(scores, best, axes, (IDENTITY,), seen, recorded, known)
 
 
-def linear_axes(seen: FloatArray, recorded: FloatArray, rate: FloatArray, known: BoolArray, angular: str) -> Axes:
-    """The convention of the linear velocity, m/s; `rate` (T-1, 3) is the angular velocity that the cameras see.
+def linear_axes(
+    seen: FloatArray, recorded: FloatArray, rate: FloatArray, known: BoolArray, angular: str, baseline: float
+) -> Axes:
+    """The convention of the linear velocity, m/s; `rate` (T-1, 3) is the angular velocity that the cameras see,
+    `baseline` their distance in m.
 
     A car shows only which axis is forward: its small components are explained as well by a slightly wrong extrinsic.
     An axis therefore counts as seen only where its component is larger than that, and follows the cameras' with a gain
@@ -81,13 +85,14 @@ def linear_axes(seen: FloatArray, recorded: FloatArray, rate: FloatArray, known:
     def design(x: FloatArray, chosen: BoolArray) -> FloatArray:
         return np.concatenate([-so3.hat3(x), so3.hat3(rate[chosen]), x[:, :, None]], axis=2)
 
-    prior = np.array([MISALIGNMENT] * 3 + [LEVER_ARM] * 3 + [SCALE])
+    lever_arm = LEVER_ARM * baseline
+    prior = np.array([MISALIGNMENT] * 3 + [lever_arm] * 3 + [SCALE])
     scores, lags = _scores(seen, recorded, known, design, prior)
     best = max(scores, key=lambda name: scores[name])
     shifted, chosen = _lagged(recorded, known, lags[best])
     turned = shifted[chosen] @ axes_matrix(best).T
-    excited = _excited(seen[chosen], turned, rate[chosen])
-    follows = _follows(seen[chosen], turned, rate[chosen])
+    excited = _excited(seen[chosen], turned, rate[chosen], lever_arm)
+    follows = _follows(seen[chosen], turned, rate[chosen], lever_arm)
     axes = tuple(excited[i] and follows[i] and _lead(scores, best, i) > ENOUGH for i in range(3))
     return _decided(scores, best, axes, (IDENTITY, angular), seen, recorded, known)
 
@@ -125,7 +130,7 @@ def _lead(scores: dict[str, float], best: str, axis: int) -> float:
     return scores[best] - max(score for name, score in scores.items() if name.split(",")[axis] != row)
 
 
-def _excited(seen: FloatArray, x: FloatArray, rate: FloatArray) -> list[bool]:
+def _excited(seen: FloatArray, x: FloatArray, rate: FloatArray, lever_arm: float) -> list[bool]:
     """For each axis, whether its motion is more than honest calibration errors leak in from the others and the rates.
 
     The size of a component is that of what cameras and recording agree on: the noise of neither adds to it.
@@ -133,18 +138,18 @@ def _excited(seen: FloatArray, x: FloatArray, rate: FloatArray) -> list[bool]:
     reach = np.abs(x).max(axis=0)
     power = np.maximum(np.mean(np.clip(seen, -reach, reach) * x, axis=0), 0.0)
     turning = np.median(rate**2, axis=0) / CHI_SQUARE_MEDIAN
-    leak = MISALIGNMENT**2 * (power.sum() - power) + LEVER_ARM**2 * (turning.sum() - turning)
+    leak = MISALIGNMENT**2 * (power.sum() - power) + lever_arm**2 * (turning.sum() - turning)
     return [bool(p > EXCITED**2 * q) for p, q in zip(power, leak, strict=True)]
 
 
-def _follows(seen: FloatArray, x: FloatArray, rate: FloatArray) -> list[bool]:
+def _follows(seen: FloatArray, x: FloatArray, rate: FloatArray, lever_arm: float) -> list[bool]:
     """For each axis, whether the cameras' velocity follows the turned recorded one with a gain near 1."""
     follows = []
     for axis in range(3):
         others = [i for i in range(3) if i != axis]
         # a slightly turned extrinsic leaks the other components in, a wrong lever arm the rates
         columns = np.column_stack([x[:, axis], x[:, others], rate[:, others]])
-        prior = np.array([10.0, MISALIGNMENT, MISALIGNMENT, LEVER_ARM, LEVER_ARM])
+        prior = np.array([10.0, MISALIGNMENT, MISALIGNMENT, lever_arm, lever_arm])
         fit = regress(seen[:, axis, None], columns[:, None, :], prior)
         deviation = float(np.sqrt(fit.covariance[0, 0]))
         follows.append(abs(float(fit.theta[0]) - 1.0) < GAIN_RANGE and deviation < GAIN_DEVIATION)

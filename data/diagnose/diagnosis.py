@@ -105,7 +105,7 @@ def _diagnose(sequence: Sequence, processes: int) -> Diagnosis:
     seen = seen_by_cameras.twist(sequence.dt)
     recorded = held_twist(sequence, Shift.MIDDLE)
     angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
-    linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name)
+    linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.camera.baseline)
     return explained(sequence, seen_by_cameras, angular, linear, copies, processes=processes)
 
 

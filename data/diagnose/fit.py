@@ -1,16 +1,16 @@
 """Noise, bias and calibration errors from bundle adjustments of many short windows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..observations import IntArray
 from ..sequence import Sequence
 from .inflation import Inflation, inflation_of
-from .links import three_rows
 from .odometry import Odometry
 from .window import SHARED_PRIOR, WindowFit, fit_windows_alike
 from .window_terms import SHARED, Sigmas, Window, WindowData
@@ -23,7 +23,10 @@ MAX_UNBROKEN = 24
 MIN_TRACK = 3
 MIN_OBSERVATIONS = 60
 ROUNDS = 6
-START = Sigmas(pixel=1.0, linear=0.2, angular=0.02)
+START = Sigmas(pixel=1.0, linear=0.4, angular=0.02)
+"""px, baselines/s and rad/s"""
+FLOOR = Sigmas(pixel=0.02, linear=2e-4, angular=1e-5)
+"""px, baselines/s and rad/s: no noise is less"""
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
 MIN_REDUNDANCY = 0.05
@@ -76,14 +79,15 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, proce
     windows = _windows(sequence, odometry, twist, _spread(sequence.n_frames))
     if not windows:
         return None
-    sigmas = START
+    baseline = sequence.camera.baseline
+    sigmas = replace(START, linear=START.linear * baseline)
     shared = [np.zeros(SHARED)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
         fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
-        sigmas = _components(fits, sigmas)
+        sigmas = _components(fits, sigmas, baseline)
     shared_mean, deviation = _agreed(fits)
     unbroken = _windows(sequence, odometry, twist, _unbroken(odometry))
     inflation = inflation_of(sequence, unbroken, shared_mean, sigmas, processes)
@@ -149,7 +153,7 @@ def _windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: l
         poses = se3.compose(step[intervals])
         row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
-        data = WindowData(frame, row, three_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        data = WindowData(frame, row, measured_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
         parts.append((data, poses))
         sights.append(chosen)
         views.append((poses @ sequence.imu_T_cam)[frame])
@@ -158,12 +162,13 @@ def _windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: l
     if not parts:
         return []
     pixel, row = o.pixel[np.concatenate(sights)], np.concatenate(rows)
-    points = triangulate_tracks(sequence.camera, np.concatenate(views), row, pixel, before, 1.0, huber=2.5).position
+    unit = StereoMeasurement(sequence.camera, 1.0, HuberKernel())
+    points = triangulate_tracks(unit, np.concatenate(views), row, pixel, before).position
     ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
     return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]
 
 
-def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
+def _components(fits: list[WindowFit], sigmas: Sigmas, baseline: float) -> Sigmas:
     residual = np.concatenate([fit.motion_residual for fit in fits])
     redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
     told = redundancy > MIN_REDUNDANCY
@@ -171,9 +176,9 @@ def _components(fits: list[WindowFit], sigmas: Sigmas) -> Sigmas:
     variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if told.any(axis=0).all() else np.zeros(6)
     pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
     return Sigmas(
-        pixel=max(0.02, sigmas.pixel * float(np.sqrt(pixel))),
-        linear=max(1e-4, float(np.sqrt(variance[:3].mean()))),
-        angular=max(1e-5, float(np.sqrt(variance[3:].mean()))),
+        pixel=max(FLOOR.pixel, sigmas.pixel * float(np.sqrt(pixel))),
+        linear=max(FLOOR.linear * baseline, float(np.sqrt(variance[:3].mean()))),
+        angular=max(FLOOR.angular, float(np.sqrt(variance[3:].mean()))),
     )
 
 

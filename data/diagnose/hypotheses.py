@@ -14,8 +14,6 @@ HYPOTHESES = 48
 """per pair of frames; with half of the links wrong, one of them is right with probability 0.998"""
 TRUNCATION = 16.0
 """of a squared whitened residual of three rows"""
-NEAREST = 0.1
-"""m in front of the camera: a point that comes nearer is behind it for all we know"""
 SEED = 20260
 
 
@@ -128,4 +126,4 @@ def _truncated(camera: StereoCamera, moved: FloatArray, pixel: FloatArray) -> Fl
         squared = (u - pixel[0]) ** 2
         squared += (u - camera.fu * camera.baseline * near - pixel[1]) ** 2
         squared += (v - pixel[2]) ** 2
-        return np.where(depth > NEAREST, np.minimum(squared, TRUNCATION), TRUNCATION)
+        return np.where(depth > camera.min_depth, np.minimum(squared, TRUNCATION), TRUNCATION)

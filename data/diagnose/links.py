@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, disparity
+from fgbaseline.geometry.measurement import measured_rows
 
 from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
@@ -96,10 +97,5 @@ def links_of(sequence: Sequence) -> Links:
         after=after,
         frame=o.frame[before],
         point=sequence.camera.triangulate(o.pixel[before]),
-        pixel=three_rows(o.pixel[after]),
+        pixel=measured_rows(o.pixel[after]),
     )
-
-
-def three_rows(pixel: FloatArray) -> FloatArray:
-    """(..., 3) uL, uR and (vL + vR) / 2 of observations (..., 4)."""
-    return np.stack([pixel[..., 0], pixel[..., 2], 0.5 * (pixel[..., 1] + pixel[..., 3])], axis=-1)

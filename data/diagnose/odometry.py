@@ -15,12 +15,16 @@ from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
 from ..observations import BoolArray, IntArray
 from ..sequence import Sequence
-from .hypotheses import NEAREST, TRUNCATION, best_hypotheses
+from .hypotheses import TRUNCATION, best_hypotheses
 from .links import Links, links_of
 
 MIN_LINKS = 6
 """per pair of frames, for a motion to be told"""
 REFINEMENTS = 12
+SINGULAR_CONDITION = 1e12
+"""of a motion's information in baselines and radians: beyond it the motion is not determined"""
+DAMPING = 1e-9
+"""1/baseline^2 and 1/rad^2, of each step"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,13 +63,14 @@ def odometry(sequence: Sequence) -> Odometry:
     links = links.select(known[links.frame])
     M = best_hypotheses(camera, links, n_pairs, count, known)
     blocks = [_block(camera, links, chosen) for chosen in links.blocks()]
+    damping = DAMPING * np.diag([camera.baseline**-2] * 3 + [1.0] * 3)
     for step in range(REFINEMENTS):
         whitened, squared = _whitened(camera, blocks, M)
         # Geman-McClure, its scale coming down to that of the noise.
         scale = _bulk_sigma(squared) ** 2 * max(9.0, 200.0 * 0.5**step)
         H, gradient = _normal_equations(blocks, whitened, scale / (scale + squared), n_pairs)
         delta = np.zeros((n_pairs, 6))
-        delta[known] = np.linalg.solve(H[known] + 1e-9 * np.eye(6), gradient[known][:, :, None])[:, :, 0]
+        delta[known] = np.linalg.solve(H[known] + damping, gradient[known][:, :, None])[:, :, 0]
         M = M @ se3.exp(delta)
     whitened, squared = _whitened(camera, blocks, M)
     sigma = _bulk_sigma(squared)
@@ -73,7 +78,8 @@ def odometry(sequence: Sequence) -> Odometry:
     H, _ = _normal_equations(blocks, whitened, inlier.astype(np.float64), n_pairs)
     enough = np.bincount(links.frame[inlier], minlength=n_pairs) >= MIN_LINKS
     known &= enough
-    known[known] = np.linalg.cond(H[known]) < 1e12
+    unit = np.repeat([camera.baseline, 1.0], 3)
+    known[known] = np.linalg.cond(H[known] * unit[:, None] * unit) < SINGULAR_CONDITION
     motion, covariance = _of_imu(sequence.imu_T_cam, M, H, sigma, known)
     return Odometry(known, motion, covariance, links, squared / sigma**2, sigma)
 
@@ -138,17 +144,11 @@ def _whitened(camera: StereoCamera, blocks: list[_Block], M: FloatArray) -> tupl
 def _whitened_block(camera: StereoCamera, links: _Block, R: FloatArray, p: FloatArray) -> FloatArray:
     x, y, z = links.point
     moved = R[:, 0] * x + R[:, 1] * y + R[:, 2] * z + p
-    behind = ~(moved[2] > NEAREST)
+    behind = ~(moved[2] > camera.min_depth)
     moved[:, behind] = [[0.0], [0.0], [1.0]]
-    near = 1.0 / moved[2]
-    u, v = moved[0] * near, moved[1] * near
-    along, apart = np.empty((3, 4, len(x))), camera.fu * camera.baseline * near
-    along[0, :3] = camera.fu * near * (R[0] - u * R[2])
-    along[1, :3] = along[0, :3] + apart * near * R[2]
-    along[2, :3] = camera.fv * near * (R[1] - v * R[2])
-    along[0, 3] = links.pixel[0] - (camera.fu * u + camera.cu)
-    along[1, 3] = links.pixel[1] - (camera.fu * u + camera.cu - apart)
-    along[2, 3] = links.pixel[2] - (camera.fv * v + camera.cv)
+    along, seen = np.empty((3, 4, len(x))), camera.rows(moved)
+    along[:, :3] = camera.rows_along(seen, R)
+    along[:, 3] = links.pixel - seen.pixel
     along[:, 3, behind] = 1e6
     whitened = _lowered(_cholesky(_deviations(links, along)), along)
     A = np.empty((3, 7, len(x)))

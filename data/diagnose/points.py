@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import FloatArray, StereoCamera, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..observations import BoolArray, IntArray, Observations
@@ -16,8 +17,6 @@ MOVING = 6.0
 """times the usual error of a piece, from which on its point moved"""
 MOVING_LEAST = 2.0
 """px"""
-HUBER = 2.5
-"""sigmas"""
 UNDETERMINED = 2.0
 """of its distance: the deviation of a point that may as well be behind the camera"""
 
@@ -36,19 +35,18 @@ def judged(sequence: Sequence, world_T_imu: FloatArray, excluded: NDArray[np.uin
     world_T_cam = (world_T_imu @ sequence.imu_T_cam)[o.frame]
     _, row = np.unique(o.landmark, return_inverse=True)
     row = row.astype(np.int64)
-    result = excluded.copy()
-    result[chosen[_moving(sequence.camera, world_T_cam, row, o, sigma)[row]]] = Excluded.MOVING
-    result[chosen[_undetermined(sequence.camera, world_T_cam, row, o, sigma)[row]]] = Excluded.GEOMETRY
+    result, model = excluded.copy(), StereoMeasurement(sequence.camera, sigma**2, HuberKernel())
+    result[chosen[_moving(model, world_T_cam, row, o)[row]]] = Excluded.MOVING
+    result[chosen[_undetermined(model, world_T_cam, row, o)[row]]] = Excluded.GEOMETRY
     return result
 
 
-def _moving(camera: StereoCamera, world_T_cam: FloatArray, row: IntArray, o: Observations, sigma: float) -> BoolArray:
+def _moving(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
     """(m,) landmarks that do not stand still."""
     piece, n_pieces = _pieces(row, o.frame)
-    position = triangulate_tracks(camera, world_T_cam, piece, o.pixel, n_pieces, sigma**2, HUBER).position
-    residual = o.pixel - camera.project(se3.transform(se3.inverse(world_T_cam), position[piece]))
-    v = 0.5 * (residual[:, 1] + residual[:, 3])
-    squared = np.nan_to_num(residual[:, 0] ** 2 + residual[:, 2] ** 2 + v**2)
+    position = triangulate_tracks(model, world_T_cam, piece, o.pixel, n_pieces).position
+    residual = o.pixel - model.camera.project(se3.transform(se3.inverse(world_T_cam), position[piece]))
+    squared = np.nan_to_num((measured_rows(residual) ** 2).sum(axis=1))
     error = np.sqrt(np.bincount(piece, squared) / np.bincount(piece))
     misfit = error > max(MOVING * float(np.median(error)), MOVING_LEAST)
     return np.asarray(np.bincount(row, misfit[piece]) > 0.5 * np.bincount(row), dtype=np.bool_)
@@ -67,11 +65,9 @@ def _pieces(row: IntArray, frame: IntArray) -> tuple[IntArray, int]:
     return first[row] + np.minimum(place * count[row] // length[row], count[row] - 1), int(count.sum())
 
 
-def _undetermined(
-    camera: StereoCamera, world_T_cam: FloatArray, row: IntArray, o: Observations, sigma: float
-) -> BoolArray:
+def _undetermined(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
     """(m,) landmarks whose distance is open, or that lie behind a camera."""
-    position, information = triangulate_tracks(camera, world_T_cam, row, o.pixel, int(row.max()) + 1, sigma**2, HUBER)
+    position, information = triangulate_tracks(model, world_T_cam, row, o.pixel, int(row.max()) + 1)
     depth = se3.transform(se3.inverse(world_T_cam), position[row])[:, 2]
     behind = np.bincount(row, ~(depth > 0.0)) > 0
     distance = np.bincount(row, np.abs(depth)) / np.bincount(row)

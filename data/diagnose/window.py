@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, StereoCamera, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, StereoMeasurement, se3
 
 from .. import forks
 from .window_system import Landmarks, Reduced, around_intervals, landmark_steps, moved_along, reduced, terms_of
@@ -78,11 +78,12 @@ def _fitted(
     iterations: int,
 ) -> list[WindowFit]:
     data, numbers = joined(windows), range(len(windows))
+    model = StereoMeasurement(camera, sigmas.pixel**2, HuberKernel())
     poses, points = (np.concatenate(parts) for parts in list(zip(*windows, strict=True))[1:])
     for step in range(iterations + 1):
-        pixels = pixel_terms(camera, imu_T_cam, data, poses, points, sigmas.pixel, shared)
+        pixels = pixel_terms(model, imu_T_cam, data, poses, points, shared)
         motions = motion_terms(data, poses, sigmas, shared)
-        landmarks, frames = terms_of(data, pixels, motions, sigmas.pixel)
+        landmarks, frames = terms_of(data, pixels, motions, model)
         systems = [reduced(data, i, landmarks, frames, pixels.turn) for i in numbers]
         for system, common in zip(systems, shared, strict=True):
             system.H[-SHARED:, -SHARED:] += SHARED_PRIOR

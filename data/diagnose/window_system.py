@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, StereoMeasurement
 
 from ..observations import IntArray
 from .window_terms import OFFSET, SHARED, Joined, MotionTerms, PixelTerms
 
-DAMPING = 1e-9
-"""1/m^2, on each coordinate of a landmark"""
+DAMPING = 3e-10
+"""1/baseline^2, on each coordinate of a landmark"""
 
 
 class Landmarks(NamedTuple):
@@ -56,8 +56,11 @@ class Reduced(NamedTuple):
     """(6K + 1, 3m) between poses, in world axes, and offset, and landmarks over their factors"""
 
 
-def terms_of(joined: Joined, pixels: PixelTerms, motions: MotionTerms, sigma: float) -> tuple[Landmarks, Frames]:
+def terms_of(
+    joined: Joined, pixels: PixelTerms, motions: MotionTerms, model: StereoMeasurement
+) -> tuple[Landmarks, Frames]:
     """The blocks of all windows, from terms at poses (F, 4, 4)."""
+    sigma = np.sqrt(model.variance)
     n, m, F = len(joined.row), joined.n_points, joined.n_frames
     root = np.sqrt(pixels.weight)
     A, r, arm = pixels.by_point * root, pixels.residual * root, pixels.arm
@@ -66,7 +69,7 @@ def terms_of(joined: Joined, pixels: PixelTerms, motions: MotionTerms, sigma: fl
         information[i, i:] = information[i:, i] = (A[:, i : i + 1] * A[:, i:]).sum(axis=0)
     pull, by_offset = (A * r[:, None]).sum(axis=0), A[1] * (root / sigma)
     by_point = _summed_by_point(np.concatenate([information.reshape(9, n), pull, by_offset]), joined.row, m)
-    factor = _cholesky(by_point[:9].reshape(3, 3, m))
+    factor = _cholesky(by_point[:9].reshape(3, 3, m), DAMPING / model.camera.baseline**2)
     over = _over(factor[:, joined.row], information)
     with_pose = -np.concatenate([over, _crossed(arm, over)]).reshape(18, n)
     landmarks = Landmarks(factor, _over(factor, by_point[9:12]), with_pose, _over(factor, by_point[12:]))
@@ -178,14 +181,14 @@ def _crossed(arm: FloatArray, columns: FloatArray) -> FloatArray:
     return np.stack([a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x])
 
 
-def _cholesky(information: FloatArray) -> FloatArray:
+def _cholesky(information: FloatArray, damping: float) -> FloatArray:
     """(6, m) factors, row after row, of information (3, 3, m) with its damping, below which no pivot can be."""
     (a, b, c), (_, d, e), (_, _, f) = information
-    l00 = np.sqrt(a + DAMPING)
+    l00 = np.sqrt(a + damping)
     l10, l20 = b / l00, c / l00
-    l11 = np.sqrt(np.maximum(d + DAMPING - l10**2, DAMPING))
+    l11 = np.sqrt(np.maximum(d + damping - l10**2, damping))
     l21 = (e - l20 * l10) / l11
-    l22 = np.sqrt(np.maximum(f + DAMPING - l20**2 - l21**2, DAMPING))
+    l22 = np.sqrt(np.maximum(f + damping - l20**2 - l21**2, damping))
     return np.stack([l00, l10, l11, l20, l21, l22])
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, StereoCamera, se3, so3
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3, so3
 
 from ..observations import IntArray
 
@@ -20,10 +20,6 @@ TURN = slice(4, 7)
 """of the shared parameters"""
 OFFSET = 7
 """of the shared parameters"""
-HUBER = 2.5
-"""sigmas of the norm of an observation's three rows"""
-NEAREST = 0.3
-"""m in front of the camera, from which on an observation takes part"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,35 +141,27 @@ class MotionTerms(NamedTuple):
 
 
 def pixel_terms(
-    camera: StereoCamera,
+    model: StereoMeasurement,
     imu_T_cam: FloatArray,
     data: Joined,
     poses: FloatArray,
     points: FloatArray,
-    sigma: float,
     shared: FloatArray,
 ) -> PixelTerms:
-    """At poses (F, 4, 4) and points (m, 3), for a noise of `sigma` px and each window's `shared` parameters (w, 8)."""
+    """At poses (F, 4, 4) and points (m, 3), for each window's `shared` parameters (w, 8)."""
     point = np.take(np.ascontiguousarray(points.T), data.row, axis=1)
     world_T_cam = np.ascontiguousarray(np.moveaxis((poses @ imu_T_cam)[:, :3], 0, 2))
     of_frame = np.take(world_T_cam, data.frame, axis=2)
     axes, seen_from = of_frame[:, :3], of_frame[:, 3]
-    x, y, z = (axes * (point - seen_from)[:, None]).sum(axis=0)
-    front = z > NEAREST
-    x[~front], y[~front], z[~front] = 0.0, 0.0, 1.0
-    near = 1.0 / (sigma * z)
-    u, v, apart = x / z, y / z, camera.fu * camera.baseline / z
-    by_point = np.empty((3, 3, len(x)))
-    by_point[0] = camera.fu * near * (axes[:, 0] - u * axes[:, 2])
-    by_point[1] = by_point[0] + apart * near * axes[:, 2]
-    by_point[2] = np.sqrt(2.0) * camera.fv * near * (axes[:, 1] - v * axes[:, 2])
-    offset = np.repeat(shared[:, OFFSET], [o.stop - o.start for o in data.observations])
-    left = camera.fu * u + camera.cu
-    residual = data.pixel.T - np.stack([left, left - apart + offset, camera.fv * v + camera.cv])
-    residual /= sigma
-    residual[2] *= np.sqrt(2.0)
-    norm = np.sqrt((residual**2).sum(axis=0))
-    weight = np.where(front, HUBER / np.maximum(norm, HUBER), 0.0)
+    q = (axes * (point - seen_from)[:, None]).sum(axis=0)
+    front = q[2] > model.camera.min_depth
+    q[:, ~front] = [[0.0], [0.0], [1.0]]
+    seen, white = model.camera.rows(q), model.white_scale[:, None]
+    by_point = model.camera.rows_along(seen, axes.transpose(1, 0, 2)) * white[:, None]
+    residual = data.pixel.T - seen.pixel
+    residual[1] -= np.repeat(shared[:, OFFSET], [o.stop - o.start for o in data.observations])
+    residual *= white
+    weight = np.where(front, model.weight((residual**2).sum(axis=0)), 0.0)
     arm = point - np.take(np.ascontiguousarray(poses[:, :3, 3].T), data.frame, axis=1)
     return PixelTerms(residual, by_point, arm, weight, poses[:, :3, :3])
 

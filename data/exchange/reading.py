@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera
+from fgbaseline.geometry import FloatArray, HuberKernel, InputError, StereoCamera
 
 from ..formats.fields import extrinsic, positive, time_stamps
 from ..formats.named_file import FilePath, reading, regular_file
 from ..formats.npz_archive import NpzArchive
 from ..observations import IntArray, Observations
-from ..problem import Excluded, HuberKernel, LandmarkPrior, Problem, Reading
+from ..problem import Excluded, LandmarkPrior, Problem, Reading
 from ..sequence import Sequence
 from . import layout
 
