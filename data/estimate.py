@@ -1,13 +1,13 @@
 """What every estimator answers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, se3
 
 from .observations import BoolArray, IntArray
 
@@ -115,6 +115,17 @@ class Estimate:
     """where it was estimated along with the poses"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further answers that the same run gave at no cost, by the name they are registered under"""
+
+    def moved(self, motion: FloatArray) -> "Estimate":
+        """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
+        R, landmarks = motion[:3, :3], self.landmarks
+        covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
+        return replace(
+            self,
+            world_T_imu=motion @ self.world_T_imu,
+            landmarks=Landmarks(landmarks.index, se3.transform(motion, landmarks.position), covariance),
+            by_products={name: other.moved(motion) for name, other in self.by_products.items()},
+        )
 
     @staticmethod
     def failed(name: str, reason: str, n_frames: int, n_observations: int) -> "Estimate":

@@ -14,7 +14,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import predict
+from fgbaseline.geometry.measurement import predict, squared_norm
 
 
 class LandmarkBlocks:
@@ -35,11 +35,14 @@ class LandmarkBlocks:
             root = np.linalg.cholesky(np.linalg.inv(prior.covariance)).T
             self.root_information = np.broadcast_to(root, (m, 3, 3)).copy()
 
-    def update(self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray) -> None:
+    def update(
+        self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray | None = None
+    ) -> None:
         """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
 
-        `weight` (n,) multiplies V^-1 of each observation. Landmarks that are not yet known start at their
-        back-projection, with the information that this one observation gives.
+        `weight` (n,) multiplies V^-1 of each observation; without it the kernel decides, of innovations whitened by
+        H Sigma H^T + V. Landmarks that are not yet known start at their back-projection, with the information that
+        this one observation gives.
         """
         model = self.measurement
         fresh = ~self.known[row]
@@ -49,16 +52,27 @@ class LandmarkBlocks:
             self.known[row[fresh]] = True
         predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
         residual, rows, variance = model.documented_rows(pixel, predicted.pixel)
+        H = predicted.by_point()[:, rows, :3]
+        if weight is None:
+            weight = np.ones(len(row))
+            if model.kernel is not None:
+                weight[~fresh] = model.kernel.weight(self._squared_norms(residual[~fresh], H[~fresh], row[~fresh]))
         whiten = np.sqrt(weight[:, None] / variance)
         # The right-hand side as a fourth column: its first three rows in R are Q^T times it, and Q is never formed.
         r = len(variance)
         stacked = np.zeros((len(row), r + 3, 4))
-        stacked[:, :r, :3] = whiten[:, :, None] * predicted.by_point()[:, rows, :3]
+        stacked[:, :r, :3] = whiten[:, :, None] * H
         stacked[:, :r, 3] = whiten * residual
         stacked[:, r:, :3] = self.root_information[row]
         R: FloatArray = np.asarray(np.linalg.qr(stacked, mode="r"))
         self.mean[row] += _solved(R)
         self.root_information[row] = R[:, :3, :3]
+
+    def _squared_norms(self, residual: FloatArray, H: FloatArray, row: IntArray) -> FloatArray:
+        """(n,) r^T (H Sigma H^T + V)^-1 r of residuals (n, 3) with Jacobians (n, 3, 3) of known landmarks."""
+        half = np.linalg.solve(np.swapaxes(self.root_information[row], 1, 2), np.swapaxes(H, 1, 2))
+        S = np.swapaxes(half, 1, 2) @ half + np.diag(self.measurement.row_variance)
+        return squared_norm(residual, S)
 
     def covariance(self) -> FloatArray:
         """(m, 3, 3) m^2; NaN for landmarks that were never seen."""

@@ -36,12 +36,11 @@ def map_along(
     """The landmarks mapped along given poses (T, 4, 4), and the seconds (T,) each frame took."""
     o = problem.observations()
     rows = problem.feature_row(o.landmark)
-    weight = np.ones(len(o))
     blocks = LandmarkBlocks(problem, problem.mapping_measurement)
     seconds = np.empty(problem.n_frames)
     for k, seen in enumerate(o.by_frame(problem.n_frames)):
         frame_start = time.perf_counter()
-        blocks.update(world_T_imu[k], rows[seen], o.pixel[seen], weight[seen])
+        blocks.update(world_T_imu[k], rows[seen], o.pixel[seen])
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, problem.n_frames)

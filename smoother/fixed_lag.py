@@ -12,6 +12,7 @@ from fgbaseline.data.problem import Problem
 
 from .arrival import GivenUpError, add_recovering
 from .arrivals import Arrivals
+from .convention import from_first_pose
 from .incremental import ISAM2Settings
 from .undone import UNDONE
 from .window import Window
@@ -35,7 +36,8 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     costs `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        return _solve(problem, progress, settings or FixedLagSettings())
+        answer = _solve(from_first_pose(problem), progress, settings or FixedLagSettings())
+        return answer.moved(problem.initial_pose)
 
 
 def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:

@@ -13,7 +13,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from .arrival import GivenUpError
-from .convention import pose_covariances
+from .convention import from_first_pose, pose_covariances
 from .covariances import covariances
 from .incremental import FrameLostError, IncrementalSmoother, ISAM2Settings
 from .journal import IndeterminateSystemError
@@ -33,7 +33,8 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
     `recovered`. `by_products["isam2-online"]` is pose k as known from data up to k.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        return _solve(problem, progress, settings or ISAM2Settings())
+        answer = _solve(from_first_pose(problem), progress, settings or ISAM2Settings())
+        return answer.moved(problem.initial_pose)
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:

@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.observations import BoolArray, Observations
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, StereoCamera
 
 MIN_DISPARITY = 0.05
 """px; a landmark so far away that no step along its ray changes what the camera sees makes a system indeterminate, as
@@ -21,9 +21,13 @@ def undone(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks
 
 def seen_well(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> BoolArray:
     """(n,) whether each observation's landmark is in front of its camera, and not at infinity."""
-    camera = problem.sequence.camera
-    cam_T_world = se3.inverse(world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
+    world_T_cam = (world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
     points = landmarks.position[np.searchsorted(landmarks.index, o.landmark)]
-    depth = se3.transform(cam_T_world, points)[:, 2]
-    well: BoolArray = (depth > camera.min_depth) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
-    return well
+    return in_front(problem.sequence.camera, world_T_cam, points)
+
+
+def in_front(camera: StereoCamera, world_T_cam: FloatArray, points: FloatArray) -> BoolArray:
+    """(n,) whether world points (n, 3) are in front of cameras at poses (n, 4, 4), and not at infinity; NaN is not."""
+    depth = np.einsum("ni,ni->n", world_T_cam[:, :3, 2], points - world_T_cam[:, :3, 3])
+    front: BoolArray = (depth > camera.min_depth) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
+    return front

@@ -9,6 +9,8 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
+from .undone import in_front
+
 START_TOLERANCE = 1e-3
 """of the distance: the last step of a start, which the graph moves further than that; the next would be its square"""
 
@@ -66,19 +68,23 @@ class WaitingLandmarks:
     def enter(self, candidates: list[int], world_T_imu: FloatArray) -> list[Entry]:
         """Those of the candidates that are determined along the poses (T, 4, 4); they wait no more.
 
-        The landmark must be in front of every camera that saw it, and its triangulation, with the poses held, must
-        leave no direction less certain than the rule allows.
+        With the poses held, the triangulated landmark must be in front of every camera that saw it, and no direction
+        may have a larger standard deviation than the rule allows.
         """
         if self._problem.landmark_prior is not None:
             return [self._enter_at_prior(landmark) for landmark in candidates]
         if not candidates:
             return []
-        lengths = [len(self._observed[j]) for j in candidates]
+        lengths = np.array([len(self._observed[j]) for j in candidates])
         index = np.concatenate([self._observed[j] for j in candidates])
         row = np.repeat(np.arange(len(candidates)), lengths)
-        position, deviation = self._triangulate(index, row, len(candidates), world_T_imu)
-        camera = world_T_imu[self._observations.frame[index[np.cumsum(lengths) - 1]], :3, 3]
-        determined = deviation < self._rule.max_relative_deviation * np.linalg.norm(position - camera, axis=1)
+        world_T_cam = world_T_imu[self._observations.frame[index]] @ self._problem.sequence.imu_T_cam
+        position, deviation = self._triangulate(index, row, world_T_cam, len(candidates))
+        front = np.logical_and.reduceat(
+            in_front(self._problem.sequence.camera, world_T_cam, position[row]), np.cumsum(lengths) - lengths
+        )
+        distance = np.linalg.norm(position - world_T_cam[np.cumsum(lengths) - 1, :3, 3], axis=1)
+        determined = front & (deviation < self._rule.max_relative_deviation * distance)
         return [Entry(j, position[i], self._observed.pop(j)) for i, j in enumerate(candidates) if bool(determined[i])]
 
     def _enter_at_prior(self, landmark: int) -> Entry:
@@ -88,18 +94,11 @@ class WaitingLandmarks:
         return Entry(landmark, prior.mean[row], self._observed.pop(landmark))
 
     def _triangulate(
-        self, index: IntArray, row: IntArray, n: int, world_T_imu: FloatArray
+        self, index: IntArray, row: IntArray, world_T_cam: FloatArray, n: int
     ) -> tuple[FloatArray, FloatArray]:
         """Positions (n, 3) and the standard deviation (n,) of the worst-known direction, m; infinite where unknown."""
-        problem, o = self._problem, self._observations
-        points = triangulate_tracks(
-            problem.measurement,
-            world_T_imu[o.frame[index]] @ problem.sequence.imu_T_cam,
-            row,
-            o.pixel[index],
-            n,
-            START_TOLERANCE,
-        )
+        model, pixel = self._problem.measurement, self._observations.pixel[index]
+        points = triangulate_tracks(model, world_T_cam, row, pixel, n, START_TOLERANCE)
         weakest = np.linalg.eigvalsh(points.information)[:, 0]
         finite = np.isfinite(points.position).all(axis=1) & (weakest > 0)
         deviation = np.full(n, np.inf)

@@ -65,6 +65,19 @@ class Scene:
         )
 
 
+def first_frames(s: Sequence, frames: int) -> Sequence:
+    """The recording of the first frames alone."""
+    o, truth = s.observations, s.truth
+    return replace(
+        s,
+        t=s.t[:frames].copy(),
+        linear_velocity=s.linear_velocity[:frames].copy(),
+        angular_velocity=s.angular_velocity[:frames].copy(),
+        observations=o.select(o.frame < frames),
+        truth=None if truth is None else replace(truth, world_T_imu=truth.world_T_imu[:frames]),
+    )
+
+
 def with_pixels(sequence: Sequence, pixel: FloatArray) -> Sequence:
     """The recording with other pixels (n, 4)."""
     o = sequence.observations

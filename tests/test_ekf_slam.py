@@ -15,7 +15,8 @@ from fgbaseline.data.simulate import KITTI
 from fgbaseline.ekf.landmark_update import LandmarkBlocks
 from fgbaseline.ekf.mapping import map_along
 from fgbaseline.ekf.slam import _loss_as_printed
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, se3
+from fgbaseline.geometry.measurement import measured_rows, predict
 
 from .synthetic import Scene, drive, first_innovation, matched, plain_problem, position_errors
 
@@ -223,3 +224,21 @@ def test_a_singular_innovation_is_told_in_words_and_figures() -> None:
         f"the innovation covariance was numerically singular at {frames} of 10 frames, first at frame {frame}: "
         "the printed equations lose positive definiteness there, the form used here does not"
     )
+
+
+@given(st.integers(0, 10_000), st.floats(0.5, 4.0))
+def test_mapping_weighs_an_innovation_by_its_own_covariance(seed: int, threshold: float) -> None:
+    kernel = HuberKernel(threshold)
+    problem = plain_problem(Scene(frames=2, n_points=5, seed=seed).sequence(), kernel)
+    pixel, cam_T_imu = problem.sequence.observations.pixel, se3.inverse(KITTI.imu_T_cam)
+    wrong = pixel[5:] + np.random.default_rng(seed).normal(size=(5, 4)) * 3.0
+    blocks, expected = (LandmarkBlocks(problem, problem.measurement) for _ in range(2))
+    for each in (blocks, expected):
+        each.update(np.eye(4), np.arange(5), pixel[:5])
+    sigma, predicted = blocks.covariance(), predict(KITTI.camera, cam_T_imu, np.eye(4), blocks.mean)
+    H, residual = predicted.by_point()[:, :, :3], measured_rows(wrong) - predicted.pixel
+    S = H @ sigma @ np.swapaxes(H, 1, 2) + 0.25 * np.diag([1.0, 1.0, 0.5])
+    norm = np.sqrt([r @ np.linalg.solve(s, r) for r, s in zip(residual, S, strict=True)])
+    expected.update(np.eye(4), np.arange(5), wrong, np.minimum(1.0, threshold / norm))
+    blocks.update(np.eye(4), np.arange(5), wrong)
+    np.testing.assert_allclose(blocks.mean, expected.mean, rtol=1e-7)

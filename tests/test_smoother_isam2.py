@@ -14,9 +14,10 @@ from fgbaseline.data.track_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.factors import Factors
 from fgbaseline.smoother.keys import landmark_key
+from fgbaseline.smoother.waiting import EntryRule, WaitingLandmarks
 
 from .four_rows import State, cost, information
-from .synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
+from .synthetic import Scene, drive, first_frames, matched, plain_problem, position_errors, with_pixels
 from .test_smoother_factors import graph_of, near_truth, values_of
 
 SCENE = Scene().sequence()
@@ -111,23 +112,13 @@ def test_the_covariances_are_the_dense_inverse_of_the_curvature(name: str) -> No
 
 def truncated(problem: Problem, frames: int) -> Problem:
     """The problem of the first frames alone."""
-    s = problem.sequence
-    o = s.observations
-    assert s.truth is not None
-    sequence = replace(
-        s,
-        t=s.t[:frames].copy(),
-        linear_velocity=s.linear_velocity[:frames].copy(),
-        angular_velocity=s.angular_velocity[:frames].copy(),
-        observations=o.select(o.frame < frames),
-        truth=replace(s.truth, world_T_imu=s.truth.world_T_imu[:frames]),
-    )
+    sequence = first_frames(problem.sequence, frames)
     return replace(
         problem,
         sequence=sequence,
         increment=problem.increment[: frames - 1],
         increment_covariance=problem.increment_covariance[: frames - 1],
-        excluded=problem.excluded[o.frame < frames],
+        excluded=problem.excluded[problem.sequence.observations.frame < frames],
     )
 
 
@@ -292,3 +283,20 @@ def test_the_first_landmarks_that_all_come_at_once_do_not_throw_the_path(seed: i
     told = data.Calibration(noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None)
     estimate = smoother.isam2(data.calibrated(sequence, settings=told))
     assert position_errors(estimate.by_products["isam2-online"], sequence)[2:].max() < 0.12
+
+
+def test_no_landmark_enters_behind_a_camera_that_saw_it() -> None:
+    # Two views of a point ahead and a third whose pose is past it: the least cost in front of two is behind the third.
+    problem = plain_problem(Scene(frames=3, n_points=1, sigma_pixel=0.0).sequence())
+    truth = problem.sequence.truth
+    assert truth is not None
+    assert truth.landmarks is not None
+    waiting = WaitingLandmarks(problem, problem.observations(), EntryRule())
+    for i in range(3):
+        waiting.add(0, i)
+    path = truth.world_T_imu.copy()
+    depth = float((path[0] @ problem.sequence.imu_T_cam)[:3, 2] @ truth.landmarks[0])
+    path[2] = path[0]
+    path[2, :3, 3] += (depth + 3.0) * (path[0] @ problem.sequence.imu_T_cam)[:3, 2]
+    assert waiting.enter([0], path) == []
+    assert len(waiting.enter([0], truth.world_T_imu)) == 1
