@@ -5,7 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from fgbaseline.data import Estimate, Excluded, Problem, Status
+from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import disparity
 
@@ -71,7 +71,8 @@ def trust(
     share = n_used / max(1, int(offered(problem).sum()))
     per_frame = np.bincount(problem.sequence.observations.frame[reference.used], minlength=problem.n_frames)
     weak = float(np.mean(per_frame < limit.weak_below))
-    given_up = len({e.frame for e in reference.events if e.kind == "frame without observations"}) / problem.n_frames
+    lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
+    given_up = len(lost) / problem.n_frames
     model = "as large as the noise model says"
     findings = [
         (_above(pixel, limit.pixel_ratio), f"its pixel residuals are {_times(pixel)} {model}"),
@@ -128,7 +129,7 @@ def _beside_batch(
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
         return Verdict.TRUSTED, f"not compared with a batch solution{why}"
-    if any(event.kind == "one start only" for event in batch.events):
+    if any(event.kind == EventKind.ONE_START for event in batch.events):
         return (
             Verdict.DOUBTFUL,
             "a batch solution was found from one start only: nothing says that it is the lowest",

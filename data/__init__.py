@@ -3,7 +3,7 @@
 from .calibrated import Calibration, NoiseSettings, calibrated
 from .diagnose import Diagnosis, diagnose
 from .documented import documented
-from .estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
+from .estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from .exchange import read_problem, write_problem
 from .formats import (
     attach_truth,
@@ -32,6 +32,7 @@ __all__ = [
     "Diagnosis",
     "Estimate",
     "Event",
+    "EventKind",
     "Excluded",
     "HeldOut",
     "HuberKernel",
