@@ -40,7 +40,8 @@ def rmse_difference(
 ) -> RmseDifference:
     """RMSE of `errors` (n,) less that of `others` (n,), with the interval of a paired moving-block bootstrap.
 
-    Both have to be of the same moments, in order; moments where either is not finite are left out. Each repetition
+    Both have to be of the same moments, in order; moments where either is NaN are left out. Infinite errors count: the
+    difference is then infinite, or NaN and unsettled where both have some. Each repetition
     draws the same blocks of moments for both, so that what makes a stretch hard for both does not blur which is better:
     intervals of the two RMSEs can overlap and the order be clear all the same. The block length is Politis and White's
     for the differences of the squared errors. Raises InputError where they are not of one length.
@@ -49,10 +50,15 @@ def rmse_difference(
     if pair[0].shape != pair[1].shape or pair[0].ndim != 1:
         raise InputError(f"errors at the same moments are needed, got {pair[0].shape} and {pair[1].shape} of them")
     squares: FloatArray = np.stack(pair, axis=1) ** 2
-    squares = squares[np.isfinite(squares).all(axis=1)]
+    squares = squares[~np.isnan(squares).any(axis=1)]
     n = len(squares)
     if n == 0:
         return RmseDifference(np.nan, np.nan, np.nan, 1, False)
+    infinite = np.isinf(squares)
+    if infinite.any():
+        first, second = np.sqrt(squares.mean(axis=0))
+        value = float("nan") if infinite.any(axis=0).all() else float(first - second)
+        return RmseDifference(value, np.nan, np.nan, 1, False)
     found = block_length(squares[:, 0] - squares[:, 1])
     block = max(found.length, -(-n // MOST_BLOCKS))
     drawn = np.sqrt(draw_blocks(n, block, repetitions, seed).sums(squares) / n)

@@ -11,6 +11,7 @@ import pandas as pd
 from fgbaseline.geometry import FloatArray
 
 from ..job import MARK
+from ..schema_base import INFINITE
 from .job import Planned
 from .store import Store
 from .work import COSTS
@@ -158,4 +159,6 @@ def _at(estimator: Mapping[str, Any], path: tuple[str, ...]) -> float:
     value: Any = estimator
     for key in path:
         value = value.get(key) if isinstance(value, Mapping) else None
+    if value is None and estimator["notes"].get(".".join(path)) == INFINITE:
+        return float("inf")
     return float(value) if isinstance(value, int | float) else float("nan")

@@ -13,7 +13,7 @@ def claimed_said(comparison: Comparison) -> list[str]:
         claimed = result.claimed
         if claimed is None:
             continue
-        known = claimed.nees[np.isfinite(claimed.nees)]
+        known = claimed.nees[~np.isnan(claimed.nees)]
         if len(known):
             mean = float(np.mean(known))
             sentences.append(

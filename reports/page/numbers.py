@@ -1,14 +1,17 @@
-"""Numbers as a person reads them: three significant digits, a dash for what is not one."""
+"""Numbers as a person reads them: three significant digits, a dash for what is not one, ∞ for an infinite one."""
 
 from collections.abc import Iterable
-from math import isfinite
+from math import isfinite, isinf
 
 DASH = "–"
+INFINITY = "∞"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def number(value: object) -> str:
-    """A number to three significant digits (whole from 1000 on, counts in full), or a dash for None and NaN."""
+    """A number to three significant digits (whole from 1000 on, counts in full), ∞, or a dash for None and NaN."""
+    if isinstance(value, float) and isinf(value):
+        return INFINITY if value > 0 else f"\N{MINUS SIGN}{INFINITY}"
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         return DASH
     if isinstance(value, int):

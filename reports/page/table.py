@@ -8,8 +8,9 @@ from typing import Any
 
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
+from fgbaseline.reports.schema_base import INFINITE
 
-from .numbers import DASH, number
+from .numbers import DASH, INFINITY, number
 from .verdict import by_products
 
 
@@ -58,7 +59,9 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A figure as text, whether it is the best of its column, and the mark of the note that says why it is missing."""
+    """A figure as text, whether it is the best of its column, and the mark of the note on it.
+
+    The note says why the figure is missing, or what it leaves out."""
 
     text: str
     best: bool = False
@@ -111,10 +114,13 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
         value = values[c][name]
         if c.group == REFERENCE and name == run.reference:
             return Cell("reference" if opens[c] or c is columns[0] else "", opens_group=opens[c])
+        why = _why_absent(estimators[name], c) if value is None else _left_out(estimators[name], c)
+        if why == INFINITE:
+            return Cell(INFINITY, opens_group=opens[c])
+        mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
         if value is None:
-            mark = notes.setdefault(_why_absent(estimators[name], c), chr(ord("a") + len(notes) % 26))
             return Cell(DASH, note=mark, opens_group=opens[c])
-        return Cell(number(float(value) * c.scale), best=value == best[c], opens_group=opens[c])
+        return Cell(number(float(value) * c.scale), best=value == best[c], note=mark, opens_group=opens[c])
 
     rows = [
         Row(
@@ -139,6 +145,13 @@ def _why_absent(estimator: Mapping[str, Any], column: Column) -> str:
     """What the summary's notes say of a missing value, by its own key or that of what it belongs to."""
     notes: Mapping[str, str] = estimator.get("notes") or {}
     return notes.get(".".join(column.path)) or notes.get(column.path[0]) or column.absent
+
+
+def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
+    """How many errors a figure leaves out since they are missing; empty where it leaves out none."""
+    part = estimator.get(column.path[0])
+    missing = part.get("missing", 0) if isinstance(part, Mapping) else 0
+    return f"{number(missing)} errors are missing (NaN) and left out" if missing else ""
 
 
 def _best(run: Run, column: Column, values: Mapping[str, float | int | None]) -> float | int | None:
