@@ -49,9 +49,9 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
 
     `rank`; `runs` that have an answer; `mean`, `low`, `high`; and, paired run by run with the best one, `behind`,
     `behind_low` and `behind_high`: how much larger the error is on average, over the runs that both answered. `tied`
-    where that interval holds zero: these runs cannot tell the two apart; over one run there is no interval, and nobody
-    but the first is. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have failed
-    where it was hard.
+    where that interval does not lie above zero: these runs do not separate the two, and neither does a single one,
+    which has no interval. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have
+    failed where it was hard.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
@@ -62,7 +62,8 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
         with np.errstate(invalid="ignore"):
             apart = np.where(values[name] == values[order[0]], 0.0, values[name] - values[order[0]])
         behind = mean_of(apart)
-        tied = rank == 1 or behind.low <= 0.0 <= behind.high
+        infinite = behind.value == np.inf and behind.n > 1
+        tied = rank == 1 or not (behind.low > 0.0 or infinite)
         mean = means[name]
         rows.append((rank, mean.n, mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
     return pd.DataFrame(rows, columns=columns, index=pd.Index(order, name="estimator"))

@@ -1,5 +1,6 @@
-"""Which of two estimates is nearer, and whether this recording can tell: both drawn with the same blocks."""
+"""Which of several estimates is nearer, and whether the recording settles it: all drawn with the same blocks."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,3 +67,35 @@ def rmse_difference(
     first, second = np.sqrt(squares.mean(axis=0))
     reliable = n / block >= FEWEST_BLOCKS and found.correlation_ends
     return RmseDifference(float(first - second), float(low), float(high), block, reliable)
+
+
+@dataclass(frozen=True, slots=True)
+class PairedRanking:
+    """Several estimates over the same moments, the smallest RMSE first."""
+
+    rmse: Mapping[str, float]
+    """in rising order"""
+    behind: Mapping[str, RmseDifference]
+    """of all but the first: its RMSE less that of the first; value >= 0 where both are finite"""
+    moments: int
+    """at which all of them have an error"""
+
+
+def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedRanking:
+    """Ranks errors (n,) at the same n moments by their RMSE over those at which none of them is NaN.
+
+    `behind` says for each whether it is settled that the first one is smaller: see `rmse_difference`. Raises InputError
+    where they are not of one length.
+    """
+    columns = {name: np.asarray(e, dtype=np.float64) for name, e in errors.items()}
+    if len({column.shape for column in columns.values()}) > 1:
+        raise InputError("errors at the same moments are needed, got some of different lengths")
+    everywhere = ~np.any([np.isnan(column) for column in columns.values()], axis=0)
+    common = {name: column[everywhere] for name, column in columns.items()} if columns else {}
+    if not any(len(column) for column in common.values()):
+        return PairedRanking({}, {}, 0)
+    rmse = {name: float(np.sqrt(np.mean(column**2))) for name, column in common.items()}
+    order = sorted(rmse, key=lambda name: rmse[name])
+    first = common[order[0]]
+    behind = {name: rmse_difference(common[name], first, seed=seed) for name in order[1:]}
+    return PairedRanking({name: rmse[name] for name in order}, behind, int(np.sum(everywhere)))

@@ -83,6 +83,12 @@ class Results:
         return list(self.planned[0].job.estimators)
 
     @property
+    def references(self) -> dict[str, str]:
+        """The reference of each case, where all its runs have the same."""
+        of_case = {str(case): set(names) for case, names in self.runs.groupby("case")["reference"]}
+        return {case: str(*names) for case, names in of_case.items() if len(names) == 1}
+
+    @property
     def reference(self) -> str | None:
         """The reference of all runs that did not fail; None where they have different ones, or there are none."""
         names = {str(summary["reference"]["name"]) for summary in self.summaries.values()}

@@ -10,10 +10,10 @@ from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.reprojections import WRONG
 from fgbaseline.reports.figures.view import TopView
 
+from .accuracy_verdict import compared
 from .charts import charts
 from .departure import departure, far
 from .packing import flags, floats, integers, pixels, small_integers
-from .verdict import compared
 
 REASONS = {
     Excluded.FEATURE_NOT_CHOSEN: "not among the features asked for",

@@ -10,8 +10,8 @@ from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
 from fgbaseline.reports.schema_base import INFINITE
 
+from .accuracy_verdict import unranked
 from .numbers import DASH, INFINITY, number
-from .verdict import by_products
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ class Table:
 def main_table(run: Run, estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     """The table of `estimators` of `summary.json`: columns that no estimator of the run has are left out.
 
-    What belongs to the reference's own run is near to it by nature and is not called best.
+    What belongs to the reference's own run or graph is near to it by nature and is not called best.
     """
     return table_of(run, estimators, COLUMNS)
 
@@ -108,6 +108,7 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
     columns = [c for c in columns if c.group != REFERENCE or len(answered) > 1]
     opens = {c: i > 0 and columns[i - 1].group != c.group for i, c in enumerate(columns)}
     best = {c: _best(run, c, values[c]) for c in columns}
+    best_text = {c: None if value is None else number(float(value) * c.scale) for c, value in best.items()}
     notes: dict[str, str] = {}
 
     def cell(name: str, c: Column) -> Cell:
@@ -120,7 +121,8 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
         mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
         if value is None:
             return Cell(DASH, note=mark, opens_group=opens[c])
-        return Cell(number(float(value) * c.scale), best=value == best[c], note=mark, opens_group=opens[c])
+        text = number(float(value) * c.scale)
+        return Cell(text, best=text == best_text[c], note=mark, opens_group=opens[c])
 
     rows = [
         Row(
@@ -157,7 +159,7 @@ def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
 def _best(run: Run, column: Column, values: Mapping[str, float | int | None]) -> float | int | None:
     known = {name: value for name, value in values.items() if value is not None}
     if column.group == REFERENCE:
-        near_by_nature = {run.reference, *by_products(run)}
+        near_by_nature = {run.reference, *unranked(run)}
         known = {name: value for name, value in known.items() if name not in near_by_nature}
     if column.best == 0 or len(known) < 2:
         return None
