@@ -148,7 +148,7 @@ def test_overconfidence_is_told_as_a_ratio_of_errors() -> None:
     nees = run.results["ekf"].nees
     assert nees is not None
     mean = float(np.nanmean(nees))
-    assert f"{number(np.sqrt(mean / 6))} times for ekf (NEES {number(mean)})" in told(run, "True errors against")
+    assert f"{number(np.sqrt(mean / 6))} for ekf (NEES {number(mean)})" in told(run, "Normalized error RMS")
 
 
 def test_a_path_with_holes_is_said_to_have_them() -> None:

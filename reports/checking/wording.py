@@ -1,6 +1,7 @@
 """A check in words and in cells that every form of output shares."""
 
 from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.data.plural import plural
 
 from .line import NEW, Checked, Line
 
@@ -52,7 +53,9 @@ def remarks(checked: Checked) -> list[str]:
     several = len(checked.measured.runs) > 1
     said = []
     for line in checked.lines:
-        left_out = f"{line.missing:,} errors are missing (NaN) and left out" if line.missing else ""
+        left_out = (
+            f"{plural(line.missing, 'error is', 'errors are')} missing (NaN) and left out" if line.missing else ""
+        )
         reasons = [reason for reason in (line.reason, left_out) if reason not in ("", NEW)]
         if reasons:
             name = f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..page.numbers import listed, number
+from ..page.numbers import counted, listed, number
 from .comparison import Comparison
 
 
@@ -17,8 +17,8 @@ def claimed_said(comparison: Comparison) -> list[str]:
         if len(known):
             mean = float(np.mean(known))
             sentences.append(
-                f"{result.name}'s errors are {number(float(np.sqrt(mean / 6.0)))} times as large as its covariances "
-                f"say (mean NEES {number(mean)} over {number(len(known))} poses, 6 being expected)."
+                f"Normalized error RMS of {result.name} by its covariances: {number(float(np.sqrt(mean / 6.0)))}, "
+                f"1 being expected (mean NEES {number(mean)} over {counted(len(known), 'pose')}, 6 being expected)."
             )
         if claimed.not_positive_definite:
             sentences.append(

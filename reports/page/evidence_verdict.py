@@ -9,7 +9,7 @@ from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.evidence import frames_in_words
 
 from .accuracy_verdict import same_graph
-from .numbers import listed, number
+from .numbers import counted, listed, number
 
 MOST_FRAMES = 80
 """letters of a list of frames, from which on only the first are told"""
@@ -26,12 +26,12 @@ def held_out_sentences(run: Run) -> list[str]:
     if errors is not None and (left_out := list(same_graph(run) & set(ranking.index))):
         ranking = held_out_ranking(replace(errors, error=errors.error.drop(columns=left_out)))
     if len(ranking) == 0 or errors is None:
-        return [f"{number(held.n_tracks)} tracks were held out, but none of them is left to judge a path by."]
+        return [f"{counted(held.n_tracks, 'track was', 'tracks were')} held out; none is left to judge by."]
     names = [str(name) for name in ranking.index]
     medians = dict(zip(names, ranking["median"].tolist(), strict=True))
     sentence = (
-        f"On {number(errors.inliers)} pieces of held-out tracks, which no estimator saw, {names[0]} errs "
-        f"by {number(medians[names[0]])} px in the median"
+        f"On {counted(errors.inliers, 'piece')} of held-out tracks, which no estimator saw, "
+        f"{names[0]} errs by {number(medians[names[0]])} px in the median"
     )
     if len(names) > 1:
         sentence += ", " + listed(f"{name} by {number(medians[name])} px" for name in names[1:])
@@ -53,7 +53,8 @@ def covariance_sentences(run: Run) -> list[str]:
             if len(where) > MOST_FRAMES:
                 where = f"first {bad[0]}, last {bad[-1]}"
             sentences.append(
-                f"{result.name} gives {number(len(bad))} pose covariances that are not positive definite (frames "
+                f"{result.name} gives {counted(len(bad), 'pose covariance that is', 'pose covariances that are')} not "
+                f"positive definite ({'frame' if len(bad) == 1 else 'frames'} "
                 f"{where}); what is said of its consistency leaves them out."
             )
     return sentences

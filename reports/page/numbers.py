@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from math import isfinite, isinf
 
+from fgbaseline.data.plural import noun
+
 DASH = "–"
 INFINITY = "∞"
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -26,6 +28,11 @@ def number(value: object) -> str:
     mantissa, exponent = f"{value:.2e}".split("e")
     raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa} × 10{raised}".replace("-", "\N{MINUS SIGN}")
+
+
+def counted(n: int, one: str, many: str = "") -> str:
+    """A count and its noun: `one` for 1, else `many`, by default `one` with an s."""
+    return f"{number(n)} {noun(n, one, many)}"
 
 
 def per_cent(share: float) -> str:

@@ -11,7 +11,7 @@ from fgbaseline.reports.figures import colours
 from fgbaseline.reports.schema_base import INFINITE
 
 from .accuracy_verdict import unranked
-from .numbers import DASH, INFINITY, number
+from .numbers import DASH, INFINITY, counted, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
     """How many errors a figure leaves out since they are missing; empty where it leaves out none."""
     part = estimator.get(column.path[0])
     missing = part.get("missing", 0) if isinstance(part, Mapping) else 0
-    return f"{number(missing)} errors are missing (NaN) and left out" if missing else ""
+    return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
 
 
 def _best(run: Run, column: Column, values: Mapping[str, float | int | None]) -> float | int | None:

@@ -12,7 +12,7 @@ from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 from .accuracy_verdict import by_products, compared, divergence_rmse, nearest_sentences, truth_sentences
 from .departure import AROUND, departure, far, wrong_seconds, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
-from .numbers import listed, number, per_cent
+from .numbers import counted, listed, number, per_cent
 
 
 def verdict(run: Run) -> list[str]:
@@ -91,15 +91,12 @@ def _consistency(run: Run) -> list[str]:
     if not known:
         return []
     each = (
-        f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} times for {name} (NEES {number(value)})"
+        f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} for {name} (NEES {number(value)})"
         for name, value in sorted(
             known.items(), key=lambda item: abs(np.log(max(item[1], 1e-300) / DEGREES_OF_FREEDOM))
         )
     )
-    return [
-        f"True errors against those the covariances claim: {listed(each)}; {DEGREES_OF_FREEDOM} is the NEES of a "
-        "filter that knows its errors."
-    ]
+    return [f"Normalized error RMS, the root of the mean NEES / {DEGREES_OF_FREEDOM} (expected 1): {listed(each)}."]
 
 
 def _common_observations(run: Run) -> list[str]:
@@ -116,7 +113,8 @@ def _common_observations(run: Run) -> list[str]:
     ranked = sorted(medians, key=lambda name: medians[name])
     each = listed(f"{number(medians[name])} px for {name}" for name in ranked)
     return [
-        f"Over the {number(len(common))} observations that all of them used, the median reprojection error is {each}."
+        f"Over the {counted(len(common), 'observation')} that all of them used, the median reprojection error is "
+        f"{each}."
     ]
 
 
