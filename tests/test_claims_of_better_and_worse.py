@@ -100,6 +100,9 @@ def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None
     d = compare.rmse_difference(np.full(100, 0.003984), np.full(100, 0.003976))
     assert d.settled
     assert not claimed(d, 0.003984, 0.003976)
+    errors = {"isam2": np.full(FRAMES, 0.003984), "ekf": np.full(FRAMES, 0.003976)}
+    said = truth_sentences(run_with(errors, errors))
+    assert said[1:] == ["The errors of ekf and isam2 agree to the digits printed: not ranked."]
 
 
 def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> None:

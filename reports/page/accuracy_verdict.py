@@ -84,7 +84,8 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
     smaller = [name for name in found.rmse if name != reference and found.rmse[name] < own]
     pairs = {name: rmse_difference(*_common(errors, (reference, name), found)) for name in smaller}
     better = [name for name in smaller if claimed(pairs[name], own, found.rmse[name])]
-    open_ = [name for name in smaller if name not in better]
+    equal = [name for name in smaller if number(found.rmse[name]) == number(own)]
+    unsettled = [name for name in smaller if name not in (*better, *equal)]
     over = _over(run, found)
     sentences = []
     if better:
@@ -94,10 +95,12 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
             f"The reference is worse than {than} here, by paired bootstrap of the RMSE{over}: {reference} has "
             f"{number(own)} m, so divergence from it does not measure accuracy on this recording{rough}."
         )
-    if open_:
+    if unsettled:
         sentences.append(
-            f"This recording does not settle whether {listed(open_)} or {reference} has the smaller error{over}."
+            f"This recording does not settle whether {listed(unsettled)} or {reference} has the smaller error{over}."
         )
+    if equal:
+        sentences.append(f"The errors of {listed([*equal, reference])} agree to the digits printed{over}: not ranked.")
     return sentences
 
 
@@ -143,7 +146,12 @@ def _nearest(run: Run, rivals: dict[str, Result], found: PairedRanking) -> str:
         text = f"{first} is {away(first)} from {run.reference} ({along}), " + listed(
             f"{name} {away(name)}" for name in level
         )
-        text += f"; this recording does not settle whether {first} is nearer than {listed(level)}"
+        equal = [name for name in level if number(found.rmse[name]) == number(found.rmse[first])]
+        unsettled = [name for name in level if name not in equal]
+        if unsettled:
+            text += f"; this recording does not settle whether {first} is nearer than {listed(unsettled)}"
+        if equal:
+            text += f"; {listed([first, *equal])} agree to the digits printed"
     else:
         text = f"Nearest to {run.reference} is {first}, {away(first)} away ({along})"
     if farther:
