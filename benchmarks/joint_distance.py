@@ -99,7 +99,7 @@ def shown(sequence: Sequence, found: Iterator[Step]) -> Table:
     for step in found:
         apart = compare.divergence_summary(compare.divergence(step.estimate, step.online))
         beyond = compare.divergence_summary(compare.divergence(step.estimate, step.final))
-        given_up = sum(event.kind == "frame disagrees" for event in step.estimate.events)
+        given_up = sum(event.kind == data.EventKind.FRAME_DISAGREES for event in step.estimate.events)
         table.add_row(
             step.name,
             step.group,

@@ -71,7 +71,7 @@ def rmse(estimate: Estimate, batch: Estimate) -> float:
 
 def two_starts(batch: Estimate) -> str:
     """What batch says of its two starts."""
-    told = {"both starts end at the same cost": "same", "starts end at different costs": "differ"}
+    told = {data.EventKind.SAME_COST: "same", data.EventKind.DIFFERENT_COSTS: "differ"}
     return next((told[event.kind] for event in batch.events if event.kind in told), "one only")
 
 

@@ -14,7 +14,7 @@ from .interpolation import interpolated
 from .maps import map_by_depth, map_difference
 from .moved import moved_points
 from .over_runs import Consistency, consistency_of, mean_of, nees_over_runs, ranking
-from .paired import RmseDifference, rmse_difference
+from .paired import PairedRanking, RmseDifference, paired_ranking, rmse_difference
 from .pairs import Unit, pose_pairs
 from .pose_difference import Difference, absolute_difference, motion_difference
 from .relative import matched_pairs, relative_errors
@@ -47,6 +47,7 @@ __all__ = [
     "HeldOutErrors",
     "Matched",
     "NisSummary",
+    "PairedRanking",
     "Passing",
     "RmseDifference",
     "SegmentErrors",
@@ -88,6 +89,7 @@ __all__ = [
     "nees_table",
     "nis_per_degree",
     "nis_summary",
+    "paired_ranking",
     "pose_errors",
     "pose_pairs",
     "ranking",

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
 from .best_rotation import best_rotation, best_turn
@@ -76,7 +77,7 @@ class Alignment:
         """What was done, for under a table: 'SE(3)-aligned over all 120 poses'."""
         said = _SAID[self.kind]
         if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
-            said += f" over {'all' if self.n == self.of else 'the first'} {self.n} poses"
+            said += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
         if self.kind is Align.SIM3:
             said += f" (scale {self.scale:.6g})"
         if self.free:

@@ -7,6 +7,7 @@ import numpy as np
 
 from fgbaseline.data import Trajectory
 from fgbaseline.data.observations import IntArray
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
 
 from .alignment import Align, Alignment, align
@@ -60,7 +61,9 @@ class Matched:
         )
         shifted = f", {self.estimate.name} {self.offset:+.4g} s" if self.offset else ""
         left = f"left out: {self.left_out_reference} of the reference, {self.left_out_estimate} of the estimate"
-        return f"{len(self)} poses paired ({how} {self.tolerance:.3g} s{shifted}; {left}); {self.alignment.caption}"
+        stamps = f"{how} {self.tolerance:.3g} s" if self.reference.stamped else "by their number"
+        paired = f"{plural(len(self), 'pose')} paired ({stamps}{shifted}; {left})"
+        return f"{paired}; {self.alignment.caption}"
 
     def aligned(
         self, kind: Align | str, *, first: int | None = None, up: FloatArray | tuple[float, ...] = (0.0, 0.0, 1.0)

@@ -8,6 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from .block_draws import BlockDraws, draw_blocks
 from .block_length import block_length
+from .statistics import known, mean, quantile
 
 REPETITIONS = 1000
 CONFIDENCE = 0.95
@@ -29,35 +30,37 @@ def error_statistics(
     seed: int = 0,
     block: int | None = None,
 ) -> pd.DataFrame:
-    """`value`, `low`, `high` of each statistic of the finite errors (n,), which follow each other in time.
+    """`value`, `low`, `high` of each statistic of the errors (n,), NaN aside, which follow each other in time.
 
     Rows: rmse, mean, median, std, p95, min, max, sse (sum of squares) and n. `low` and `high` are percentiles over
     `repetitions` series put together from random blocks of the errors, so that their correlation in time counts; NaN
     for min, max, sse and n. `block` is by default the longer of Politis and White's for the errors and their squares,
     and no less than n / MOST_BLOCKS. The table's `attrs` have `block`, `blocks` (how many fit into the series),
     `confidence` and `reliable`: whether there are FEWEST_BLOCKS of them and the correlation ends within the series,
-    which that of an error that grows with the path does not. All NaN where there is no error. Raises
+    which that of an error that grows with the path does not; `missing`, how many errors are NaN. Infinite errors count,
+    and leave no interval. All NaN where there is no error. Raises
     InputError for a confidence outside (0, 1), fewer than 1 repetition, or a block that is not between 1 and n.
     """
     if not 0.0 < confidence < 1.0 or repetitions < 1:
         raise InputError(f"bootstrap: expected 0 < confidence < 1 and repetitions, got {confidence!r}, {repetitions!r}")
-    e = np.asarray(errors, dtype=np.float64)
-    e = e[np.isfinite(e)]
+    e = known(errors)
     n = len(e)
+    finite = bool(np.isfinite(e).all())
     if block is not None and not 1 <= block <= max(n, 1):
         raise InputError(f"bootstrap: a block of {block} does not fit into {n} errors")
-    found = [block_length(e), block_length(e**2)] if n else []
+    found = [block_length(e), block_length(e**2)] if n and finite else []
     length = block or max([1, -(-n // MOST_BLOCKS), *(one.length for one in found)])
     values = {**_of_series(e), "n": n}
     table = pd.DataFrame({"value": values, "low": np.nan, "high": np.nan}).rename_axis("statistic")
-    if n > 1:
+    if n > 1 and finite:
         drawn = _of_draws(e, draw_blocks(n, length, repetitions, seed))
         table.loc[list(OF_SERIES), ["low", "high"]] = tails(drawn, confidence).T
     table.attrs = {
         "block": length,
         "blocks": n / length,
         "confidence": confidence,
-        "reliable": n / length >= FEWEST_BLOCKS and all(one.correlation_ends for one in found),
+        "reliable": finite and n / length >= FEWEST_BLOCKS and all(one.correlation_ends for one in found),
+        "missing": int(np.size(np.asarray(errors)) - n),
     }
     return table
 
@@ -70,8 +73,9 @@ def tails(drawn: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
 def _of_series(e: FloatArray) -> dict[str, float]:
     if len(e) == 0:
         return dict.fromkeys((*OF_SERIES, *WITHOUT_INTERVAL), float("nan"))
-    median, p95 = np.percentile(e, [50.0, 95.0])
-    figures = (np.sqrt(np.mean(e**2)), e.mean(), median, e.std(), p95, e.min(), e.max(), e @ e)
+    spread = e.std() if np.isfinite(e).all() else np.inf
+    median, p95 = quantile(e, 0.5), quantile(e, 0.95)
+    figures = (np.sqrt(np.mean(e**2)), mean(e), median, spread, p95, e.min(), e.max(), np.sum(e**2))
     return dict(zip((*OF_SERIES, *WITHOUT_INTERVAL), map(float, figures), strict=True))
 
 

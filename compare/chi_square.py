@@ -32,8 +32,8 @@ def probability_beyond(value: FloatArray, degrees: FloatArray | float) -> FloatA
 
 
 def share_inside(values: FloatArray, degrees: FloatArray | float, probability: float = PROBABILITY) -> float:
-    """Which share of the finite values (n,) lies inside the bounds of a single one; NaN where there is none."""
+    """Which share of the values (n,), without NaN, lies inside the bounds of a single one; NaN where there is none."""
     low, high = (np.broadcast_to(limit, values.shape) for limit in bounds(degrees, 1, probability))
-    known = np.isfinite(values)
+    known = ~np.isnan(values)
     inside = (values[known] >= low[known]) & (values[known] <= high[known])
     return float(inside.mean()) if known.any() else float("nan")

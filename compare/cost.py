@@ -21,7 +21,7 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
         return float("nan")
     squared = problem.measurement.loss(pixel_squares(problem, table[list(ROWS)].to_numpy()))
     return 0.5 * float(
-        squared.sum() + motion_squares(problem, estimate).sum() + _prior_squares(problem, estimate, taken)
+        squared.sum() + motion_squares(problem, estimate).sum() + prior_squares(problem, estimate, taken)
     )
 
 
@@ -42,7 +42,8 @@ def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:
     return se3.log(se3.inverse(se3.exp(problem.increment)) @ se3.relative(estimate.world_T_imu))
 
 
-def _prior_squares(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
+def prior_squares(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
+    """Sum of the whitened squares of the priors of the landmarks that the observations `taken` (n,) see."""
     prior = problem.landmark_prior
     if prior is None:
         return 0.0

@@ -25,7 +25,7 @@ class DifferenceShares:
     noise: float
     """the rest: all that is neither, tilt and random walk among it"""
     scale_percent: float
-    """by how much the estimate is too large, %"""
+    """100 times the coefficient s of the fit, %: not by how much the path is longer"""
     heading_deg: float
     """the fitted constant error of heading, deg, to the left positive"""
     heading_deg_per_s: float

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.geometry import InputError
 
 from .association import Matched
+from .statistics import summarised
 from .trajectory import pose_errors
 
 PARTS = 10
@@ -41,8 +42,6 @@ def growth_by_part(table: pd.DataFrame, parts: int = PARTS) -> pd.DataFrame:
     position = table["position"].to_numpy()
     frames = last - first
     frames[-1] += 1
-    squares = np.concatenate([[0.0], np.cumsum(np.nan_to_num(position) ** 2)])
-    known = np.concatenate([[0], np.cumsum(np.isfinite(position))])
     end = np.append(first[1:], len(travelled))
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = position[last] - position[first]
@@ -51,7 +50,7 @@ def growth_by_part(table: pd.DataFrame, parts: int = PARTS) -> pd.DataFrame:
                 "from_m": edges[:-1],
                 "to_m": edges[1:],
                 "frames": frames,
-                "rmse": np.sqrt((squares[end] - squares[first]) / (known[end] - known[first])),
+                "rmse": [summarised(position[a:b])["rmse"] for a, b in zip(first, end, strict=True)],
                 "per_metre": grown / (travelled[last] - travelled[first]),
                 "per_frame": grown / (last - first),
                 "heading_deg": table["heading_deg"].to_numpy()[last],

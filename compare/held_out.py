@@ -127,7 +127,7 @@ def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
     drawn = _drawn_medians(values, np.floor(errors.table["start"].to_numpy() / BLOCK).astype(np.int64))
     low, high = np.percentile(drawn, [2.5, 97.5], axis=0, method="nearest")
     with np.errstate(invalid="ignore"):
-        behind = np.nan_to_num(drawn - drawn[:, [best]], nan=np.inf)
+        behind = np.where(drawn == drawn[:, [best]], 0.0, drawn - drawn[:, [best]])  # two infinite medians are a tie
     behind_low, behind_high = np.percentile(behind, [2.5, 97.5], axis=0, method="nearest")
     table = pd.DataFrame(
         {

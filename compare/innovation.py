@@ -33,9 +33,9 @@ def nis_per_degree(estimate: Estimate) -> FloatArray:
 
 
 def nis_summary(estimate: Estimate) -> NisSummary:
-    """All frames in which the filter recorded a finite NIS, at least one landmark being known before."""
+    """All frames in which the filter recorded a NIS, be it infinite, at least one landmark being known before."""
     recorded = estimate.innovations
-    known = np.isfinite(nis_per_degree(estimate))
+    known = ~np.isnan(nis_per_degree(estimate))
     if recorded is None or not known.any():
         nan = float("nan")
         return NisSummary(nan, nan, nan, nan, 0)

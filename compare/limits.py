@@ -13,7 +13,7 @@ class Outcome(StrEnum):
 
     HOLDS = "holds"
     CANNOT_TELL = "cannot tell"
-    """there is a figure, but nothing that it can be held against"""
+    """there is no figure (NaN), or nothing that it can be held against"""
     FALLS_SHORT = "falls short"
 
 
@@ -38,8 +38,10 @@ class Bounds:
         return min(value - self.at_least, self.at_most - value)
 
     def judge(self, value: float | None) -> Outcome:
-        """HOLDS for a finite value within, bounds included; what is no finite number never does."""
-        held = value is not None and math.isfinite(value) and self.at_least <= value <= self.at_most
+        """HOLDS for a finite value within, bounds included; an infinite one never does, of NaN nothing is known."""
+        if value is None or math.isnan(value):
+            return Outcome.CANNOT_TELL
+        held = math.isfinite(value) and self.at_least <= value <= self.at_most
         return Outcome.HOLDS if held else Outcome.FALLS_SHORT
 
 

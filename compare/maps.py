@@ -17,7 +17,7 @@ DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
-    """One row per `landmark` that both have, at a finite place, and some frame with both poses sees:
+    """One row per `landmark` that both have, at a place that is not NaN, and some frame with both poses sees:
 
     `distance` in the world as it is, m, with whatever drift the paths have; `seen` the distance of the two points as
     the two cameras see them, each in its own camera frame at the sight nearest to the reference's camera, m, which has
@@ -28,13 +28,14 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
     """
     index, mine, its = np.intersect1d(estimate.landmarks.index, reference.landmarks.index, return_indices=True)
     frame = _nearest_sight(sequence, estimate, reference)[index]
-    known = (frame >= 0) & np.isfinite(estimate.landmarks.position[mine]).all(axis=1)
+    known = (frame >= 0) & ~np.isnan(estimate.landmarks.position[mine]).any(axis=1)
     index, mine, its, frame = index[known], mine[known], its[known], frame[known]
     p, q = estimate.landmarks.position[mine], reference.landmarks.position[its]
-    p_cam, q_cam = (
-        se3.transform(se3.inverse(e.world_T_imu[frame] @ sequence.imu_T_cam), x)
-        for e, x in ((estimate, p), (reference, q))
-    )
+    with np.errstate(invalid="ignore"):  # a landmark at infinity
+        p_cam, q_cam = (
+            se3.transform(se3.inverse(e.world_T_imu[frame] @ sequence.imu_T_cam), x)
+            for e, x in ((estimate, p), (reference, q))
+        )
     sigmas, left_out = np.full(len(index), np.nan), np.zeros(len(index), dtype=np.bool_)
     if estimate.landmarks.covariance is not None and reference.landmarks.covariance is not None:
         P, Q = estimate.landmarks.covariance[mine], reference.landmarks.covariance[its]
@@ -48,7 +49,7 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
         {
             "landmark": index,
             "distance": np.linalg.norm(p - q, axis=1),
-            "seen": np.linalg.norm(p_cam - q_cam, axis=1),
+            "seen": np.where(np.isinf(p).any(axis=1), np.inf, np.linalg.norm(p_cam - q_cam, axis=1)),
             "depth": q_cam[:, 2],
             "sigmas": sigmas,
             "left_out": left_out,

@@ -25,18 +25,21 @@ class Mean(NamedTuple):
     low: float
     high: float
     n: int
-    """finite values it rests on"""
+    """values it rests on"""
 
 
 def mean_of(values: FloatArray) -> Mean:
-    """The mean over runs of the finite values (n,), with x +- t s / sqrt(n), t of n - 1 degrees of freedom."""
-    known = values[np.isfinite(values)]
+    """The mean over runs of values (n,), with x +- t s / sqrt(n), t of n - 1 degrees of freedom; NaN is left out.
+
+    An infinite value makes the mean infinite, without an interval.
+    """
+    known = values[~np.isnan(values)]
     n = len(known)
     if n == 0:
         return Mean(np.nan, np.nan, np.nan, 0)
     mean = float(np.mean(known))
-    if n == 1:
-        return Mean(mean, np.nan, np.nan, 1)
+    if n == 1 or not np.isfinite(known).all():
+        return Mean(mean, np.nan, np.nan, n)
     half = float(stdtrit(n - 1, 0.5 + PROBABILITY / 2.0)) * float(np.std(known, ddof=1)) / np.sqrt(n)
     return Mean(mean, mean - half, mean + half, n)
 
@@ -46,9 +49,9 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
 
     `rank`; `runs` that have an answer; `mean`, `low`, `high`; and, paired run by run with the best one, `behind`,
     `behind_low` and `behind_high`: how much larger the error is on average, over the runs that both answered. `tied`
-    where that interval holds zero: these runs cannot tell the two apart; over one run there is no interval, and nobody
-    but the first is. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have failed
-    where it was hard.
+    where that interval does not lie above zero: these runs do not separate the two, and neither does a single one,
+    which has no interval. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have
+    failed where it was hard.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
@@ -56,8 +59,11 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
     order = sorted((name for name in values if means[name].n), key=lambda name: (-means[name].n, means[name].value))
     rows = []
     for rank, name in enumerate(order, 1):
-        behind = mean_of(values[name] - values[order[0]])
-        tied = rank == 1 or behind.low <= 0.0 <= behind.high
+        with np.errstate(invalid="ignore"):
+            apart = np.where(values[name] == values[order[0]], 0.0, values[name] - values[order[0]])
+        behind = mean_of(apart)
+        infinite = behind.value == np.inf and behind.n > 1
+        tied = rank == 1 or not (behind.low > 0.0 or infinite)
         mean = means[name]
         rows.append((rank, mean.n, mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
     return pd.DataFrame(rows, columns=columns, index=pd.Index(order, name="estimator"))
@@ -69,7 +75,7 @@ def nees_over_runs(columns: Sequence[FloatArray]) -> pd.DataFrame:
     values = np.full((len(columns), frames), np.nan)
     for row, column in zip(values, columns, strict=True):
         row[: len(column)] = column
-    n = np.isfinite(values).sum(axis=0)
+    n = (~np.isnan(values)).sum(axis=0)
     total = np.nansum(values, axis=0)
     some = np.maximum(n, 1)
     low, high = bounds(float(POSE_DEGREES), some)
@@ -95,7 +101,7 @@ class Consistency(NamedTuple):
 
 def consistency_of(columns: Sequence[FloatArray]) -> Consistency:
     """The consistency of an estimator over runs with NEES (T,) each; NaN where none has any."""
-    known = [values for values in columns if np.isfinite(values).any()]
+    known = [values for values in columns if not np.isnan(values).all()]
     table = nees_over_runs(known)
     table = table[table["runs"] == len(known)] if known else table
     if len(table) == 0:

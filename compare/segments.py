@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.data.observations import IntArray
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
 
 from .association import Matched
@@ -61,7 +62,9 @@ class SegmentErrors:
         whose = "KITTI's lengths" if self.official else "lengths fitted to the path, not KITTI's"
         shortest, longest = min(self.lengths), max(self.lengths)
         every = "pose" if self.step == 1 else f"{self.step} poses"
-        return f"{len(self.table)} segments of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"
+        return (
+            f"{plural(len(self.table), 'segment')} of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"
+        )
 
 
 def segment_errors(

@@ -26,7 +26,7 @@ class DifferenceNees:
     @property
     def left_out(self) -> BoolArray:
         """(T,) comparable frames in which P - P_ref is not positive definite."""
-        return np.asarray(self.comparable & ~np.isfinite(self.nees), dtype=np.bool_)
+        return np.asarray(self.comparable & np.isnan(self.nees), dtype=np.bool_)
 
 
 def difference_nees(estimate: Estimate, reference: Estimate) -> DifferenceNees:

@@ -5,12 +5,17 @@ from enum import IntEnum
 
 import numpy as np
 
-from fgbaseline.data import Estimate, Excluded, Problem, Status
+from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import disparity
 
-from .cost import cost, motion_squares, pixel_squares
-from .reprojection import ROWS, reprojection
+from .cost import cost
+from .noise_scale import motion_scale, pixel_scale
+
+FAR_POINT = 1.0
+"""px of disparity"""
+NOTABLE = 0.05
+"""share of impossible observations from which on it is reported"""
 
 
 class Verdict(IntEnum):
@@ -33,12 +38,12 @@ class Trust:
 class TrustLimits:
     """Where a finding turns doubtful, and where untrusted."""
 
-    pixel_ratio: tuple[float, float] = (2.0, 4.0)
-    """mean whitened squared residual of an observation over its expectation"""
-    motion_ratio: tuple[float, float] = (2.0, 6.0)
-    """the same of the motion increments"""
+    pixel_scale: tuple[float, float] = (1.6, 3.0)
+    """pixel noise that explains the residuals over that of the model: see `pixel_scale`"""
+    motion_scale: tuple[float, float] = (1.4, 2.4)
+    """the same of the motion increments: see `motion_scale`"""
     used_share: tuple[float, float] = (0.6, 0.3)
-    """of the observations with a usable disparity"""
+    """of the `offered` observations"""
     weak_frames: tuple[float, float] = (0.05, 0.25)
     """share of frames with fewer than `weak_below` used observations"""
     weak_below: int = 6
@@ -50,6 +55,8 @@ class TrustLimits:
     """share by which its cost is above that of the batch solution"""
     batch_position: tuple[float, float] = (0.05, 1.0)
     """m, RMSE of its positions from those of the batch solution"""
+    impossible_share: tuple[float, float] = (0.2, 0.5)
+    """of the `offered` observations: those without a positive disparity"""
 
 
 def trust(
@@ -57,9 +64,7 @@ def trust(
 ) -> Trust:
     """The verdict on an estimate, from whitened residuals, the share of observations used, weak frames and `batch`.
 
-    Under the problem's own noise model a whitened squared residual of three rows is 3 on average, less the share that
-    the estimated landmarks absorb, and one of an increment at most 6. Kernel-weighted, so that the residuals are those
-    the optimum saw.
+    Residuals are held against the problem's own noise model: see `pixel_scale` and `motion_scale`.
     """
     if reference.status is Status.FAILED:
         return Trust(Verdict.UNTRUSTED, (f"it failed: {reference.reason}",))
@@ -67,20 +72,27 @@ def trust(
     n_used = int(reference.used.sum())
     if n_used == 0:
         return Trust(Verdict.UNTRUSTED, ("it used no observation",))
-    pixel, motion = pixel_ratio(problem, reference), motion_ratio(problem, reference)
-    share = n_used / max(1, int(offered(problem).sum()))
+    pixel, motion = pixel_scale(problem, reference), motion_scale(problem, reference)
+    counted = offered(problem)
+    n_offered = max(1, int(counted.sum()))
+    share = int((reference.used & counted).sum()) / n_offered
+    impossible = int((counted & ~possible(problem)).sum()) / n_offered
     per_frame = np.bincount(problem.sequence.observations.frame[reference.used], minlength=problem.n_frames)
     weak = float(np.mean(per_frame < limit.weak_below))
-    given_up = len({e.frame for e in reference.events if e.kind == "frame without observations"}) / problem.n_frames
-    model = "as large as the noise model says"
+    lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
+    given_up = len(lost) / problem.n_frames
+    robust = "" if problem.kernel is None else ", robust"
     findings = [
-        (_above(pixel, limit.pixel_ratio), f"its pixel residuals are {_times(pixel)} {model}"),
-        (_above(motion, limit.motion_ratio), f"its departures from the measured motion are {_times(motion)} {model}"),
-        (_below(share, limit.used_share), f"it used {share:.0%} of the observations with a disparity above 1 px"),
+        (_above(pixel, limit.pixel_scale), f"normalized pixel residual RMS {_figure(pixel)} (expected 1{robust})"),
+        (_above(motion, limit.motion_scale), f"normalized motion residual RMS {_figure(motion)} (expected at most 1)"),
+        (_below(share, limit.used_share), f"it used {share:.0%} of the observations, far points aside"),
         (_above(weak, limit.weak_frames), f"{weak:.1%} of the frames have fewer than {limit.weak_below} observations"),
         (_above(given_up, limit.given_up_frames), f"the observations of {given_up:.1%} of the frames were given up"),
     ]
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
+    if impossible > NOTABLE:
+        text = f"{impossible:.0%} of the observations have no positive disparity, which no point in view can have"
+        findings.append((_above(impossible, limit.impossible_share), text))
     if untied:
         share = untied / (problem.n_frames - 1)
         text = (
@@ -96,29 +108,17 @@ def trust(
 
 
 def offered(problem: Problem) -> BoolArray:
-    """(n,) the observations a problem could have used: of the wanted features, with a disparity above 1 px."""
-    usable = disparity(problem.sequence.observations.pixel) > 1.0
-    return np.asarray(usable & (problem.excluded != Excluded.FEATURE_NOT_CHOSEN), dtype=np.bool_)
+    """(n,) the observations that an estimator is expected to use: all of the problem, and those of the wanted features
+    that it excludes, but for far points: a disparity above 0 and of at most 1 px is possible and says little of the
+    depth. What is impossible (no positive disparity) is counted."""
+    d = disparity(problem.sequence.observations.pixel)
+    wanted = problem.excluded != Excluded.FEATURE_NOT_CHOSEN
+    return np.asarray(problem.mask | (wanted & ~((d > 0.0) & (d <= FAR_POINT))), dtype=np.bool_)
 
 
-def pixel_ratio(problem: Problem, estimate: Estimate) -> float:
-    """Mean over the used observations of the whitened, kernel-weighted squared residual, over its expectation.
-
-    Expected are 3 (n - m) / n for n observations of m landmarks without a prior, and 3 with one.
-    """
-    table = reprojection(problem.sequence, estimate)
-    squared = pixel_squares(problem, table.loc[table["used"], list(ROWS)].to_numpy())
-    if problem.kernel is not None:
-        norm = np.sqrt(np.maximum(squared, problem.kernel.threshold**2))
-        squared = squared * problem.kernel.threshold / norm
-    n = len(squared)
-    absorbed = 0 if problem.landmark_prior is not None else len(estimate.landmarks)
-    return float(squared.sum() / max(1.0, 3.0 * (n - absorbed)))
-
-
-def motion_ratio(problem: Problem, estimate: Estimate) -> float:
-    """Mean over the increments of the whitened squared residual of the estimated motion, over 6."""
-    return float(np.mean(motion_squares(problem, estimate)) / 6.0)
+def possible(problem: Problem) -> BoolArray:
+    """(n,) whether an observation has a positive disparity, as every point in front of the cameras has."""
+    return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 
 def _beside_batch(
@@ -128,7 +128,7 @@ def _beside_batch(
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
         return Verdict.TRUSTED, f"not compared with a batch solution{why}"
-    if any(event.kind == "one start only" for event in batch.events):
+    if any(event.kind == EventKind.ONE_START for event in batch.events):
         return (
             Verdict.DOUBTFUL,
             "a batch solution was found from one start only: nothing says that it is the lowest",
@@ -152,5 +152,5 @@ def _below(value: float, limits: tuple[float, float]) -> Verdict:
     return Verdict(int(not value >= limits[0]) + int(not value >= limits[1]))
 
 
-def _times(variance_ratio: float) -> str:
-    return f"{np.sqrt(variance_ratio):.2g} times"
+def _figure(value: float) -> str:
+    return f"{value:.2g}"

@@ -29,6 +29,7 @@ def track_chi_square(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
     The landmark takes three away; what the poses take is neglected, which makes the residuals of a good estimate a
     little too small. Uniform probabilities say that the noise is white, Gaussian and of the size assumed.
     """
+    table = table[table["error"].notna()]
     squared = np.sum(whitened_rows(problem, table) ** 2, axis=1)
     groups = table.assign(squared=squared).groupby("landmark")["squared"]
     result = pd.DataFrame({"n": groups.size(), "squared": groups.sum()})
@@ -45,6 +46,7 @@ def whitened_summary(problem: Problem, table: pd.DataFrame) -> dict[str, float |
     `spread_*` in sigmas, sqrt(1 - m / n) being expected of m landmarks and n observations.
     """
     rows = judged(problem, table)
+    rows = rows[rows["error"].notna()]
     tracks = track_chi_square(problem, rows)
     degrees = float(tracks["degrees"].sum())
     white = whitened_rows(problem, rows)

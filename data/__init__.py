@@ -5,7 +5,7 @@ from fgbaseline.geometry import HuberKernel
 from .calibrated import Calibration, NoiseSettings, calibrated
 from .diagnose import Diagnosis, diagnose
 from .documented import documented
-from .estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
+from .estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from .exchange import read_problem, write_problem
 from .formats import (
     attach_truth,
@@ -34,6 +34,7 @@ __all__ = [
     "Diagnosis",
     "Estimate",
     "Event",
+    "EventKind",
     "Excluded",
     "HeldOut",
     "HuberKernel",

@@ -12,6 +12,7 @@ from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of
 from .documented import most_observed
 from .gaps import admit_gaps
 from .motion import Shift, dead_reckoned_path, increments
+from .plural import plural
 from .problem import Excluded, Problem
 from .repairs import Repairs
 from .sequence import Sequence
@@ -111,8 +112,8 @@ def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Pr
         return problem
     linear, angular = (np.sqrt(np.mean(found.deviation[found.blind, part] ** 2)) for part in (slice(3), slice(3, 6)))
     remark = (
-        f"over {len(found.blind)} intervals that the cameras do not see, velocities are averaged over neighbours: "
-        f"their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
+        f"over {plural(len(found.blind), 'interval')} that the cameras do not see, velocities are averaged over "
+        f"neighbours: their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
     )
     return replace(
         problem,

@@ -6,6 +6,7 @@ from fgbaseline.geometry import FloatArray, InputError, disparity
 
 from .motion import Shift, back_project, dead_reckoned_path, increments
 from .observations import IntArray, Observations
+from .plural import plural
 from .problem import Excluded, LandmarkPrior, Problem, Reading
 from .sequence import Sequence
 
@@ -37,7 +38,10 @@ def documented(
     if np.any(at_infinity & (excluded == Excluded.NO)):
         excluded[at_infinity & (excluded == Excluded.NO)] = Excluded.DISPARITY
         n = int(np.sum(excluded == Excluded.DISPARITY))
-        remarks.append(f"{n} observations have a disparity of exactly zero: left out, having no back-projection")
+        remarks.append(
+            f"{plural(n, 'observation has', 'observations have')} a disparity of exactly zero: left out, having no "
+            "back-projection"
+        )
         chosen = np.unique(o.landmark[excluded == Excluded.NO])
     mean = average_back_projections(sequence, dead_reckoned_path(step), chosen, excluded == Excluded.NO)
     return Problem(

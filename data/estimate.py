@@ -29,13 +29,47 @@ class Status(StrEnum):
     FAILED = "failed"
 
 
+class EventKind(StrEnum):
+    """Kinds of events that the estimators of this package report; the values are the text in files and tables."""
+
+    LANDMARK_DROPPED = "landmark dropped"
+    """it violated cheirality or made the system indeterminate, and was removed from the graph"""
+    LANDMARK_NEVER_DETERMINED = "landmark never determined"
+    FRAME_WITHOUT_OBSERVATIONS = "frame without observations"
+    """the observations of a frame left the system indeterminate and were removed; weighs on the reference's trust"""
+    SOLVED_BY_QR = "solved by QR"
+    RELINEARIZATION_FAILED = "final relinearisation failed"
+    NO_COVARIANCES = "no covariances"
+    DESCENT_FAILED = "descent failed"
+    """Levenberg-Marquardt ended with an exception from one of its starts"""
+    ONE_START = "one start only"
+    """a minimum that no second start confirms; weighs on the reference's trust"""
+    SAME_COST = "both starts end at the same cost"
+    DIFFERENT_COSTS = "starts end at different costs"
+    SINGULAR_INNOVATION = "innovation covariance singular"
+    COVARIANCE_LOST = "covariance lost"
+    """the covariance of a filter's state was no longer positive definite"""
+    GYROSCOPE_BIAS = "gyroscope bias"
+    """a result: the bias that was estimated along with the poses"""
+    BEHIND_CAMERA = "behind the camera"
+    """observations rejected since their landmark violates cheirality"""
+    OUTSIDE_GATE = "outside the gate"
+    """observations rejected by a chi-square gate"""
+    FRAME_DISAGREES = "frame disagrees"
+    """all observations of a frame rejected, since most of them are beyond a chi-square quantile"""
+    ENTRY_PUT_OFF = "entry put off"
+    """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
+    STATE_FULL = "state full"
+    """observations of landmarks that the state has no room for"""
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth telling a person: where, what and why."""
+    """What happened in an estimator: where, what and why."""
 
     frame: int
-    kind: str
-    """short and countable, such as 'landmark dropped'"""
+    kind: EventKind | str
+    """short and countable; any text of an estimator's own is counted and listed, and weighs on nothing"""
     reason: str
     landmark: int | None = None
 

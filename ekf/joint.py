@@ -5,13 +5,12 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, GyroBias, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Landmarks, Progress, Status
 from fgbaseline.data.problem import Problem
 
 from .joint_filter import JointFilter
 from .joint_settings import JointSettings
 from .joint_state import BIAS, POSE
-from .screening import Rejection
 
 BIAS_BLOCK = slice(POSE, POSE + BIAS)
 
@@ -80,16 +79,16 @@ def _told(bias: GyroBias) -> list[Event]:
     k = int(answered[-1])
     found = zip(bias.mean[k], np.sqrt(np.diagonal(bias.covariance[k])), strict=True)
     text = ", ".join(f"{mean:+.4f} ± {deviation:.4f}" for mean, deviation in found)
-    return [Event(k, "gyroscope bias", f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
+    return [Event(k, EventKind.GYROSCOPE_BIAS, f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
 
 
 def _verdict(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:
     if failure:
         return Status.FAILED, failure
     trouble = {
-        Rejection.FRAME: "most observations disagreed with the prediction, which took no part",
-        Rejection.SINGULAR: "the joint covariance was no longer positive definite",
-        Rejection.FULL: f"the state was full: {joint.waited} observations were not used",
+        EventKind.FRAME_DISAGREES: "most observations disagreed with the prediction, which took no part",
+        EventKind.COVARIANCE_LOST: "the joint covariance was no longer positive definite",
+        EventKind.STATE_FULL: f"the state was full: {joint.waited} observations were not used",
     }
     told = []
     for kind, what in trouble.items():

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.estimate import Event, Innovations
+from fgbaseline.data.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
@@ -15,12 +15,11 @@ from .joint_settings import JointSettings, Linearisation
 from .joint_state import ABSENT, POSE, JointState
 from .joint_update import Factor, Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from .landmark_chart import Coordinates, chart, coordinates_of, homogeneous
-from .screening import Rejection, screened
+from .screening import screened
 
 MIN_COSINE = 0.05
 """of the angle between the optical axis and the ray to a landmark: beyond it (87 degrees) it counts as behind the
 camera; at its plane the Jacobian is without bound"""
-UNDETERMINED = "landmark never determined"
 
 
 class _Seen(NamedTuple):
@@ -84,7 +83,7 @@ class JointFilter:
             if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
                 wanted &= self.measured[index, 0] > self.measured[index, 1]
             if (wanted != new).any():
-                self._reject(k, Rejection.ENTRY, ~wanted[new])
+                self._reject(k, EventKind.ENTRY_PUT_OFF, ~wanted[new])
             enters = self._admitted(k, index, wanted)
             if enters.any():
                 self._enter_at_first_sight(index[enters])
@@ -101,7 +100,7 @@ class JointFilter:
         waiting = wanted & ~enters
         self.waited += int(np.count_nonzero(waiting))
         self.turned_away[self.row[index[waiting]]] = True
-        self._reject(k, Rejection.FULL, waiting)
+        self._reject(k, EventKind.STATE_FULL, waiting)
         return enters
 
     def _predict(self, k: int) -> None:
@@ -132,18 +131,19 @@ class JointFilter:
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.taken)
             if not verdict.taken.any():
-                return verdict.rejection is not Rejection.FRAME
+                return verdict.rejection is not EventKind.FRAME_DISAGREES
         try:
             if factor is None or not verdict.plain:
                 innovation = innovation.select(verdict.taken)
                 factor = innovation.factorised(self.row_variance / verdict.weight[verdict.taken, None])
             self._apply(correct(innovation, factor, state.P))
         except NotPositiveDefiniteError:
-            self._reject(k, Rejection.SINGULAR, verdict.taken)
+            self._reject(k, EventKind.COVARIANCE_LOST, verdict.taken)
             return False
         self.used[seen.observed[verdict.taken]] = True
         if not state.P.diagonal().min() >= 0.0:
-            self.events.append(Event(k, Rejection.SINGULAR, "P - W^T W has a negative variance after the update"))
+            negative = "P - W^T W has a negative variance after the update"
+            self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
 
     def _as_expected(self, k: int, innovation: Innovation) -> Factor | None:
@@ -169,7 +169,7 @@ class JointFilter:
         front = seen.cosine > MIN_COSINE
         if front.all():
             return seen
-        self._reject(k, Rejection.BEHIND, ~front)
+        self._reject(k, EventKind.BEHIND_CAMERA, ~front)
         return _Seen(seen.observed[front], seen.H.select(front), seen.residual[front], seen.cosine[front])
 
     def _apply(self, delta: FloatArray) -> None:
@@ -235,8 +235,9 @@ class JointFilter:
         self.state.leave(leaving)
 
     def _undetermined(self, k: int, row: IntArray, why: str) -> None:
-        self.events.extend(Event(k, UNDETERMINED, why, j) for j in self.problem.features[row].tolist())
+        kind = EventKind.LANDMARK_NEVER_DETERMINED
+        self.events.extend(Event(k, kind, why, j) for j in self.problem.features[row].tolist())
 
-    def _reject(self, k: int, why: Rejection, rejected: BoolArray) -> None:
+    def _reject(self, k: int, why: EventKind, rejected: BoolArray) -> None:
         n = int(np.count_nonzero(rejected))
         self.events.append(Event(k, why, f"{n} of {len(rejected)} observations take no part"))

@@ -1,12 +1,12 @@
 """Which of a frame's observations the joint filter believes, and how much."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cache
 
 import numpy as np
 from scipy.special import chdtri
 
+from fgbaseline.data.estimate import EventKind
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement
 from fgbaseline.geometry.measurement import ROWS
@@ -20,19 +20,6 @@ MIN_VOTES = 5
 """observations below which a frame has no majority"""
 
 
-class Rejection(StrEnum):
-    """Why observations that the problem offers take no part: the kinds of the filter's events."""
-
-    BEHIND = "behind the camera"
-    GATE = "outside the gate"
-    FRAME = "frame disagrees"
-    SINGULAR = "covariance lost"
-    ENTRY = "entry put off"
-    """the first sight of a landmark: in a frame that is not believed, or at infinity in world coordinates"""
-    FULL = "state full"
-    """of landmarks that wait outside until others have left"""
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Screened:
     """The verdict on n observations."""
@@ -41,7 +28,7 @@ class Screened:
     """(n,)"""
     weight: FloatArray
     """(n,) the kernel's, by which the inverse of each one's noise is multiplied"""
-    rejection: Rejection | None = None
+    rejection: EventKind | None = None
     """why the others are not taken"""
 
     @property
@@ -61,10 +48,10 @@ def screened(squared_norm: FloatArray, measurement: StereoMeasurement, settings:
     if settings.disagreeing_share is not None and n >= MIN_VOTES:
         disagreeing = np.count_nonzero(~(squared_norm <= quantile(DISAGREEMENT)))
         if disagreeing > settings.disagreeing_share * n:
-            return Screened(np.zeros(n, dtype=np.bool_), weight, Rejection.FRAME)
+            return Screened(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
     if settings.gate is not None:
         taken = squared_norm <= quantile(settings.gate)
-        return Screened(taken, weight, None if taken.all() else Rejection.GATE)
+        return Screened(taken, weight, None if taken.all() else EventKind.OUTSIDE_GATE)
     return Screened(np.ones(n, dtype=np.bool_), weight)
 
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem, Reading
 from fgbaseline.geometry import FloatArray, se3
@@ -128,7 +128,7 @@ def _loss_as_printed(covariance: FloatArray, innovation: PoseInnovation, weight:
 def _singular(frame: int, condition: float, lost: str) -> Event:
     return Event(
         frame,
-        "innovation covariance singular",
+        EventKind.SINGULAR_INNOVATION,
         f"H Sigma H^T + V, with a condition number of {condition:.1e} from a landmark near the camera plane, {lost}",
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from fgbaseline.data import Diagnosis, diagnose, read, repairs_text
 from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
 from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import InputError
 
 from .whole_folder import require_free, whole_folder
@@ -78,8 +79,8 @@ def text(report: dict[str, Any]) -> str:
 def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
     sequence = diagnosis.sequence
     click.echo(
-        f"{sequence.name}: {sequence.n_frames:,} frames, {len(sequence.observations):,} observations of "
-        f"{len(np.unique(sequence.observations.landmark)):,} tracks"
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
+        f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
     )
     if diagnosis.cannot_tell:
         click.echo(f"Cannot tell what is wrong with its velocities: {diagnosis.cannot_tell}.")

@@ -140,7 +140,7 @@ def _held_out(run: Run, name: str) -> dict[str, float | int] | None:
 
 
 def _known(values: FloatArray) -> FloatArray:
-    return np.asarray(values[np.isfinite(values)])
+    return np.asarray(values[~np.isnan(values)])
 
 
 def _or_nan(what: Any, values: FloatArray) -> float:

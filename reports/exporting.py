@@ -6,6 +6,7 @@ import click
 
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.exchange import layout, write_problem
+from fgbaseline.data.plural import plural
 
 from . import job
 from .whole_folder import require_free, whole_folder
@@ -21,7 +22,7 @@ def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
     for sentence in told(problem):
         click.echo(sentence)
     if held is not None:
-        click.echo(f"{held.n_tracks} tracks are held out: they are not in the problem")
+        click.echo(f"Held out, and not in the problem: {plural(held.n_tracks, 'track')}")
     click.echo(f"\nThe problem is in {out}; docs/export.md describes its files")
     return 0
 
@@ -33,8 +34,9 @@ def told(problem: Problem) -> list[str]:
     kernel = "no kernel" if problem.kernel is None else f"Huber's kernel at {problem.kernel.threshold:g} sigma"
     left_out = int((problem.excluded != Excluded.NO).sum())
     return [
-        f"{sequence.name}, {problem.preset}: {problem.n_frames} frames, {int(problem.mask.sum())} observations of "
-        f"{len(problem.features)} landmarks take part, {left_out} are left out",
+        f"{sequence.name}, {problem.preset}: {plural(problem.n_frames, 'frame')}, "
+        f"{plural(int(problem.mask.sum()), 'observation')} of "
+        f"{plural(len(problem.features), 'landmark')}; left out: {left_out:,}",
         f"{sigma:.3g} px, {kernel}, "
         + ("no prior on landmarks" if problem.landmark_prior is None else "a prior on every landmark"),
         *problem.remarks,

@@ -26,13 +26,14 @@ SCHEMA: Final = "fgbaseline/summary/1"
 
 
 class Spread(_Part):
-    """Statistics of errors in m, over the frames that have one."""
+    """Statistics of errors in m, over the frames that have one; null with the note `infinite` where one is infinite."""
 
     rmse: Number
     mean: Number
     median: Number
     p95: Number
     max: Number
+    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
 
 
 class Divergence(Spread):
@@ -48,7 +49,7 @@ class Reprojection(Spread):
 
     under_3px: Annotated[Number, Field(description="share, 0 to 1")]
     behind_camera: Annotated[int, Field(description="observations whose landmark lies behind the camera")]
-    n: int
+    n: Annotated[int, Field(description="observations that the figures are over")]
 
 
 class Component(_Part):

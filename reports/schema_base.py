@@ -3,7 +3,9 @@
 from pydantic import BaseModel, ConfigDict
 
 Number = float | None
-"""null for what is not a number; `notes` then says why"""
+"""null for what is not a finite number; `notes` then says why"""
+INFINITE = "infinite"
+"""the note of a figure that is infinite"""
 
 
 class Part(BaseModel):

@@ -19,7 +19,9 @@ from fgbaseline.geometry import FloatArray
 from .comparison import Result, Run
 from .evidence_summary import evidence_reasons, evidence_summary, held_out_summary
 from .figures.view import TopView
+from .json_numbers import finite, nulls
 from .schema import EstimatorSummary, Summary
+from .schema_base import INFINITE
 
 LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
 
@@ -28,7 +30,7 @@ def summarise(run: Run) -> Summary:
     """The summary of a run; what is not a number is None, and its reason stands in `notes`."""
     sequence, problem = run.problem.sequence, run.problem
     return Summary.model_validate(
-        _finite(
+        finite(
             {
                 "sequence": {
                     "name": sequence.name,
@@ -128,11 +130,12 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
         "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
     }
-    return {**values, "notes": notes(run, result, _nulls(values))}
+    return {**values, "notes": notes(run, result, nulls(values))}
 
 
-def notes(run: Run, result: Result, nulls: Iterable[str]) -> dict[str, str]:
-    """Why the values at the paths `nulls` are no numbers, by key: for all that lies below it, `*` for all."""
+def notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict[str, str]:
+    """Why values are null, by key: for all that lies below it, `*` for all. `absent` are their paths, and whether a
+    value is infinite."""
     estimate = result.estimate
     if not result.answered:
         return {"*": f"the estimator failed: {estimate.reason}"}
@@ -157,19 +160,13 @@ def notes(run: Run, result: Result, nulls: Iterable[str]) -> dict[str, str]:
         "observations.share": "the problem has no observations",
     }
     told: dict[str, str] = {}
-    for null in nulls:
+    for null, infinite in absent:
+        if infinite:
+            told[null] = INFINITE
+            continue
         key = next((k for k in (null, null.partition(".")[0]) if reasons.get(k)), null)
         told[key] = reasons.get(key) or "it is not a finite number"
     return told
-
-
-def _nulls(value: Any, path: str = "") -> Iterator[str]:
-    """The paths of all values that are, or will be, null."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _nulls(inner, f"{path}.{key}" if path else str(key))
-    elif value is None or (isinstance(value, float) and not math.isfinite(value)):
-        yield path
 
 
 def _truth_count(table: pd.DataFrame) -> dict[str, int]:
@@ -180,12 +177,3 @@ def _truth_count(table: pd.DataFrame) -> dict[str, int]:
 def _length(poses: FloatArray) -> float:
     positions = poses[np.isfinite(poses).all(axis=(1, 2)), :3, 3]
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-
-
-def _finite(value: Any) -> Any:
-    """The same tree with None for every float that is not finite."""
-    if isinstance(value, Mapping):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

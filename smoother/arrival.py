@@ -6,14 +6,12 @@ from typing import NamedTuple, Protocol
 
 import gtsam
 
-from fgbaseline.data.estimate import Event
+from fgbaseline.data.estimate import Event, EventKind
 from fgbaseline.geometry import FloatArray
 
 from .journal import IndeterminateSystemError
 from .waiting import Entry
 
-FRAME_LOST = "frame without observations"
-"""the kind of the event that a frame's observations were given up"""
 ATTEMPTS = 20
 """at solving a frame with fewer landmarks, before its observations are given up instead"""
 
@@ -87,10 +85,10 @@ def add_recovering(graph: Graph, arrival: Arrival) -> GivenUp:
         raise GivenUpError(text) from error
     dropped, events = _told(arrival.frame, given_up)
     reason = "its observations left the system indeterminate and were given up"
-    lost = Event(arrival.frame, FRAME_LOST, reason)
+    lost = Event(arrival.frame, EventKind.FRAME_WITHOUT_OBSERVATIONS, reason)
     return GivenUp(dropped | {entry.landmark for entry in arrival.entries}, (*events, lost))
 
 
 def _told(frame: int, given_up: Mapping[int, str]) -> GivenUp:
-    events = tuple(Event(frame, "landmark dropped", why, landmark) for landmark, why in given_up.items())
+    events = tuple(Event(frame, EventKind.LANDMARK_DROPPED, why, landmark) for landmark, why in given_up.items())
     return GivenUp(frozenset(given_up), events)

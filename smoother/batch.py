@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
@@ -77,7 +77,7 @@ def _solve(problem: Problem, answer: Estimate) -> Estimate:
                 events=(*events, _costs(minima, T - 1)),
             )
         # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
-        events += [Event(T - 1, "landmark dropped", UNDONE, j) for j in gone]
+        events += [Event(T - 1, EventKind.LANDMARK_DROPPED, UNDONE, j) for j in gone]
         used = used & ~np.isin(problem.sequence.observations.landmark, gone)
     return Estimate.failed("batch", "no landmark is determined, or no descent ended", T, len(used))
 
@@ -101,7 +101,7 @@ def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: li
         try:
             minima.append(descend())
         except RuntimeError as error:
-            events.append(Event(kept.n_frames - 1, "descent failed", str(error).strip().partition("\n")[0]))
+            events.append(Event(kept.n_frames - 1, EventKind.DESCENT_FAILED, str(error).strip().partition("\n")[0]))
     return [minimum for minimum in minima if np.isfinite(minimum.cost)]
 
 
@@ -109,15 +109,15 @@ def _costs(minima: list[Minimum], last: int) -> Event:
     """What the starts came to."""
     told = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
     if len(minima) == 1:
-        return Event(last, "one start only", f"the cost is {told}: nothing says that it is the lowest")
+        return Event(last, EventKind.ONE_START, f"the cost is {told}: nothing says that it is the lowest")
     low, high = sorted(minimum.cost for minimum in minima)
     share = high / low - 1.0 if low > 0 else float("inf")
     one, other = (poses_of(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
     rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
     apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
     if share <= SAME_COST:
-        return Event(last, "both starts end at the same cost", f"the cost is {told}: {apart}")
-    return Event(last, "starts end at different costs", f"the cost is {told}: {apart}; the lower one counts")
+        return Event(last, EventKind.SAME_COST, f"the cost is {told}: {apart}")
+    return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
 
 
 def _marginals(kept: Problem, best: Minimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
@@ -125,7 +125,7 @@ def _marginals(kept: Problem, best: Minimum, events: list[Event]) -> tuple[Float
     try:
         covariance = covariances(whole_graph(kept), best.values)
     except RuntimeError:
-        events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
+        events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
         return np.full((T, 6, 6), np.nan), landmarks_of(best.values, keys)
     poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
     return poses, landmarks_of(best.values, keys, covariance)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Progress, Status
 from fgbaseline.data.problem import Problem
 
 from .arrival import GivenUpError, add_recovering
@@ -65,7 +65,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         if progress is not None:
             progress(k + 1, T)
     window.keep_leaving(np.inf, ())
-    events += [Event(T - 1, "landmark dropped", UNDONE, j) for j in window.lost]
+    events += [Event(T - 1, EventKind.LANDMARK_DROPPED, UNDONE, j) for j in window.lost]
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
     return Estimate(
         name="fixed-lag",

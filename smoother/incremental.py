@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import gtsam
 import numpy as np
 
-from fgbaseline.data.estimate import Event, Landmarks, Progress
+from fgbaseline.data.estimate import Event, EventKind, Landmarks, Progress
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .arrival import FRAME_LOST, Arrival, add_recovering
+from .arrival import Arrival, add_recovering
 from .arrivals import Arrivals
 from .convention import pose_covariances
 from .elimination import Chronology
@@ -127,7 +127,7 @@ class IncrementalSmoother:
     def _frame(self, k: int, observed: range) -> None:
         arrival = self.arrivals.next(k, observed, self.key, self._dropped)
         landmarks, events = add_recovering(self, arrival)
-        if not self._may_lose_frames and any(event.kind == FRAME_LOST for event in events):
+        if not self._may_lose_frames and any(event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS for event in events):
             raise FrameLostError(k)
         self._n_frames = k + 1
         self._dropped |= landmarks
@@ -232,7 +232,7 @@ class IncrementalSmoother:
                 graph.remove(slot)
             values.erase(self.key.pop(j))
         last = self.problem.n_frames - 1
-        self.events += [Event(last, "landmark dropped", UNDONE, landmark) for landmark in given_up]
+        self.events += [Event(last, EventKind.LANDMARK_DROPPED, UNDONE, landmark) for landmark in given_up]
         return bool(given_up)
 
     def used(self) -> BoolArray:

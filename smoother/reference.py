@@ -8,7 +8,7 @@ import gtsam
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
@@ -21,7 +21,6 @@ from .keys import pose_key
 from .relinearised import Relinearised, compact, relinearised
 from .values import landmarks_of, poses_of
 
-NEVER_DETERMINED, BY_QR = "landmark never determined", "solved by QR"
 """kinds of events that are no trouble"""
 
 
@@ -105,7 +104,7 @@ def _run(
         where = error.frame if isinstance(error, FrameLostError) else problem.n_frames - 1
     smoother = IncrementalSmoother(problem, replace(settings, careful=True))
     smoother.run(seconds, progress)
-    smoother.events.append(Event(where, BY_QR, "Cholesky failed there: pivots of very unequal size"))
+    smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
     return smoother
 
 
@@ -123,7 +122,7 @@ def _final(smoother: IncrementalSmoother, relinearise: bool) -> tuple[gtsam.Nonl
             break
     if failure:
         last = smoother.problem.n_frames - 1
-        smoother.events.append(Event(last, "final relinearisation failed", f"{failure}; the step before stands"))
+        smoother.events.append(Event(last, EventKind.RELINEARIZATION_FAILED, f"{failure}; the step before stands"))
     return graph, values
 
 
@@ -135,21 +134,20 @@ def _marginals(
     try:
         covariance = covariances(graph, values)
     except RuntimeError:
-        smoother.events.append(Event(T - 1, "no covariances", "the system is indeterminate at its solution"))
+        smoother.events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
         return np.full((T, 6, 6), np.nan), landmarks_of(values, smoother.key)
     poses = pose_covariances(smoother.problem, [covariance[pose_key(k)] for k in range(T)])
     return poses, landmarks_of(values, smoother.key, covariance)
 
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
-    return [
-        Event(frame, NEVER_DETERMINED, "its observations never fixed its position well enough", landmark)
-        for landmark, frame in smoother.arrivals.waiting.last_seen()
-    ]
+    kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never fixed its position well enough"
+    return [Event(frame, kind, why, landmark) for landmark, frame in smoother.arrivals.waiting.last_seen()]
 
 
 def _verdict(events: tuple[Event, ...]) -> tuple[Status, str]:
-    trouble = Counter(event.kind for event in events if event.kind not in (NEVER_DETERMINED, BY_QR))
+    harmless = (EventKind.LANDMARK_NEVER_DETERMINED, EventKind.SOLVED_BY_QR)
+    trouble = Counter(event.kind for event in events if event.kind not in harmless)
     if not trouble:
         return Status.OK, ""
     told = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))

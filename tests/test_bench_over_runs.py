@@ -63,7 +63,7 @@ def test_runs_of_other_lengths_are_averaged_where_all_have_a_value() -> None:
 
 def test_no_value_has_no_mean_and_no_run_no_consistency() -> None:
     nothing = pytest.approx((np.nan, np.nan, np.nan, 0), nan_ok=True)
-    assert compare.mean_of(np.array([np.nan, np.inf])) == nothing
+    assert compare.mean_of(np.array([np.nan, np.nan])) == nothing
     assert compare.consistency_of([]) == pytest.approx((np.nan,) * 4 + (0,), nan_ok=True)
     assert compare.consistency_of([np.full(3, np.nan)]) == pytest.approx((np.nan,) * 4 + (0,), nan_ok=True)
     apart = [np.array([6.0, np.nan]), np.array([np.nan, 6.0])]

@@ -16,6 +16,7 @@ from fgbaseline.reports.checking.evaluation import evaluate
 from fgbaseline.reports.checking.limits_file import Limits, read_limits
 from fgbaseline.reports.checking.line import Checked, Line
 from fgbaseline.reports.checking.measured import read_folder, read_measured
+from fgbaseline.reports.checking.wording import remarks
 
 from .summaries import estimator, summary, write
 
@@ -49,7 +50,8 @@ def test_the_larger_tolerance_counts_and_sums_are_exact() -> None:
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
 def test_what_is_no_finite_number_never_holds(value: float | None) -> None:
-    assert Bounds().judge(value) is Outcome.FALLS_SHORT
+    infinite = value is not None and math.isinf(value)
+    assert Bounds().judge(value) is (Outcome.FALLS_SHORT if infinite else Outcome.CANNOT_TELL)
 
 
 def checked(folder: Path, document: Any, limits: str, baseline: Any = None, *, updating: bool = False) -> Checked:
@@ -80,25 +82,40 @@ def test_every_estimator_that_a_glob_matches_is_judged(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "reason"),
+    ("values", "reason", "outcome"),
     [
-        (estimator(None, notes={"ate": "the recording has no truth"}), "the recording has no truth"),
-        (estimator(ate=math.nan), "not a finite number"),
-        (estimator(ate=math.inf), "not a finite number"),
-        ({**estimator(), "ate": None, "notes": {"ate": "no truth"}}, "no truth"),
-        ({key: value for key, value in estimator().items() if key != "ate"}, "no such metric"),
-        (estimator(0.1, status="failed"), "the estimator failed: it lost its way"),
+        (
+            estimator(None, notes={"ate": "the recording has no truth"}),
+            "the recording has no truth",
+            Outcome.CANNOT_TELL,
+        ),
+        (estimator(ate=math.nan), "not a finite number", Outcome.CANNOT_TELL),
+        (estimator(ate=math.inf), "infinite", Outcome.FALLS_SHORT),
+        (estimator(None, notes={"ate.rmse": "infinite"}), "infinite", Outcome.FALLS_SHORT),
+        ({**estimator(), "ate": None, "notes": {"ate": "no truth"}}, "no truth", Outcome.CANNOT_TELL),
+        ({k: v for k, v in estimator().items() if k != "ate"}, "no such metric", Outcome.FALLS_SHORT),
+        (estimator(0.1, status="failed"), "the estimator failed: it lost its way", Outcome.FALLS_SHORT),
     ],
 )
 @pytest.mark.parametrize("asked", ["at_most = 1e9", 'baseline = { better = "lower", relative = 9 }', "at_least = -1e9"])
-def test_what_is_missing_or_failed_never_passes(values: Any, reason: str, asked: str, tmp_path: Path) -> None:
+def test_what_is_missing_or_failed_never_passes(
+    values: Any, reason: str, outcome: Outcome, asked: str, tmp_path: Path
+) -> None:
     document = summary(isam2=estimator(), ekf=values)
     limits = ATE.replace("at_most = 0.5", asked)
     result = checked(tmp_path, document, limits, summary(isam2=estimator(), ekf=estimator()))
     assert result.lines[0].outcome is Outcome.HOLDS
-    assert result.lines[1].outcome is Outcome.FALLS_SHORT
+    assert result.lines[1].outcome is outcome
     assert reason in result.lines[1].reason
-    assert result.exit_code == 1
+    assert result.exit_code == (1 if outcome is Outcome.FALLS_SHORT else 2)
+
+
+def test_errors_that_a_figure_leaves_out_are_counted_beside_it(tmp_path: Path) -> None:
+    values = estimator(0.1)
+    values["ate"]["missing"] = 60
+    result = checked(tmp_path, summary(ekf=values), ATE)
+    assert only(result).missing == 60
+    assert remarks(result) == [f"ekf, ate.rmse: 60 errors are missing (NaN) and left out ({result.limits}, line 1)."]
 
 
 def test_a_bound_and_a_baseline_are_two_lines_with_the_change_on_both(tmp_path: Path) -> None:

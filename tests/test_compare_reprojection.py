@@ -137,15 +137,16 @@ def test_no_landmarks_make_an_empty_table_and_a_summary_without_numbers() -> Non
     assert len(compare.reprojection_by(table, "frame")) == 0
 
 
-def test_a_landmark_in_the_camera_plane_is_an_error_without_size_and_no_warning() -> None:
+def test_a_landmark_at_the_camera_is_an_infinite_error_and_no_warning() -> None:
     answer = true_answer(EXACT)
     position = answer.landmarks.position.copy()
     position[0] = (answer.world_T_imu[2] @ EXACT.imu_T_cam)[:3, 3]
     table = compare.reprojection(EXACT, replace(answer, landmarks=Landmarks(np.arange(EXACT.n_landmarks), position)))
     summary = compare.reprojection_summary(table)
     compare.component_summary(table)
-    assert summary["n"] == 120
-    assert np.isfinite(summary["rmse"])
+    assert (summary["n"], summary["missing"]) == (120, 0)
+    assert summary["rmse"] == summary["mean"] == summary["max"] == np.inf
+    assert np.isfinite(summary["median"])
 
 
 def test_commonly_used_is_what_all_that_use_any_have_used() -> None:
@@ -168,8 +169,8 @@ def test_a_point_in_the_camera_plane_counts_as_behind_and_three_pixels_as_far() 
     assert summary["under_3px"] == pytest.approx(1 / 3)
     by_frame = compare.reprojection_by(table, "frame")
     assert by_frame.index.name == "frame"
-    assert by_frame.columns.tolist() == ["median", "mean", "rmse", "under_3px", "behind_camera", "n"]
-    assert by_frame.loc[4].tolist() == pytest.approx([2.0, 2.0, 5**0.5, 0.5, 1, 2])
+    assert by_frame.columns.tolist() == ["median", "mean", "rmse", "under_3px", "behind_camera", "n", "missing"]
+    assert by_frame.loc[4].tolist() == pytest.approx([2.0, 2.0, 5**0.5, 0.5, 1, 2, 0])
     assert by_frame.loc[7].tolist() == pytest.approx([5.0, 5.0, 5.0, 0.0, 1, 1])
 
 
@@ -181,11 +182,11 @@ def test_the_columns_of_the_table_are_named() -> None:
     assert list(compare.component_summary(table)) == ["uL", "vL", "uR", "vR"]
 
 
-def test_an_infinite_residual_has_no_spread_and_raises_no_warning() -> None:
+def test_an_infinite_residual_has_an_infinite_spread_and_raises_no_warning() -> None:
     table = pd.DataFrame({"uL": [np.inf, 1.0], "vL": 1.0, "uR": [1.0, 3.0], "vR": [-np.inf, np.inf]})
     found = compare.component_summary(table)
     assert found["uL"]["bias"] == np.inf
-    assert np.isnan(found["uL"]["spread"])
+    assert found["uL"]["spread"] == np.inf
     assert found["uR"] == {"bias": 2.0, "spread": 1.0}
 
 

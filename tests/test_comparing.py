@@ -123,7 +123,7 @@ def test_an_offset_is_found_and_told(files: Path) -> None:
     data.write_tum(files / "late.tum", t + 0.25, poses)
     result = compare(files / "truth.tum", files / "late.tum", search_offset=0.5, association="interpolated")
     assert result.results["late"].matched.offset == pytest.approx(-0.25, abs=1e-3)
-    assert any("fit best -250 ms later" in sentence for sentence in result.verdict)
+    assert any("fit best 250 ms earlier" in sentence for sentence in result.verdict)
 
 
 def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:

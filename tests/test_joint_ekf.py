@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from fgbaseline import data, ekf
-from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Status
+from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
 from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
-from fgbaseline.ekf.screening import Rejection, screened
+from fgbaseline.ekf.screening import screened
 from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
 
@@ -413,20 +413,20 @@ def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
 ) -> None:
     verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings())
     assert verdict.taken.tolist() == [believed] * (wild + tame)
-    assert verdict.rejection is (None if believed else Rejection.FRAME)
+    assert verdict.rejection is (None if believed else EventKind.FRAME_DISAGREES)
     always = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(disagreeing_share=None))
     assert always.plain
 
 
 def test_what_is_no_number_disagrees() -> None:
-    assert screened(np.full(5, np.nan), measured(None), JointSettings()).rejection is Rejection.FRAME
+    assert screened(np.full(5, np.nan), measured(None), JointSettings()).rejection is EventKind.FRAME_DISAGREES
 
 
 def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
     at = chi2.ppf(0.99, 3)
     gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), measured(None), JointSettings(gate=0.99))
     assert gated.taken.tolist() == [True, True, False]
-    assert gated.rejection is Rejection.GATE
+    assert gated.rejection is EventKind.OUTSIDE_GATE
     assert screened(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
     weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings())
     assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
@@ -440,22 +440,23 @@ def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it
     noise = problem.increment_covariance.copy()
     noise[4] = -np.eye(6)
     estimate = ekf.joint_ekf(replace(problem, increment_covariance=noise))
-    assert estimate.events[0] == data.Event(5, Rejection.SINGULAR, "12 of 12 observations take no part")
+    assert estimate.events[0] == data.Event(5, EventKind.COVARIANCE_LOST, "12 of 12 observations take no part")
     assert not estimate.used[SCENE.observations.frame == 5].any()
     assert estimate.used[SCENE.observations.frame < 5].all()
 
 
 def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
-    put_off = [data.Event(k, Rejection.ENTRY, f"2 of {2 if k else 12} observations take no part") for k in range(10)]
-    never = [data.Event(9, "landmark never determined", "no frame that was believed saw it", j) for j in (0, 1)]
+    said = (f"2 of {2 if k else 12} observations take no part" for k in range(10))
+    put_off = [data.Event(k, EventKind.ENTRY_PUT_OFF, text) for k, text in enumerate(said)]
+    never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no frame that was believed saw it", j) for j in (0, 1)]
     assert list(estimate.events) == [*put_off, *never]
 
 
 def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
     estimate = ekf.joint_ekf(replace(plain_problem(SCENE), initial_covariance=-np.eye(6)))
     said = "P - W^T W has a negative variance after the update"
-    assert list(estimate.events) == [data.Event(k, Rejection.SINGULAR, said) for k in range(1, 10)]
+    assert list(estimate.events) == [data.Event(k, EventKind.COVARIANCE_LOST, said) for k in range(1, 10)]
     assert estimate.reason == (
         "at 9 of 10 frames, first at frame 1, the joint covariance was no longer positive definite"
     )

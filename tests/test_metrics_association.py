@@ -88,7 +88,7 @@ def test_unlike_evo_no_pose_is_paired_twice() -> None:
     assert ours.reference.t.tolist() == [1.0]
     assert ours.estimate.t.tolist() == [1.05]
     assert (ours.left_out_reference, ours.left_out_estimate) == (1, 1)
-    assert ours.caption.startswith("1 poses paired (within 0.2 s; left out: 1 of the reference, 1 of the estimate)")
+    assert ours.caption.startswith("1 pose paired (within 0.2 s; left out: 1 of the reference, 1 of the estimate)")
 
 
 @pytest.mark.parametrize("denser", ["reference", "estimate"])
@@ -245,7 +245,7 @@ def test_a_gap_that_is_the_tolerance_is_within_it() -> None:
     assert (len(pair), pair.tolerance) == (2, 0.25)
     drawn = compare.associate(path([0.0, 1.0, 2.0]), path([0.0, 0.5, 2.0]), how="interpolated", tolerance=0.5)
     assert drawn.reference.t.tolist() == [0.0, 0.5, 2.0]  # the ends are inside
-    assert compare.associate(path([1.0]), path([1.0]), tolerance=0.0).caption.startswith("1 poses paired (within 0 s;")
+    assert compare.associate(path([1.0]), path([1.0]), tolerance=0.0).caption.startswith("1 pose paired (within 0 s;")
 
 
 def test_stamps_of_five_metres_of_driving_apart_are_not_paired_by_default() -> None:

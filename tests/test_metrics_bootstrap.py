@@ -216,7 +216,7 @@ def test_ten_blocks_are_reliable_and_nine_are_not() -> None:
     noise = np.random.default_rng(0).normal(size=100)
     for block, enough in ((10, True), (11, False)):
         attrs = compare.error_statistics(noise, block=block, repetitions=5, confidence=0.5).attrs
-        assert attrs == {"block": block, "blocks": 100 / block, "confidence": 0.5, "reliable": enough}
+        assert attrs == {"block": block, "blocks": 100 / block, "confidence": 0.5, "reliable": enough, "missing": 0}
     assert compare.rmse_difference(np.full(10, 2.0), np.ones(10)).reliable
     assert not compare.rmse_difference(np.full(9, 2.0), np.ones(9)).reliable
 
@@ -250,7 +250,7 @@ def test_an_interval_leaves_out_the_same_share_at_both_ends() -> None:
 
 
 def test_moments_that_one_of_the_two_lacks_are_left_out() -> None:
-    found = compare.rmse_difference([3.0, np.nan, 3.0, 3.0], [1.0, 1.0, np.inf, 1.0])
+    found = compare.rmse_difference([3.0, np.nan, 3.0, 3.0], [1.0, 1.0, np.nan, 1.0])
     assert (found.value, found.low, found.high, found.block) == (2.0, 2.0, 2.0, 1)
     assert found.settled
     with pytest.raises(InputError, match="same moments"):

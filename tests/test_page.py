@@ -220,7 +220,7 @@ def test_what_the_mask_excluded_and_what_happened_is_counted_and_capped() -> Non
         (0, "0"),
         (None, "–"),
         (float("nan"), "–"),
-        (float("inf"), "–"),
+        (float("inf"), "∞"),
         (True, "–"),
     ],
 )

@@ -297,6 +297,6 @@ def test_no_landmark_enters_behind_a_camera_that_saw_it() -> None:
     path = truth.world_T_imu.copy()
     depth = float((path[0] @ problem.sequence.imu_T_cam)[:3, 2] @ truth.landmarks[0])
     path[2] = path[0]
-    path[2, :3, 3] += (depth + 3.0) * (path[0] @ problem.sequence.imu_T_cam)[:3, 2]
+    path[2, :3, 3] += (depth + 20.0) * (path[0] @ problem.sequence.imu_T_cam)[:3, 2]
     assert waiting.enter([0], path) == []
     assert len(waiting.enter([0], truth.world_T_imu)) == 1

@@ -3,10 +3,11 @@
 import numpy as np
 
 from ..observations import BoolArray
+from ..plural import plural
 from ..sequence import Sequence
 from .links import MAX_ROW_MISMATCH, MIN_DISPARITY
 from .tracks import BURST, GAP, MIN_USABLE, MOVING_LINKS, Tracks
-from .wording import Finding, plural, spans
+from .wording import Finding, spans
 
 MIN_WRONG = 0.10
 """share of the links: every tracker has some that are wrong"""

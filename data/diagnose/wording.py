@@ -37,11 +37,6 @@ def vector(values: FloatArray, digits: int) -> str:
     return f"({', '.join(f'{value:.{digits}f}' for value in values)})"
 
 
-def plural(n: int, one: str, many: str = "") -> str:
-    """'1 frame', '1,009 frames'."""
-    return f"{n:,} {one if n == 1 else many or one + 's'}"
-
-
 def spans(frames: IntArray, most: int = 4) -> str:
     """Runs of increasing indices, the longest first so many: '121-127, 150 and 3 more'; those 2 apart are one run."""
     if len(frames) == 0:

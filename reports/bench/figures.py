@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fgbaseline import compare
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from ..figures.health import NEES_BOUNDS
@@ -169,11 +170,11 @@ def nees_over_time(results: Results, case: str) -> Figure | None:
     axes.set_yscale("log")
     axes.set_ylim(*_reach(values))
     band = axes.fill_between(bounds.index, bounds["low"], bounds["high"], color="#d7e8d9", zorder=1, linewidth=0)
-    band.set_label(f"95 % bounds ({runs} runs)")
+    band.set_label(f"95 % bounds ({plural(runs, 'run')})")
     axes.axhline(POSE_DEGREES, color="#6b9a72", linewidth=0.9, zorder=1.5)
     axes.set_xlabel("frame")
     axes.set_ylabel("ANEES (above: overconfident)")
-    head(figure, f"NEES over time, mean of {runs} runs: {plain(case)}", [*handles, band])
+    head(figure, f"NEES over time, mean of {plural(runs, 'run')}: {plain(case)}", [*handles, band])
     return figure
 
 

@@ -77,7 +77,7 @@ def main_grid(results: Results, *, with_costs: bool) -> Grid:
         columns.append(
             _Column("answered", {k: f"{row['runs'] - row['failed']} of {row['runs']}" for k, row in table.items()})
         )
-    references, rows = _references(results), []
+    references, rows = results.references, []
     for key, row in table.items():
         cells = tuple(column.cells.get(key, number(None)) for column in columns)
         reason = _reason(results, key) if row["failed"] == row["runs"] else ""
@@ -138,12 +138,6 @@ def _best(values: Mapping[Key, float], metric: str) -> frozenset[Key]:
 
 def _by_key(table: pd.DataFrame) -> dict[Key, dict[str, Any]]:
     return {(row["case"], row["estimator"]): row for row in records(table)}
-
-
-def _references(results: Results) -> dict[str, str]:
-    """The reference of each case, where all its runs have the same."""
-    of_case = {str(case): set(names) for case, names in results.runs.groupby("case")["reference"]}
-    return {case: str(*names) for case, names in of_case.items() if len(names) == 1}
 
 
 def _reason(results: Results, key: Key) -> str:

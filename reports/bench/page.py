@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..figures.palette import colours_of
 from ..page.embedding import picture
-from ..page.numbers import number
+from ..page.numbers import counted
 from ..page.rendering import environment
 from .grid import interval, main_grid
 from .progress import duration
@@ -122,7 +122,11 @@ def _runs(results: Results) -> list[dict[str, str]]:
         page = "" if failure or one.job.page == "none" else f"{RUNS}/{one.job.key}/report.html"
         failed = rows[rows["status"] == "failed"]
         said = failure or "; ".join(f"{row['estimator']} failed: {row['reason']}" for row in records(failed))
-        size = "" if failure else f"{number(int(first['frames']))} frames, {number(int(first['observations']))} matches"
+        size = (
+            ""
+            if failure
+            else f"{counted(int(first['frames']), 'frame')}, {counted(int(first['observations']), 'match', 'matches')}"
+        )
         trust = "" if failure else f"{first['reference']} {first['trust']}"
         listed.append({"name": one.name, "page": page, "reason": said, "size": size, "trust": trust})
     return listed

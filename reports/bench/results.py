@@ -11,6 +11,7 @@ import pandas as pd
 from fgbaseline.geometry import FloatArray
 
 from ..job import MARK
+from ..schema_base import INFINITE
 from .job import Planned
 from .store import Store
 from .work import COSTS
@@ -80,6 +81,12 @@ class Results:
     def estimators(self) -> list[str]:
         """Their names in the suite's order."""
         return list(self.planned[0].job.estimators)
+
+    @property
+    def references(self) -> dict[str, str]:
+        """The reference of each case, where all its runs have the same."""
+        of_case = {str(case): set(names) for case, names in self.runs.groupby("case")["reference"]}
+        return {case: str(*names) for case, names in of_case.items() if len(names) == 1}
 
     @property
     def reference(self) -> str | None:
@@ -158,4 +165,6 @@ def _at(estimator: Mapping[str, Any], path: tuple[str, ...]) -> float:
     value: Any = estimator
     for key in path:
         value = value.get(key) if isinstance(value, Mapping) else None
+    if value is None and estimator["notes"].get(".".join(path)) == INFINITE:
+        return float("inf")
     return float(value) if isinstance(value, int | float) else float("nan")

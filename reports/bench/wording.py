@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from ..page.accuracy_verdict import SAME_GRAPH
 from ..page.numbers import listed, number
 from .figures import judge
 from .grid import interval
@@ -52,23 +53,41 @@ def _best(results: Results) -> list[str]:
     said = []
     for case, table in of_case.items():
         metric = next(metric for metric in METRICS if (table["metric"] == metric.name).any())
-        said.append(_winner(case, table[table["metric"] == metric.name], metric))
+        reference = results.references.get(case)
+        unranked = frozenset(SAME_GRAPH) - {reference} if reference in SAME_GRAPH else frozenset()
+        said.append(_winner(case, table[table["metric"] == metric.name], metric, unranked))
     without = [case for case in results.cases if case not in of_case]
     return [*said, f"Nothing says who is most accurate in {listed(without)}."] if without else said
 
 
-def _winner(case: str, ranked: pd.DataFrame, metric: Metric) -> str:
-    first, *others = records(ranked)
-    runs = f" over {first['runs']} runs" if first["runs"] > 1 else ""
-    said = f"{case}: {first['estimator']} has the least {metric.title}, "
-    said += f"{interval(first['mean'], first['low'], first['high'])} {metric.unit}{runs}"
-    tied = [row["estimator"] for row in others if row["tied"]]
-    if tied:
-        return f"{said}; these runs cannot tell {listed(tied)} from it."
+def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[str]) -> str:
+    """The least mean error among those that answered in every run, where the paired interval separates it.
+
+    Other minima of the reference's graph are no competitors of it.
+    """
+    rows = [row for row in records(ranked) if row["estimator"] not in unranked] or records(ranked)
+    most = max(row["runs"] for row in rows)
+    first, *others = (row for row in rows if row["runs"] == most)
+    figures = {
+        row["estimator"]: f"{interval(row['mean'], row['low'], row['high'])} {metric.unit}".rstrip() for row in rows
+    }
+    fewer = [f"{row['estimator']} ({row['runs']} of {most})" for row in rows if row["runs"] < most]
+    left_out = f"; not ranked for missing answers: {listed(fewer)}" if fewer else ""
     if not others:
-        return f"{said}."
-    margin = f"{others[0]['estimator']} follows with {number(others[0]['mean'])}"
-    return f"{said}; {margin}."
+        return f"{case}: {first['estimator']} has a {metric.title} of {figures[first['estimator']]}{left_out}."
+    if most == 1:
+        each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
+        return f"{case}: {metric.title} {each}; one run does not rank them{left_out}."
+    best = number(first["mean"])
+    tied = [row["estimator"] for row in others if row["tied"] or number(row["mean"]) == best]
+    least = f"{figures[first['estimator']]} over {most} runs"
+    if tied:
+        said = f"{case}: {metric.title} {first['estimator']} {least}; these do not separate {listed(tied)} from it"
+    else:
+        said = f"{case}: {first['estimator']} has the least {metric.title}, {least}"
+    apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if row["estimator"] not in tied]
+    larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
+    return f"{said}{larger}{left_out}."
 
 
 def _overall(results: Results) -> list[str]:

@@ -41,6 +41,7 @@ def _line(line: Line) -> dict[str, Any]:
         "baseline": line.before,
         "change": line.change,
         "reason": line.reason,
+        "missing": line.missing,
         "limit_line": line.limit_line,
     }
 

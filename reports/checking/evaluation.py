@@ -8,16 +8,19 @@ from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
+from ..schema_base import INFINITE
 from .baseline import before, is_timing
 from .limits_file import Limit, Limits, Needed
 from .line import NEW, Checked, Line
 from .measured import (
     DIGITS,
+    NO_SUCH_METRIC,
     Measured,
     MeasuredRun,
     failure,
     has_metric,
     metrics_of,
+    missing_in,
     nearest,
     value_of,
 )
@@ -95,9 +98,10 @@ def _lines(
     doubt = _doubt(limit.metric, run, limits.content.reference)
 
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
-        outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating)
-        at = limits.line(("limit", index))
-        return Line(name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason)
+        short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
+        outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating, short)
+        at, left_out = limits.line(("limit", index)), missing_in(values, limit.metric)
+        return Line(name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason, left_out)
 
     if limit.bounds is not None:
         yield line(value, limit.bounds, "")
@@ -108,10 +112,10 @@ def _lines(
 
 
 def _outcome(
-    value: float | None, missing: str, bounds: Bounds | None, unknown: str, doubt: str, updating: bool
+    value: float | None, missing: str, bounds: Bounds | None, unknown: str, doubt: str, updating: bool, short: bool
 ) -> tuple[Outcome, str]:
     if value is None:
-        return Outcome.FALLS_SHORT, missing
+        return Outcome.FALLS_SHORT if short else Outcome.CANNOT_TELL, missing
     if doubt:
         return Outcome.CANNOT_TELL, doubt
     if bounds is None:

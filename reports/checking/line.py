@@ -33,6 +33,8 @@ class Line:
     """in the baseline"""
     reason: str
     """why there is no value, or why nothing can be told"""
+    missing: int = 0
+    """errors that are NaN, which the value leaves out"""
 
     @property
     def margin(self) -> float | None:

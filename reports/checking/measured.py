@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,12 @@ from fgbaseline.data.finite import is_finite_number
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
+from ..schema_base import INFINITE
+
 SUMMARY = "summary.json"
 COMPARISON = "comparison.json"
 BASELINE = "fgbaseline/baseline/1"
+NO_SUCH_METRIC = "it has no such metric"
 DIGITS = 5
 """significant ones, of a baseline: what lies beyond differs between processors and libraries"""
 NO_METRICS = frozenset({"status", "reason", "notes", "events"})
@@ -121,6 +125,12 @@ def failure(estimator: Mapping[str, Any]) -> str | None:
     return f"the estimator failed: {estimator.get('reason') or 'no reason given'}"
 
 
+def missing_in(estimator: Mapping[str, Any], metric: str) -> int:
+    """How many errors the figure at a path leaves out since they are missing (NaN)."""
+    found = _at(estimator, f"{metric.rpartition('.')[0]}.missing") if "." in metric else 0
+    return found if isinstance(found, int) else 0
+
+
 def has_metric(estimator: Mapping[str, Any], metric: str) -> bool:
     """Whether a path leads to a number, or to where one is missing: a null at its end or on the way."""
     found = _at(estimator, metric)
@@ -133,9 +143,11 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
         return None, reason
     found = _at(estimator, metric)
     if found is _ABSENT:
-        return None, "it has no such metric"
+        return None, NO_SUCH_METRIC
     if is_finite_number(found):
         return float(found), ""
+    if isinstance(found, float) and math.isinf(found):
+        return None, INFINITE
     notes = estimator.get("notes") or {}
     keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
     return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")

@@ -1,6 +1,7 @@
 """A check in words and in cells that every form of output shares."""
 
 from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.data.plural import plural
 
 from .line import NEW, Checked, Line
 
@@ -50,12 +51,16 @@ def cells(line: Line) -> dict[str, str]:
 def remarks(checked: Checked) -> list[str]:
     """What no cell says: why there is no value, or nothing to hold it against."""
     several = len(checked.measured.runs) > 1
-    return [
-        f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}: {line.reason} "
-        f"({checked.limits}, line {line.limit_line})."
-        for line in checked.lines
-        if line.reason not in ("", NEW)
-    ]
+    said = []
+    for line in checked.lines:
+        left_out = (
+            f"{plural(line.missing, 'error is', 'errors are')} missing (NaN) and left out" if line.missing else ""
+        )
+        reasons = [reason for reason in (line.reason, left_out) if reason not in ("", NEW)]
+        if reasons:
+            name = f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}"
+            said.append(f"{name}: {'; '.join(reasons)} ({checked.limits}, line {line.limit_line}).")
+    return said
 
 
 def bound(bounds: Bounds | None, tolerance: str = "") -> str:

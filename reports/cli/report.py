@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fgbaseline.data.forks import cores, shared
+from fgbaseline.data.plural import plural
 
 from .. import job
 from ..whole_folder import require_free, whole_folder
@@ -35,11 +36,11 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
 
     told = reporter()
     told.say(
-        f"{sequence.name}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
-        f"{sequence.n_landmarks} tracks"
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
+        f"of {plural(sequence.n_landmarks, 'track')}"
     )
     if held is not None:
-        told.say(f"{held.n_tracks} tracks held out, {len(held.observations)} observations")
+        told.say(f"{plural(held.n_tracks, 'track')} held out, {plural(len(held.observations), 'observation')}")
     if settings.preset == "calibrated" and not settings.as_recorded:
         told.say("diagnosing the recording")
     with shared(lambda _: job.pose_problem(kept, settings, cores()), 1, cores()) as posed:

@@ -5,6 +5,8 @@ from typing import Any
 
 import click
 
+from fgbaseline.data.plural import plural
+
 PATHS = ("town", "loop", "highway", "handheld", "along")
 INTERVALS = ("after", "before", "mean")
 
@@ -86,6 +88,6 @@ def command(output: Path, along: Path | None, force: bool, **given: Any) -> None
     sequence = simulate(Simulation(**settings))
     write_npz(sequence, output)
     click.echo(
-        f"{output}: {sequence.n_frames} frames, {len(sequence.observations)} observations of "
-        f"{sequence.n_landmarks} tracks"
+        f"{output}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} of "
+        f"{plural(sequence.n_landmarks, 'track')}"
     )

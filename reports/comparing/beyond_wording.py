@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..page.numbers import listed, number
+from ..page.numbers import counted, listed, number
 from .comparison import Comparison
 
 
@@ -13,12 +13,12 @@ def claimed_said(comparison: Comparison) -> list[str]:
         claimed = result.claimed
         if claimed is None:
             continue
-        known = claimed.nees[np.isfinite(claimed.nees)]
+        known = claimed.nees[~np.isnan(claimed.nees)]
         if len(known):
             mean = float(np.mean(known))
             sentences.append(
-                f"{result.name}'s errors are {number(float(np.sqrt(mean / 6.0)))} times as large as its covariances "
-                f"say (mean NEES {number(mean)} over {number(len(known))} poses, 6 being expected)."
+                f"Normalized error RMS of {result.name} by its covariances: {number(float(np.sqrt(mean / 6.0)))}, "
+                f"1 being expected (mean NEES {number(mean)} over {counted(len(known), 'pose')}, 6 being expected)."
             )
         if claimed.not_positive_definite:
             sentences.append(
@@ -68,7 +68,7 @@ def pixels_said(comparison: Comparison) -> list[str]:
     each = listed(f"{number(medians[name])} px for {name}" for name in order)
     return [
         f"With landmarks triangulated along each path in the same way, the median reprojection error is {each}: it "
-        "ranks them locally, by what happens within the life of a track."
+        "judges them locally, within the life of a track."
     ]
 
 
@@ -80,6 +80,9 @@ def held_out_said(comparison: Comparison) -> list[str]:
     each = listed(
         f"{number(float(median))} px for {name}" for name, median in zip(table.index, table["median"], strict=True)
     )
-    tied = [str(name) for name, low in zip(table.index[1:], table["behind_low"][1:], strict=True) if low <= 0.0]
-    said = f"; {listed(tied)} cannot be told from {table.index[0]}" if tied else ""
+    first, best = table.index[0], number(float(table["median"].iloc[0]))
+    rest = table.iloc[1:]
+    lows = zip(rest.index, rest["behind_low"], rest["median"], strict=True)
+    tied = [str(name) for name, low, median in lows if not low > 0.0 or number(float(median)) == best]
+    said = f"; the bootstrap does not separate {listed(tied)} from {first}" if tied else ""
     return [f"On tracks that were held out, one half predicted from the other, the median error is {each}{said}."]

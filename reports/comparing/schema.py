@@ -32,6 +32,7 @@ class Statistics(Part):
     max: Number
     sse: Annotated[Number, Field(description="sum of squares")]
     n: int
+    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
     block: Annotated[int, Field(description="errors in a row that the bootstrap keeps together")]
     reliable: Annotated[bool, Field(description="whether so many blocks fit that the intervals mean something")]
 

@@ -2,7 +2,6 @@
 
 import math
 import platform
-from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -13,6 +12,8 @@ from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors
 from fgbaseline.compare.travel import distance_travelled
 
+from ..json_numbers import finite, nulls
+from ..schema_base import INFINITE
 from .claimed import Claimed
 from .comparison import Comparison, Result
 from .pixels import Pixels
@@ -25,7 +26,7 @@ WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 def summarise(comparison: Comparison) -> Summary:
     """The summary; what is not a number is None, and where a part is missing `notes` says why."""
     return Summary.model_validate(
-        _finite(
+        finite(
             {
                 "caption": comparison.caption,
                 "reference": _reference(comparison),
@@ -55,7 +56,7 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
 
 def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
     matched, motion = result.matched, result.matched.alignment
-    return {
+    values = {
         "source": result.entry.trajectory.source,
         "poses": len(result.entry.trajectory),
         "caption": matched.caption,
@@ -103,8 +104,9 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         **_pixels(result.pixels),
         "map": None if result.map is None else _map(result.map),
         "held_out": _held_out(comparison, result.name),
-        "notes": result.notes,
     }
+    infinite = {path: INFINITE for path, is_infinite in nulls(values) if is_infinite}
+    return {**values, "notes": result.notes | infinite}
 
 
 def _statistics(table: pd.DataFrame) -> dict[str, Any]:
@@ -113,6 +115,7 @@ def _statistics(table: pd.DataFrame) -> dict[str, Any]:
         **{name: table.loc[name, ["value", "low", "high"]].to_dict() for name in WITH_INTERVAL},
         **{name: float(values[name]) for name in ("min", "max", "sse")},
         "n": int(values["n"]),
+        "missing": int(table.attrs["missing"]),
         "block": int(table.attrs["block"]),
         "reliable": bool(table.attrs["reliable"]),
     }
@@ -140,14 +143,14 @@ def _map(table: pd.DataFrame) -> dict[str, Any]:
     return {
         "n": len(table),
         "median": float(table["distance"].median()),
-        "p95": float(table["distance"].quantile(0.95)),
+        "p95": compare.summarised(table["distance"])["p95"],
         "median_seen": float(table["seen"].median()),
         "by_depth": by_depth.rename_axis("depth").reset_index().astype({"depth": str}).to_dict(orient="records"),
     }
 
 
 def _nees(claimed: Claimed) -> dict[str, float | int]:
-    known = claimed.nees[np.isfinite(claimed.nees)]
+    known = claimed.nees[~np.isnan(claimed.nees)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
     return {
         "mean": mean,
@@ -176,12 +179,3 @@ def _pixels(pixels: Pixels | None) -> dict[str, Any]:
 
 def _reprojection(table: pd.DataFrame | None) -> dict[str, Any] | None:
     return None if table is None else compare.reprojection_summary(table)
-
-
-def _finite(value: Any) -> Any:
-    """The same tree with None for every float that is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

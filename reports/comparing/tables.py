@@ -152,7 +152,8 @@ def text_table(comparison: Comparison) -> tuple[list[str], list[Line]]:
         cells = [value_at(known[name], column.path) for name in names]
         others = [c.value for n, c in zip(names, cells, strict=True) if n in rivals and np.isfinite(c.value)]
         least = min(others) if column.compared and len(others) > 1 else None
-        best = [n in rivals and c.value == least for n, c in zip(names, cells, strict=True)]
+        text = None if least is None else number(least)
+        best = [n in rivals and number(c.value) == text for n, c in zip(names, cells, strict=True)]
         lines.append(Line(column.group, column.heading, [c.text for c in cells], best))
     return names, lines
 

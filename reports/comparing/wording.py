@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from fgbaseline.compare import Verdict
+from fgbaseline.compare.travel import distance_travelled
 
-from ..page.numbers import listed, number, per_cent
+from ..page.numbers import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
 from .ranking import ranked, rmse
@@ -36,6 +37,7 @@ def verdict(comparison: Comparison) -> list[str]:
         _nearest,
         _passing,
         _shares,
+        _lengths,
         _offsets,
         _left_out,
         _open,
@@ -135,11 +137,27 @@ def _shares(comparison: Comparison) -> list[str]:
         s = result.shares
         if not np.isfinite(s.noise):
             continue
-        long = "long" if s.scale_percent > 0 else "short"
         heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
         sentences.append(
-            f"Of {result.name}'s squared distance {heading} is heading, {scale} scale (its path is "
-            f"{number(abs(s.scale_percent))} % too {long}) and {rest} the rest."
+            f"Of {result.name}'s squared distance {heading} is heading, {scale} scale (least-squares scale "
+            f"{1.0 + 0.01 * s.scale_percent:.4f} of its positions on the reference's) and {rest} the rest."
+        )
+    return sentences
+
+
+def _lengths(comparison: Comparison) -> list[str]:
+    """By how much the path of each estimate is longer or shorter, over the paired poses, as it came."""
+    sentences = []
+    for result in comparison.results.values():
+        matched = result.matched
+        own = float(distance_travelled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
+        path = float(distance_travelled(matched.reference.position)[-1])
+        if not path > 0.0 or number(own) == number(path):
+            continue
+        than = "longer" if own > path else "shorter"
+        sentences.append(
+            f"The path of {result.name} over the paired poses is {number(own)} m long, "
+            f"{number(100.0 * abs(own / path - 1.0))} % {than} than the reference's."
         )
     return sentences
 
@@ -157,9 +175,10 @@ def _offsets(comparison: Comparison) -> list[str]:
         found = result.offset
         if found is None:
             continue
+        where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
         text = (
-            f"The stamps of {result.name} fit best {1e3 * found.seconds:+.3g} ms later "
-            f"({1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
+            f"The stamps of {result.name} fit best {'as they are' if found.seconds == 0 else where} "
+            f"(shifts of {1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
         )
         sentences.append(text + ("." if found.determined else "; the path does not determine it."))
     return sentences
@@ -171,7 +190,7 @@ def _left_out(comparison: Comparison) -> list[str]:
         counts = (result.matched.left_out_estimate, result.matched.left_out_reference)
         same.setdefault(counts, []).append(result.name)
     return [
-        f"Without a partner, and left out: {number(here)} {'pose' if here == 1 else 'poses'} of {listed(names)}, "
+        f"Without a partner, and left out: {counted(here, 'pose')} of {listed(names)}, "
         f"{number(there)} of {comparison.reference.name}."
         for (here, there), names in same.items()
         if here or there

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from fgbaseline.compare import map_by_depth
+from fgbaseline.data.plural import plural
 from fgbaseline.reports.comparison import Run
 
 from .frames import log_where_positive
@@ -78,5 +79,5 @@ def held_out(run: Run) -> Figure | None:
     panel.grid(axis="y", visible=False)
     panel.set_xlabel("median error on held-out tracks, px, with its 95 % interval")
     n = 0 if run.held_out.errors is None else run.held_out.errors.inliers
-    head(figure, f"Predicting tracks that no estimator saw: {n} pieces of tracks, the same for all")
+    head(figure, f"Predicting tracks that no estimator saw: {plural(n, 'piece')} of tracks, the same for all")
     return figure

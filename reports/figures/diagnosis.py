@@ -12,6 +12,7 @@ from fgbaseline.data.diagnose import Tracks
 from fgbaseline.data.diagnose.diagnosis import turned
 from fgbaseline.data.diagnose.repair import sure_bias
 from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from .layout import lay_out
@@ -160,7 +161,7 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
         panel.set_ylabel("density")
     sigma = fit.sigmas
     title = f"Residuals of the velocities over the noise found: {sigma.linear:.3f} m/s, {sigma.angular:.4f} rad/s"
-    head(figure, title, [swatch("#b8c4d0", f"{len(fit.motion):,} intervals"), *handles])
+    head(figure, title, [swatch("#b8c4d0", plural(len(fit.motion), "interval")), *handles])
     return figure
 
 
@@ -177,7 +178,7 @@ def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
     copied = np.flatnonzero(diagnosis.repeated) + 1
     if len(copied):
         _mark(upper, t[copied], COPIED, 0.0)
-        handles.append(swatch(COPIED, f"{len(copied)} copied frames"))
+        handles.append(swatch(COPIED, plural(len(copied), "copied frame")))
     few = np.flatnonzero(tracks.few)
     if len(few):
         _mark(upper, t[few], WRONG, 0.94)

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 
@@ -146,7 +147,7 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
     axes.scatter(
         landmarks[:, 0], landmarks[:, 1], s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5
     )
-    return swatch(LANDMARK, f"{len(landmarks)} landmarks")
+    return swatch(LANDMARK, plural(len(landmarks), "landmark"))
 
 
 def _draw_orientation(axes: Axes, view: TopView, run: Run, result: Result, path: FloatArray) -> None:

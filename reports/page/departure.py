@@ -24,7 +24,7 @@ class Departure:
     frame: int
     seconds: float
     beyond: float
-    """share of the frames from then on that are farther than that"""
+    """share of the frames with a pose from then on that are farther than that"""
     wrong: float | None
     """share of the matches within `AROUND` that the mask excluded as contradicting their tracks; None without a mask"""
 
@@ -50,7 +50,8 @@ def departure(run: Run, result: Result) -> Departure | None:
     k = int(np.argmax(beyond))
     t = run.problem.sequence.t
     near = np.abs(t - t[k]) <= AROUND
-    return Departure(k, float(t[k] - t[0]), float(beyond[k:].mean()), wrong_share(run.problem, near))
+    share = float(beyond[k:][~np.isnan(position[k:])].mean())
+    return Departure(k, float(t[k] - t[0]), share, wrong_share(run.problem, near))
 
 
 def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | None:

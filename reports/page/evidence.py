@@ -7,7 +7,7 @@ from typing import Any
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.tables import map_by_depth
 
-from .numbers import number
+from .numbers import counted
 from .table import Column, Table, table_of
 
 EVIDENCE = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
@@ -109,5 +109,5 @@ def _moved(run: Run) -> Folded:
         for row in moved.head(MOST_MOVED).to_dict("records")
     ]
     more = f", the clearest {MOST_MOVED}" if len(moved) > MOST_MOVED else ""
-    title = f"{number(len(moved))} tracks whose points moved or slid, as {run.reference} sees them{more}"
+    title = f"{counted(len(moved), 'track')} whose points moved or slid, as {run.reference} sees them{more}"
     return Folded(title, ["landmark", "sights", "speed, m/s", "squared residuals", "of these explained"], rows)

@@ -1,14 +1,19 @@
-"""Numbers as a person reads them: three significant digits, a dash for what is not one."""
+"""Numbers as a person reads them: three significant digits, a dash for what is not one, ∞ for an infinite one."""
 
 from collections.abc import Iterable
-from math import isfinite
+from math import isfinite, isinf
+
+from fgbaseline.data.plural import noun
 
 DASH = "–"
+INFINITY = "∞"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def number(value: object) -> str:
-    """A number to three significant digits (whole from 1000 on, counts in full), or a dash for None and NaN."""
+    """A number to three significant digits (whole from 1000 on, counts in full), ∞, or a dash for None and NaN."""
+    if isinstance(value, float) and isinf(value):
+        return INFINITY if value > 0 else f"\N{MINUS SIGN}{INFINITY}"
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         return DASH
     if isinstance(value, int):
@@ -23,6 +28,11 @@ def number(value: object) -> str:
     mantissa, exponent = f"{value:.2e}".split("e")
     raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa} × 10{raised}".replace("-", "\N{MINUS SIGN}")
+
+
+def counted(n: int, one: str, many: str = "") -> str:
+    """A count and its noun: `one` for 1, else `many`, by default `one` with an s."""
+    return f"{number(n)} {noun(n, one, many)}"
 
 
 def per_cent(share: float) -> str:

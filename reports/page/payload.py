@@ -10,10 +10,10 @@ from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.reprojections import WRONG
 from fgbaseline.reports.figures.view import TopView
 
+from .accuracy_verdict import compared
 from .charts import charts
 from .departure import departure, far
 from .packing import flags, floats, integers, pixels, small_integers
-from .verdict import compared
 
 REASONS = {
     Excluded.FEATURE_NOT_CHOSEN: "not among the features asked for",
@@ -57,12 +57,14 @@ def _who(run: Run, result: Result, axes: FloatArray) -> dict[str, Any]:
         return about
     cameras = estimate.world_T_imu @ run.problem.sequence.imu_T_cam
     used = estimate.used
+    with np.errstate(invalid="ignore"):  # a landmark at infinity
+        points = estimate.landmarks.position @ axes.T
     return about | {
         "path": floats(estimate.world_T_imu[:, :3, 3] @ axes.T),
         "cameras": floats(axes @ cameras[:, :3, :]),
         "covariance": _position_covariance(estimate, axes),
         "landmarks": integers(estimate.landmarks.index),
-        "points": floats(estimate.landmarks.position @ axes.T),
+        "points": floats(points),
         "used": flags(used) if used.any() else None,
     }
 

@@ -19,7 +19,7 @@ from .colouring import colour_rules, keys
 from .diagnosis import findings
 from .embedding import picture
 from .evidence import EVIDENCE, evidence_table, folded_tables
-from .numbers import number, per_cent
+from .numbers import counted, number, per_cent
 from .packing import embedded_json
 from .payload import payload
 from .scripting import policy, script
@@ -102,6 +102,7 @@ def environment() -> Environment:
         loader=FunctionLoader(_text), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     jinja.filters["number"] = number
+    jinja.filters["counted"] = counted
     jinja.filters["flat"] = flat
     return jinja
 

@@ -8,9 +8,10 @@ from typing import Any
 
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
+from fgbaseline.reports.schema_base import INFINITE
 
-from .numbers import DASH, number
-from .verdict import by_products
+from .accuracy_verdict import unranked
+from .numbers import DASH, INFINITY, counted, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,9 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A figure as text, whether it is the best of its column, and the mark of the note that says why it is missing."""
+    """A figure as text, whether it is the best of its column, and the mark of the note on it.
+
+    The note says why the figure is missing, or what it leaves out."""
 
     text: str
     best: bool = False
@@ -92,7 +95,7 @@ class Table:
 def main_table(run: Run, estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     """The table of `estimators` of `summary.json`: columns that no estimator of the run has are left out.
 
-    What belongs to the reference's own run is near to it by nature and is not called best.
+    What belongs to the reference's own run or graph is near to it by nature and is not called best.
     """
     return table_of(run, estimators, COLUMNS)
 
@@ -105,16 +108,21 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
     columns = [c for c in columns if c.group != REFERENCE or len(answered) > 1]
     opens = {c: i > 0 and columns[i - 1].group != c.group for i, c in enumerate(columns)}
     best = {c: _best(run, c, values[c]) for c in columns}
+    best_text = {c: None if value is None else number(float(value) * c.scale) for c, value in best.items()}
     notes: dict[str, str] = {}
 
     def cell(name: str, c: Column) -> Cell:
         value = values[c][name]
         if c.group == REFERENCE and name == run.reference:
             return Cell("reference" if opens[c] or c is columns[0] else "", opens_group=opens[c])
+        why = _why_absent(estimators[name], c) if value is None else _left_out(estimators[name], c)
+        if why == INFINITE:
+            return Cell(INFINITY, opens_group=opens[c])
+        mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
         if value is None:
-            mark = notes.setdefault(_why_absent(estimators[name], c), chr(ord("a") + len(notes) % 26))
             return Cell(DASH, note=mark, opens_group=opens[c])
-        return Cell(number(float(value) * c.scale), best=value == best[c], opens_group=opens[c])
+        text = number(float(value) * c.scale)
+        return Cell(text, best=text == best_text[c], note=mark, opens_group=opens[c])
 
     rows = [
         Row(
@@ -141,10 +149,17 @@ def _why_absent(estimator: Mapping[str, Any], column: Column) -> str:
     return notes.get(".".join(column.path)) or notes.get(column.path[0]) or column.absent
 
 
+def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
+    """How many errors a figure leaves out since they are missing; empty where it leaves out none."""
+    part = estimator.get(column.path[0])
+    missing = part.get("missing", 0) if isinstance(part, Mapping) else 0
+    return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
+
+
 def _best(run: Run, column: Column, values: Mapping[str, float | int | None]) -> float | int | None:
     known = {name: value for name, value in values.items() if value is not None}
     if column.group == REFERENCE:
-        near_by_nature = {run.reference, *by_products(run)}
+        near_by_nature = {run.reference, *unranked(run)}
         known = {name: value for name, value in known.items() if name not in near_by_nature}
     if column.best == 0 or len(known) < 2:
         return None

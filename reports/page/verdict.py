@@ -1,26 +1,26 @@
 """What the numbers of a run mean, in words: every sentence has a number or a reason, and none flatters."""
 
 from collections.abc import Callable, Iterable
-from pathlib import PurePath
 
 import numpy as np
 
 from fgbaseline.compare import Verdict, divergence_summary, reprojection_summary
 from fgbaseline.data import Status
-from fgbaseline.reports.comparison import Result, Run
+from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
-from .departure import AROUND, departure, far, path_length, wrong_seconds, wrong_share
+from .accuracy_verdict import by_products, compared, divergence_rmse, nearest_sentences, truth_sentences
+from .departure import AROUND, departure, far, wrong_seconds, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
-from .numbers import listed, number, per_cent
+from .numbers import counted, listed, number, per_cent
 
 
 def verdict(run: Run) -> list[str]:
     """Sentences on a run, what everything else leans on first."""
     parts: tuple[Callable[[Run], list[str]], ...] = (
         _reference,
-        _truth,
-        _nearest,
+        truth_sentences,
+        nearest_sentences,
         _departures,
         _ends,
         _consistency,
@@ -31,17 +31,6 @@ def verdict(run: Run) -> list[str]:
         _noise,
     )
     return [sentence for part in parts for sentence in part(run)]
-
-
-def compared(run: Run) -> list[Result]:
-    """The results that can be held against the reference, nearest first: not itself."""
-    others = [r for r in run.answered if r.name != run.reference and r.divergence is not None]
-    return sorted(others, key=_divergence)
-
-
-def by_products(run: Run) -> frozenset[str]:
-    """What the reference's own run gave along: near to it by nature."""
-    return frozenset() if run.reference is None else frozenset(run.results[run.reference].estimate.by_products)
 
 
 def _reference(run: Run) -> list[str]:
@@ -58,58 +47,11 @@ def _reference(run: Run) -> list[str]:
     return [f"The reference, {run.reference}, is {run.trust.verdict.name.lower()}: {reasons}{so}."]
 
 
-def _truth(run: Run) -> list[str]:
-    truth = run.problem.sequence.truth
-    if truth is None:
-        return []
-    source, n, T = PurePath(truth.source).name, int(truth.known.sum()), run.problem.n_frames
-    coverage = (
-        f"all {number(T)} frames"
-        if n == T
-        else f"{number(n)} of {number(T)} frames; the other {number(T - n)} are left out"
-    )
-    errors = {r.name: _ate(r) for r in run.answered}
-    ranked = sorted((name for name in errors if np.isfinite(errors[name])), key=lambda name: errors[name])
-    if not ranked:
-        return [f"The truth ({source}; {coverage}) cannot be compared with: no estimator has a pose where it does."]
-    each = listed(f"{number(errors[name])} m for {name}" for name in ranked)
-    sentences = [f"Against the truth ({source}; {coverage}), the error of the aligned path is {each} (RMSE)."]
-    reference = run.reference
-    if reference in errors:
-        better = [name for name in ranked if errors[name] < errors[reference] and name not in by_products(run)]
-        if better:
-            than = listed(f"{name} ({number(errors[name])} m)" for name in better)
-            sentences.append(
-                f"The reference is worse than {than} here: {reference} has {number(errors[reference])} m, "
-                "so nearness to it is no merit on this recording."
-            )
-    return sentences
-
-
-def _nearest(run: Run) -> list[str]:
-    others = [r for r in compared(run) if np.isfinite(_divergence(r))]
-    own = [r for r in others if r.name in by_products(run)]
-    others = [r for r in others if r.name not in by_products(run)]
-    sentences = []
-    if others:
-        first, *rest = (f"{number(_divergence(r))} m ({_of_path(r)})" for r in others)
-        text = f"Nearest to {run.reference} is {others[0].name}, {first} away (RMSE along {_length(others[0])})"
-        if rest:
-            text += ", then " + listed(f"{r.name} with {away}" for r, away in zip(others[1:], rest, strict=True))
-        sentences.append(text + ".")
-    for result in own:
-        sentences.append(
-            f"{result.name} is the same run, each pose as known when its frame came: what came later moved them by "
-            f"{number(_divergence(result))} m RMSE."
-        )
-    return sentences
-
-
 def _departures(run: Run) -> list[str]:
     sentences = []
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     for result in compared(run):
-        if result.divergence is None or result.name in by_products(run) or not np.isfinite(_divergence(result)):
+        if result.divergence is None or result.name in by_products(run) or not np.isfinite(divergence_rmse(result)):
             continue
         limit, left = f"{far(result):.3g} m", departure(run, result)
         if left is None:
@@ -145,19 +87,16 @@ def _ends(run: Run) -> list[str]:
 
 def _consistency(run: Run) -> list[str]:
     mean = {r.name: _mean(r.nees) for r in run.answered if r.nees is not None}
-    known = {name: value for name, value in mean.items() if np.isfinite(value)}
+    known = {name: value for name, value in mean.items() if not np.isnan(value)}
     if not known:
         return []
     each = (
-        f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} times for {name} (NEES {number(value)})"
+        f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} for {name} (NEES {number(value)})"
         for name, value in sorted(
             known.items(), key=lambda item: abs(np.log(max(item[1], 1e-300) / DEGREES_OF_FREEDOM))
         )
     )
-    return [
-        f"True errors against those the covariances claim: {listed(each)}; {DEGREES_OF_FREEDOM} is the NEES of a "
-        "filter that knows its errors."
-    ]
+    return [f"Normalized error RMS, the root of the mean NEES / {DEGREES_OF_FREEDOM} (expected 1): {listed(each)}."]
 
 
 def _common_observations(run: Run) -> list[str]:
@@ -174,7 +113,8 @@ def _common_observations(run: Run) -> list[str]:
     ranked = sorted(medians, key=lambda name: medians[name])
     each = listed(f"{number(medians[name])} px for {name}" for name in ranked)
     return [
-        f"Over the {number(len(common))} observations that all of them used, the median reprojection error is {each}."
+        f"Over the {counted(len(common), 'observation')} that all of them used, the median reprojection error is "
+        f"{each}."
     ]
 
 
@@ -202,23 +142,6 @@ def _noise(run: Run) -> list[str]:
     ]
 
 
-def _divergence(result: Result) -> float:
-    return float("nan") if result.divergence is None else divergence_summary(result.divergence)["rmse"]
-
-
-def _ate(result: Result) -> float:
-    return float("nan") if result.truth_aligned is None else divergence_summary(result.truth_aligned)["rmse"]
-
-
-def _of_path(result: Result) -> str:
-    length = path_length(result)
-    return f"{per_cent(_divergence(result) / length)} of the path" if length > 0 else "no path"
-
-
-def _length(result: Result) -> str:
-    return f"a path of {number(path_length(result))} m"
-
-
 def _mean(values: Iterable[float]) -> float:
-    finite = np.asarray([v for v in values if np.isfinite(v)], dtype=np.float64)
-    return float(finite.mean()) if len(finite) else float("nan")
+    known = np.asarray([v for v in values if not np.isnan(v)], dtype=np.float64)
+    return float(known.mean()) if len(known) else float("nan")

@@ -6,9 +6,10 @@ from collections.abc import Sequence as Several
 import numpy as np
 
 from fgbaseline.data import Status
+from fgbaseline.data.plural import plural
 
 from .claim import Claim, Verdict, causes, claim_on
-from .measures import metres, path_length, per_cent, plural, px
+from .measures import metres, path_length, per_cent, px
 from .study import Staged, Study
 from .the_report import REPORTED, Reported
 from .trial import Outcome
@@ -63,7 +64,7 @@ def _samples(study: Study, told: Reported) -> Claim:
         "samples",
         f"the data is given over {told.frames} seconds",
         Verdict.FALSE,
-        f"{sequence.n_frames} frames in {seconds:.1f} s",
+        f"{plural(sequence.n_frames, 'frame')} in {seconds:.1f} s",
         f"{told.frames} is the number of samples, taken {1 / np.median(sequence.dt):.1f} times a second",
     )
 
@@ -86,7 +87,7 @@ def _features(study: Study, told: Reported) -> Claim:
         "features",
         claim,
         Verdict.HOLDS if tracks == told.tracks else Verdict.FALSE,
-        f"{tracks} tracks, {len(o)} observations",
+        f"{plural(tracks, 'track')}, {plural(len(o), 'observation')}",
         f"on average {len(o) / max(1, tracks):.0f} frames a track and "
         f"{len(o) / study.subject.recorded.n_frames:.0f} tracks a frame",
     )

@@ -22,11 +22,6 @@ def per_cent(share: float) -> str:
     return f"{100.0 * share:.3g} %" if isfinite(share) else "–"
 
 
-def plural(n: int, one: str) -> str:
-    """'1 frame', '5 frames'."""
-    return f"{n} {one}{'' if n == 1 else 's'}"
-
-
 def px(value: float) -> str:
     """'30.6 px', or 'no path'."""
     return f"{value:.3g} px" if isfinite(value) else "no path"

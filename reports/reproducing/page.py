@@ -9,6 +9,8 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from fgbaseline.data.plural import plural
+
 from ..page.embedding import Picture, picture
 from ..page.numbers import number
 from .claim import Claim, Verdict
@@ -67,7 +69,11 @@ def verdict(study: Study) -> list[str]:
 
 
 def _state(outcome: Outcome) -> str:
-    lost = f", its covariance as printed lost at {outcome.lost} frames" if outcome.lost else ", no covariance lost"
+    lost = (
+        f", its covariance as printed lost at {plural(outcome.lost, 'frame')}"
+        if outcome.lost
+        else ", no covariance lost"
+    )
     return (
         f"{metres(outcome.apart_rmse)} (RMS) from dead reckoning with a median reprojection error of "
         f"{outcome.reprojection:.3g} px{lost}"

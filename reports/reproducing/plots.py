@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from ..figures.lettering import plain
@@ -66,9 +67,9 @@ def plot(
         box = _with(box, points)
         shown = box.holds(points)
         axes.scatter(points[shown, 0], points[shown, 1], s=5, color=LANDMARK, linewidths=0, rasterized=True, zorder=1.5)
-        handles.append(swatch(LANDMARK, f"{len(points)} landmarks"))
+        handles.append(swatch(LANDMARK, plural(len(points), "landmark")))
         if not shown.all():
-            note(axes, f"{int((~shown).sum())} landmarks outside the picture")
+            note(axes, f"{plural(int((~shown).sum()), 'landmark')} outside the picture")
     handles += axes.plot(*xy.T, color=PATH, linewidth=1.4, label="path")
     if arrows:
         _arrows(axes, path)

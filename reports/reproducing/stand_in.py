@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.axes import axes_matrix
 from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.plural import plural
 from fgbaseline.data.simulate import Simulation, Velocities, simulate_with_labels
 from fgbaseline.data.simulate.rig import rig_of
 from fgbaseline.geometry import FloatArray
@@ -55,8 +56,9 @@ def stand_in(recorded: Sequence, seed: int = 0) -> StandIn:
     wanted = round(TRACKS_PER_FRAME * recorded.n_frames)
     sequence, wrong = _of_size(simulation, wanted, seed)
     told = (
-        f"Simulated: {recorded.name} has no features here, so {sequence.n_landmarks:,} tracks were simulated along its "
-        f"real velocities, the rates recorded in other axes ({ANGULAR_AXES}, as found in 03.npz), {remark}, "
+        f"Simulated: {recorded.name} has no features here, so "
+        f"{plural(sequence.n_landmarks, 'track was', 'tracks were')} simulated "
+        f"along its real velocities, the rates recorded in other axes ({ANGULAR_AXES}, as found in 03.npz), {remark}, "
         f"{wrong.mean():.0%} of the matches wrong."
     )
     return StandIn(replace(sequence, name=f"{recorded.name} (simulated)"), ANGULAR_AXES, bias, wrong, told)
@@ -68,7 +70,11 @@ def _bias(recorded: Sequence) -> tuple[FloatArray, str]:
         return np.zeros(3), "without a bias, since the car never stands still to show it"
     bias = np.median(recorded.angular_velocity[still], axis=0)
     read = ", ".join(f"{rate:.4f}" for rate in bias)
-    return bias, f"with the bias of ({read}) rad/s that the gyroscope reads in {int(still.sum())} frames of standstill"
+    return (
+        bias,
+        f"with the bias of ({read}) rad/s that the gyroscope reads in "
+        f"{plural(int(still.sum()), 'frame')} of standstill",
+    )
 
 
 def _of_size(simulation: Simulation, wanted: int, seed: int) -> tuple[Sequence, BoolArray]:

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fgbaseline.data import Status
+from fgbaseline.data.plural import plural
 
 from ..figures.lettering import plain
 from ..figures.style import WIDTH, head
-from .measures import metres, path_length, plural
+from .measures import metres, path_length
 from .study import Study
 from .trial import Outcome
 

@@ -1,0 +1,80 @@
+"""By which factor the residuals are larger than the noise model says: 1 where the model is right."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import gammainc
+
+from fgbaseline.data import Estimate, Problem
+from fgbaseline.geometry import FloatArray
+
+from .cost import motion_squares, pixel_squares, prior_squares
+from .reprojection import ROWS, reprojection
+
+RANGE = (1e-9, 1e9)
+"""within which a scale is looked for"""
+
+
+def pixel_scale(problem: Problem, estimate: Estimate) -> float:
+    """The scale s of Gaussian pixel noise, in units of the model's, that explains the residuals an estimate used.
+
+    At s the expected sum of kernel-weighted whitened squares equals the observed one. The residual of an observation
+    is Gaussian over three rows with the variance s^2 (1 - h), h being what the estimated parameters absorb: the
+    landmark 1 / n of a track of n observations (nothing where it has a prior), the poses and the priors what is left of
+    the motion's and the priors' squares. In a linear least-squares problem the expected squares of pixels, motion and
+    priors add up to 3 n - 3 m for m landmarks without a prior (3 n with one): what motion and priors keep is missing
+    from the pixels. NaN where a residual is NaN or no degree of freedom is left, infinite where one is infinite.
+    """
+    table = reprojection(problem.sequence, estimate)
+    table = table[table["used"]]
+    squared = pixel_squares(problem, table[list(ROWS)].to_numpy())
+    threshold = None if problem.kernel is None else problem.kernel.threshold
+    observed = float(np.sum(kernel_weighted(squared, threshold)))
+    if not np.isfinite(observed):
+        return observed
+    _, track, seen = np.unique(table["landmark"].to_numpy(), return_inverse=True, return_counts=True)
+    prior = problem.landmark_prior is not None
+    freedom = np.ones(len(table)) if prior else 1.0 - 1.0 / seen[track]
+    kept = np.minimum(motion_squares(problem, estimate), 6.0).sum()
+    if prior:
+        kept += min(prior_squares(problem, estimate, estimate.used), 3.0 * len(seen))
+    freedom *= max(0.0, 1.0 - kept / max(3.0 * freedom.sum(), 1.0))
+    if not freedom.sum() > 0.0:
+        return float("nan")
+    width, count = np.unique(np.sqrt(freedom), return_counts=True)
+
+    def excess(log_scale: float) -> float:
+        return float(count @ expected_square(np.exp(log_scale) * width, threshold)) - observed
+
+    low, high = np.log(RANGE)
+    if not excess(low) < 0.0 < excess(high):
+        return 0.0 if observed == 0.0 else float("inf")
+    return float(np.exp(brentq(excess, low, high, xtol=1e-9)))
+
+
+def motion_scale(problem: Problem, estimate: Estimate) -> float:
+    """Root mean square of the whitened motion residuals, per degree of freedom: at most 1 is expected, since the
+    poses absorb what the pixels determine."""
+    return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / 6.0))
+
+
+def kernel_weighted(squared: FloatArray, threshold: float | None) -> FloatArray:
+    """(n,) whitened squares of observations times Huber's weight min(1, threshold / norm)."""
+    if threshold is None:
+        return squared
+    return np.minimum(squared, threshold * np.sqrt(squared))
+
+
+def expected_square(scale: ArrayLike, threshold: float | None) -> FloatArray:
+    """(...,) the expectation of `kernel_weighted` for three independent Gaussian rows of standard deviation `scale`.
+
+    With x = norm / scale, which is chi-distributed with 3 degrees of freedom, and c = threshold / scale:
+    scale^2 E[x^2; x < c] + threshold scale E[x; x >= c].
+    """
+    s = np.asarray(scale, dtype=np.float64)
+    if threshold is None:
+        return np.asarray(3.0 * s**2)
+    with np.errstate(divide="ignore", over="ignore"):
+        half = 0.5 * (threshold / s) ** 2
+    beyond = np.where(half < 700.0, (half + 1.0) * np.exp(-np.minimum(half, 700.0)), 0.0)
+    return np.asarray(3.0 * s**2 * gammainc(2.5, half) + threshold * s * np.sqrt(8.0 / np.pi) * beyond)

@@ -1,0 +1,58 @@
+"""A sentence has the number of its noun, the sign of its word, and names exactly the quantity it holds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fgbaseline import compare, data
+from fgbaseline.data.plural import noun, plural
+from fgbaseline.geometry import se3
+from fgbaseline.reports.comparing import compare as compared
+from fgbaseline.reports.page.numbers import counted, number
+
+
+def test_a_count_of_one_has_a_singular() -> None:
+    assert [plural(n, "frame") for n in (0, 1, 2, 1009)] == ["0 frames", "1 frame", "2 frames", "1,009 frames"]
+    assert [noun(n, "match", "matches") for n in (1, 2)] == ["match", "matches"]
+    assert counted(1, "error is", "errors are") == "1 error is"
+
+
+def path(n: int = 200, scale: float = 1.0) -> data.Trajectory:
+    """A bending path of some 60 m."""
+    t = 0.1 * np.arange(n)
+    poses = np.tile(np.eye(4), (n, 1, 1))
+    poses[:, :3, 3] = scale * np.stack([20.0 * np.sin(0.15 * t), 10.0 * np.sin(0.3 * t), 0.1 * t], axis=1)
+    return data.Trajectory(t, poses, "reference")
+
+
+@pytest.mark.parametrize("scale", [0.97, 1.0, 1.04])
+def test_the_length_of_a_path_is_that_of_the_path_and_not_of_a_fit(scale: float) -> None:
+    reference = path()
+    bent = path(scale=scale).world_T_body @ se3.exp([0.0, 0.3, 0.0, 0.0, 0.0, 0.2])
+    estimate = data.Trajectory(reference.t, bent, "mine")
+    result = compared(reference, estimate)
+    own, its = (np.linalg.norm(np.diff(p.world_T_body[:, :3, 3], axis=0), axis=1).sum() for p in (estimate, reference))
+    sentence = next((s for s in result.verdict if s.startswith("The path of mine")), "")
+    assert bool(sentence) == (number(own) != number(its))
+    if sentence:
+        than = "longer" if own > its else "shorter"
+        assert f"{number(float(own))} m long, {number(100.0 * abs(own / its - 1.0))} % {than} than" in sentence
+
+
+@pytest.mark.parametrize(("shift", "word"), [(0.2, "earlier"), (-0.2, "later")])
+def test_a_shift_of_time_has_no_sign_beside_its_word(shift: float, word: str) -> None:
+    reference = path()
+    estimate = data.Trajectory(reference.t + shift, reference.world_T_body, "mine")
+    result = compared(reference, estimate, search_offset=1.0)
+    assert any(s.startswith(f"The stamps of mine fit best 200 ms {word} ") for s in result.verdict)
+
+
+def test_paths_without_stamps_are_paired_by_their_number(tmp_path: Path) -> None:
+    reference = path(30)
+    for name in ("a", "b"):
+        data.write_kitti(tmp_path / f"{name}.txt", reference.world_T_body)
+    result = compared(tmp_path / "a.txt", tmp_path / "b.txt")
+    assert "30 poses paired (by their number" in result.caption
+    assert "0.01 s" not in result.caption
+    assert "within 0.01 s" in compare.associate(reference, reference).caption
