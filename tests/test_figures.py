@@ -278,7 +278,7 @@ def test_labels_of_a_column_of_panels_stand_in_one_line() -> None:
     assert len({axes.yaxis.label.get_position()[0] for axes in panels}) == 1
 
 
-@pytest.mark.parametrize("height", [2.0, 10.3187, 10.32, 5.0031, 7.7799])
+@pytest.mark.parametrize("height", [2.0, np.nextafter(10.32, 0.0), 7.7799])  # the second is a tick below 1548 rows
 def test_a_png_has_the_pixels_of_the_canvas_at_any_height(height: float) -> None:
     figure = Figure(figsize=(4.0, height), dpi=DPI)
     figure.subplots().plot([0.0, 1.0], [0.0, height])
