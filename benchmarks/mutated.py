@@ -3,7 +3,7 @@
     python -m benchmarks.mutated --cases 10000 --workers 2
 
 Case i is the same in every run: base, mutation (tests/mutations.py, in turn) and the mutation's chance come from i.
-Each command runs in a fork of a worker, may take a minute of a processor, and has to end with 0, 1 or 2 and without a traceback.
+Each command runs in a fork of a worker, may take a minute of a processor, and ends with 0, 1 or 2 and no traceback.
 A recording in wrong units may not pass `diagnose`. It may pass `check` only with the error of the good recording (it
 was repaired; `--strict` forbids that too). A mutated trajectory is refused or compared with the good one's errors.
 The exit code is 1 where a case violates that.
