@@ -11,20 +11,26 @@ installed = { $(UV) $(1) || { echo "uv could not install; pip does" >&2; $(BIN)/
 
 QUICK_CHECK :=
 
-.PHONY: run test coverage mutants quick bench docs figures fuzz lint types arrows install schema wheel clean
+.PHONY: run test test-all coverage mutants quick bench docs figures fuzz lint types arrows install schema wheel clean
 
 run: install
 	$(BIN)/fgbaseline run --out $(OUT) --force
 
 # Files are shared out whole: their tests share what is expensive.
 test: install lint types arrows
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not full"
+	@echo "Left out: tests that take minutes to hours (marked full). make test-all runs them too."
+
+# Everything, in hours: after `make test` every command of README and docs as it is printed, figures drawn, on the real
+# recordings where they are at hand, and every mutation of a recording or trajectory.
+test-all: test
+	$(BIN)/pytest -m full
 
 # Which lines and branches the tests run, in all processes: fails below 92 % of both together (pyproject.toml), and below
 # 92 % of the branches. Twice as long as the tests alone. What killed commands left half-written is passed over.
 coverage: install
 	rm -rf out/coverage
-	$(BIN)/coverage run -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/coverage run -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not full"
 	$(BIN)/coverage combine --quiet
 	rm -f out/coverage/data.*
 	$(BIN)/coverage json --quiet --fail-under 0

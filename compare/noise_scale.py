@@ -29,7 +29,7 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     table = table[table["used"]]
     squared = pixel_squares(problem, table[list(ROWS)].to_numpy())
     threshold = None if problem.kernel is None else problem.kernel.threshold
-    observed = float(np.sum(kernel_weighted(squared, threshold)))
+    observed = float(np.sum(problem.measurement.weighted(squared)))
     if not np.isfinite(observed):
         return observed
     _, track, seen = np.unique(table["landmark"].to_numpy(), return_inverse=True, return_counts=True)
@@ -58,15 +58,8 @@ def motion_scale(problem: Problem, estimate: Estimate) -> float:
     return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / 6.0))
 
 
-def kernel_weighted(squared: FloatArray, threshold: float | None) -> FloatArray:
-    """(n,) whitened squares of observations times Huber's weight min(1, threshold / norm)."""
-    if threshold is None:
-        return squared
-    return np.minimum(squared, threshold * np.sqrt(squared))
-
-
 def expected_square(scale: ArrayLike, threshold: float | None) -> FloatArray:
-    """(...,) the expectation of `kernel_weighted` for three independent Gaussian rows of standard deviation `scale`.
+    """(...,) the mean of `HuberKernel.weighted` for three independent Gaussian rows of standard deviation `scale`.
 
     With x = norm / scale, which is chi-distributed with 3 degrees of freedom, and c = threshold / scale:
     scale^2 E[x^2; x < c] + threshold scale E[x; x >= c].

@@ -57,8 +57,8 @@ def wandering(problem: Problem, long: BoolArray) -> FloatArray:
     twist = problem.increment[~long] / dt[~long, None]
     noise = np.einsum("nii->i", problem.increment_covariance[~long] / dt[~long, None, None] ** 2) / len(twist)
     stretch = np.cumsum(long)[~long]
-    shortest = max(1, round(SHORTEST_LAG / usual))
-    longest = max(shortest, min(round(float(dt.max()) / usual), len(twist) - MIN_PAIRS))
+    shortest = max(1, round(min(SHORTEST_LAG / usual, len(twist))))
+    longest = max(shortest, round(min(float(dt.max()) / usual, len(twist) - MIN_PAIRS)))
     density = np.zeros(6)
     for lag in np.unique(np.geomspace(shortest, longest, LAGS).astype(int)).tolist():
         together = stretch[lag:] == stretch[:-lag]

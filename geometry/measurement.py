@@ -54,6 +54,10 @@ class HuberKernel:
         """k / max(norm, k) of squared whitened norms (...): the factor on the inverse of the noise."""
         return np.asarray(self.threshold / np.maximum(np.sqrt(squared), self.threshold), dtype=np.float64)
 
+    def weighted(self, squared: FloatArray) -> FloatArray:
+        """Squared whitened norms (...) times their weight; infinite where they are."""
+        return np.minimum(squared, self.threshold * np.sqrt(squared))
+
     def loss(self, squared: FloatArray) -> FloatArray:
         """Twice Huber's loss of squared whitened norms (...): the square up to k^2, then 2 k norm - k^2."""
         k = self.threshold
@@ -94,6 +98,10 @@ class StereoMeasurement:
     def weight(self, squared: FloatArray) -> FloatArray:
         """The kernel's weights of squared whitened norms (...); 1 without a kernel."""
         return np.ones_like(squared) if self.kernel is None else self.kernel.weight(squared)
+
+    def weighted(self, squared: FloatArray) -> FloatArray:
+        """Squared whitened norms (...) times the kernel's weight."""
+        return squared if self.kernel is None else self.kernel.weighted(squared)
 
     def loss(self, squared: FloatArray) -> FloatArray:
         """The kernel's loss of squared whitened norms (...): these themselves without a kernel."""

@@ -60,14 +60,16 @@ def fgbaseline(
     cwd: Path,
     drawing: bool = True,
     first: Callable[[], object] = lambda: None,
+    seconds: float = SECONDS,
     **env: str,
 ) -> subprocess.CompletedProcess[str]:
     """The command in a fork: its own folder, environment, output and end, and none of the seconds that imports take.
 
     Without `drawing`, figures have their files, but nothing is on them. `first` is called in the fork before all else.
+    Raises subprocess.TimeoutExpired after `seconds`; the command is killed then.
     """
     command = _in_a_fork([str(part) for part in arguments], environment(**env), drawing, first)
-    return _ended(["fgbaseline", *arguments], cwd, None, command)
+    return _ended(["fgbaseline", *arguments], cwd, None, command, seconds)
 
 
 def started(*arguments: str | Path, cwd: Path, drawing: bool = True) -> subprocess.Popen[str]:
@@ -86,7 +88,11 @@ def started(*arguments: str | Path, cwd: Path, drawing: bool = True) -> subproce
 
 
 def _ended(
-    command: list[str | Path], cwd: Path, env: dict[str, str] | None, instead: Callable[[], NoReturn] | None = None
+    command: list[str | Path],
+    cwd: Path,
+    env: dict[str, str] | None,
+    instead: Callable[[], NoReturn] | None = None,
+    seconds: float = SECONDS,
 ) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [str(part) for part in command],
@@ -95,7 +101,7 @@ def _ended(
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=SECONDS,
+        timeout=seconds,
         check=False,
         preexec_fn=instead,
         restore_signals=instead is None,  # those that Python ignores are ignored in a fork of it

@@ -1,6 +1,7 @@
 """Every command and snippet that README and docs show is run, on short recordings under the names they have there.
 
-A command that is neither run here nor named below, with the test that runs it or the reason why none can, is a failure.
+This is the cheap form, with figures drawn; tests/test_docs_in_full.py runs all of them as they are printed. A command
+that is neither run here nor named below, with the test that runs a cheap form of it, is a failure.
 """
 
 import os
@@ -23,7 +24,6 @@ from fgbaseline.reports.cli.main import COMMANDS, group
 
 from .commands import environment
 from .documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown
-from .empty_figures import figures_left_empty
 
 ELSEWHERE = {
     "make test": "tests/test_docs.py::test_targets_of_make_are_there",
@@ -47,16 +47,19 @@ ELSEWHERE = {
         "tests/test_reproduce.py::test_every_figure_is_there_in_three_forms"
     ),
 }
-"""command -> the test that runs it, on other recordings and for a shorter time"""
-IDLE = "it measures for half an hour, what only an idle machine can tell"
-OVER_AND_OVER = "it runs the tests themselves, for half an hour and more"
-NOT_RUN = {
-    "make coverage": OVER_AND_OVER,
-    "make mutants": OVER_AND_OVER,
+"""command -> the test that runs its cheap form"""
+IN_FULL = "tests/test_docs_in_full.py::test_every_command_and_snippet_runs_as_printed"
+"""which runs every command of all these lists as it is printed, in hours"""
+HOURS = {
+    "make coverage",
+    "make mutants",
+    "make bench",
+    "make bench BENCH_FLAGS=--quick",
+    "python -m benchmarks.isam2_variants 2011_09_26_drive_0036_sync_KLT.mat",
+}
+"""commands of which there is no cheap form"""
+NEVER_RUN = {
     "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
-    "make bench": IDLE,
-    "make bench BENCH_FLAGS=--quick": IDLE,
-    "python -m benchmarks.isam2_variants 2011_09_26_drive_0036_sync_KLT.mat": IDLE,
 }
 """command -> why no test can run it"""
 SHORTER = {
@@ -73,6 +76,12 @@ name = "town"
 simulate = { path = "town", duration = 2, features_per_frame = 15 }
 seeds = { count = 2 }
 """
+
+
+def has_chromium() -> bool:
+    """Whether a browser is there that can make a picture of a page."""
+    browsers = (os.environ.get("FGBASELINE_CHROMIUM", ""), "chromium", "google-chrome")
+    return any(shutil.which(browser) for browser in browsers)
 
 
 class Place:
@@ -132,10 +141,7 @@ class Place:
         assert result in allowed, f"exit code {result}"
 
     def _script(self, arguments: list[str]) -> None:
-        if "report_image" in arguments[0] and not any(
-            shutil.which(browser)
-            for browser in (os.environ.get("FGBASELINE_CHROMIUM", ""), "chromium", "google-chrome")
-        ):
+        if "report_image" in arguments[0] and not has_chromium():
             pytest.skip("there is no Chromium")
         command = [sys.executable, str(ROOT / arguments[0]), *arguments[1:]]
         result = subprocess.run(
@@ -156,7 +162,7 @@ class Place:
                 shutil.rmtree(self.folder / "out" / "comparison", ignore_errors=True)  # which several write
                 exec(compile(block.text, name(document), "exec"), namespace)
             for command in commands(block):
-                if command not in ELSEWHERE and command not in NOT_RUN:
+                if command not in {*ELSEWHERE, *HOURS, *NEVER_RUN}:
                     self.run(command)
         self.namespaces[name(document)] = namespace
         return namespace
@@ -166,7 +172,6 @@ class Place:
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     folder = tmp_path_factory.mktemp("docs")
     with pytest.MonkeyPatch.context() as patch:
-        figures_left_empty(patch)
         patch.chdir(folder)
         yield Place(folder)
 
@@ -210,13 +215,14 @@ def test_a_command_that_does_not_run_is_noticed(place: Place) -> None:
 def test_lists_hold_nothing_that_is_not_shown() -> None:
     there = {command for _, command in shown()}
     assert set(ELSEWHERE) <= there
-    assert set(NOT_RUN) <= there
+    assert there >= HOURS
+    assert set(NEVER_RUN) <= there
     for part in SHORTER:
         assert any(part in command for command in there), part
 
 
 def test_tests_that_run_a_command_elsewhere_are_there() -> None:
-    for test in ELSEWHERE.values():
+    for test in (*ELSEWHERE.values(), IN_FULL):
         file, _, function = test.partition("::")
         assert f"\ndef {function}(" in (ROOT / file).read_text(), test
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
@@ -10,6 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from PIL import Image
 
 from fgbaseline.data import Observations
 from fgbaseline.reports import figures
@@ -18,7 +20,7 @@ from fgbaseline.reports.figures.drawing import drawings
 from fgbaseline.reports.figures.layout import lay_out
 from fgbaseline.reports.figures.lettering import plain
 from fgbaseline.reports.figures.palette import OWN
-from fgbaseline.reports.figures.style import in_style
+from fgbaseline.reports.figures.style import DPI, in_style
 from fgbaseline.reports.figures.view import TopView
 
 from .reported import answer, failed, partly_known, run_of, scene, standard_run
@@ -274,6 +276,17 @@ def test_a_logarithmic_axis_is_labelled_with_numbers_and_powers_where_these_woul
 def test_labels_of_a_column_of_panels_stand_in_one_line() -> None:
     panels = drawn_standard()["divergence"].axes
     assert len({axes.yaxis.label.get_position()[0] for axes in panels}) == 1
+
+
+@pytest.mark.parametrize("height", [2.0, np.nextafter(10.32, 0.0), 7.7799])  # the second is a tick below 1548 rows
+def test_a_png_has_the_pixels_of_the_canvas_at_any_height(height: float) -> None:
+    figure = Figure(figsize=(4.0, height), dpi=DPI)
+    figure.subplots().plot([0.0, 1.0], [0.0, height])
+    raw = BytesIO()
+    figure.savefig(raw, format="rgba", dpi=DPI)
+    pixels = np.asarray(Image.open(BytesIO(figures.encoded(figure, "png"))))
+    canvas = np.frombuffer(raw.getvalue(), np.uint8).reshape(-1, pixels.shape[1], 4)
+    np.testing.assert_array_equal(pixels, canvas[:, :, :3])
 
 
 def test_nothing_moves_when_a_figure_is_written(tmp_path: Path) -> None:

@@ -16,6 +16,9 @@ from ..problem import Excluded, LandmarkPrior, Problem, Reading
 from ..sequence import Sequence
 from . import layout
 
+MOST_UNSEEN = 100
+"""landmarks for each observation: some are seen in no frame, and arrays have their size"""
+
 
 def read_problem(folder: FilePath) -> Problem:
     """The problem that `write_problem` left in a folder (or that something else wrote in the same form), truth missing.
@@ -75,8 +78,8 @@ class _Numbers:
     def whole(self, key: str, *shape: int | None) -> IntArray:
         """The same of whole numbers from 0 on."""
         array = self.real(key, *shape)
-        if (array < 0).any() or (array != np.floor(array)).any():
-            raise InputError(f"{key}: expected whole numbers from 0 on; export the problem again")
+        if (array < 0).any() or (array != np.floor(array)).any() or (array >= 2**31).any():
+            raise InputError(f"{key}: expected whole numbers from 0 on, below 2^31; export the problem again")
         return array.astype(np.int64)
 
     def optional(self, key: str) -> float | None:
@@ -122,6 +125,12 @@ def _sequence(numbers: _Numbers, words: dict[str, Any]) -> Sequence:
     t = time_stamps("t", numbers.real("t", None, finite=False))
     K, imu_T_cam = numbers.real("K", 3, 3), numbers.real("imu_T_cam", 4, 4)
     n = len(numbers.real("frame", None))
+    n_landmarks = int(numbers.whole("n_landmarks"))
+    if n_landmarks > MOST_UNSEEN * (n + 1):
+        raise InputError(
+            f"n_landmarks: {n_landmarks:,} landmarks for {n:,} observations are more than {MOST_UNSEEN} for each; "
+            "number the landmarks from 0 on"
+        )
     frame, landmark = numbers.whole("frame", n), numbers.whole("landmark", n)
     order = np.diff(frame) * (int(landmark.max(initial=0)) + 1) + np.diff(landmark)
     if np.any(order <= 0):
@@ -136,7 +145,7 @@ def _sequence(numbers: _Numbers, words: dict[str, Any]) -> Sequence:
         ),
         imu_T_cam=extrinsic("imu_T_cam", imu_T_cam[:3, :3], imu_T_cam[:3, 3]),
         observations=Observations(frame, landmark, numbers.real("pixel", n, 4)),
-        n_landmarks=int(numbers.whole("n_landmarks")),
+        n_landmarks=n_landmarks,
         up_imu=numbers.real("up", 3),
         remarks=words["sequence_remarks"],
     )

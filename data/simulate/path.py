@@ -10,6 +10,9 @@ from fgbaseline.geometry import FloatArray, InputError, se3, so3
 from ..sequence import Sequence
 from .settings import MAX_TIME_OFFSET, Simulation, Velocities
 
+MAX_METRES = 1000.0
+"""m a frame, on average over a drive: no point that a camera sees in one frame would be near in the next"""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
@@ -96,15 +99,29 @@ def followed(settings: Simulation) -> Velocities:
         raise InputError("along: its stamps must rise")
     t = t - t[:1]
     kept = t <= (np.inf if settings.duration is None else settings.duration)
-    if kept.sum() < 2:
+    n = int(kept.sum())
+    if n < 2:
         raise InputError(f"along: fewer than two of its frames lie within duration ({settings.duration!r} s)")
+    with np.errstate(over="ignore"):
+        speed, dt = np.linalg.norm(linear[kept], axis=1), np.diff(t[kept])
+        path = float(speed[:-1] @ dt + (speed[0] + speed[-1]) * _reach(dt))
+    if not path <= MAX_METRES * n:
+        raise InputError(
+            f"along: its velocities lead over {path:.3g} m in {n} frames, and at most {MAX_METRES:g} m a frame are "
+            "simulated; check that its stamps are in s and its velocities in m/s"
+        )
     return Velocities(t[kept], linear[kept], angular[kept])
+
+
+def _reach(dt: FloatArray) -> float:
+    """By how many s a path through stamps with these intervals goes on beyond both ends."""
+    return MAX_TIME_OFFSET + 2.0 * float(dt.max())
 
 
 def path_along(velocities: Velocities) -> Path:
     """The path that integrating velocities gives (equation 9 without noise), each held until the next stamp."""
     velocity = np.concatenate([velocities.linear, velocities.angular], axis=1)
-    reach = MAX_TIME_OFFSET + 2.0 * float(np.diff(velocities.t).max())
+    reach = _reach(np.diff(velocities.t))
     t = np.concatenate([velocities.t[:1] - reach, velocities.t, velocities.t[-1:] + reach])
     held = np.concatenate([velocity[:1], velocity])
     increments = se3.exp(held * np.diff(t)[:, None])

@@ -14,7 +14,7 @@ from .matches import displaced, noisy_pixels, wrong_matches
 from .path import Path, followed, handheld_path, path_along, time_grid
 from .roads import drive, highway_road, loop_road, town_road
 from .room import Room
-from .settings import Simulation
+from .settings import MAX_FRAMES, Simulation
 from .sight import Sight
 from .street import Street
 from .tracks import Tracking, Tracks, follow
@@ -91,6 +91,12 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
         path = path_along(velocities).moved(se3.inverse(imu_T_body))
         if settings.frame_rate is None:
             return velocities.t, path
+        frames = velocities.t[-1] * settings.frame_rate
+        if not frames < MAX_FRAMES:
+            raise InputError(
+                f"frame_rate: {settings.frame_rate:g} Hz are {frames:.3g} frames over the {velocities.t[-1]:g} s of "
+                f"along, at most {MAX_FRAMES} are simulated; give a duration"
+            )
         t = np.arange(0.0, velocities.t[-1] + 1e-9, 1.0 / settings.frame_rate)
         if len(t) < 2:
             raise InputError(

@@ -115,7 +115,9 @@ def _lifetimes(n: int, how: Tracking, rng: np.random.Generator) -> IntArray:
 def _wanted(features: float, seeing: BoolArray, t: FloatArray, rng: np.random.Generator) -> IntArray:
     """(T,) how many points the detector wants: varies by a quarter over some seconds, as texture does."""
     n = len(t)
-    knots = np.arange(0.0, t[-1] - t[0] + 8.0, 4.0)
+    place = (t - t[0]) / 4.0
+    around = [np.floor(place), np.floor(place) + 1.0, np.ceil(place[-1:]) + 1.0]
+    knots = 4.0 * np.unique(np.concatenate(around))  # those next to a frame, however far apart frames are
     swing = np.interp(t - t[0], knots, rng.standard_normal(len(knots)))
     level = np.exp(0.27 * swing)
     level *= features / level.mean()

@@ -17,7 +17,8 @@ class Traffic:
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
         self._t = t
-        begin = np.arange(t[0], t[-1] + _SLOT, _SLOT)
+        slot = (t - t[0]) / _SLOT
+        begin = t[0] + _SLOT * np.unique(np.append(np.floor(slot), np.ceil(slot[-1])))  # those that a frame is in
         poses, twists = path.at(begin), path.velocity_at(begin)
         n = len(begin)
         self._begin = begin

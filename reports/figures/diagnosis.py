@@ -14,6 +14,7 @@ from fgbaseline.data.diagnose.repair import sure_bias
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
+from fgbaseline.reports.moving_sum import moving_sum
 
 from .layout import lay_out
 from .style import head, in_style, sheet, swatch
@@ -52,7 +53,7 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     repaired = turned(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
     seen = odometry.twist(sequence.dt)[:, 3:]
     t = sequence.t[:-1] - sequence.t[0]
-    width = max(1, round(SMOOTH / float(np.median(sequence.dt))))
+    width = SMOOTH / float(np.median(sequence.dt))
     figure, axes = sheet(6.4, 3)
     changed = diagnosis.angular.changed or bool(bias.any()) or diagnosis.shift != 0.0
     handles: list[Any] = []
@@ -191,12 +192,10 @@ def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
     return figure
 
 
-def smoothed(values: FloatArray, width: int) -> FloatArray:
+def smoothed(values: FloatArray, width: float) -> FloatArray:
     """(n,) the mean over a window of so many; NaN takes no part, and stays where it fills the window."""
-    kernel = np.ones(width)
     known = np.isfinite(values)
-    total = np.convolve(np.where(known, values, 0.0), kernel, "same")
-    count = np.convolve(known.astype(np.float64), kernel, "same")
+    total, count = moving_sum(np.where(known, values, 0.0), width), moving_sum(known, width)
     return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
 
 

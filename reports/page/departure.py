@@ -1,6 +1,7 @@
 """When an estimator first leaves the reference, and what the matches were like just then."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,9 +62,26 @@ def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | No
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
 
 
-def wrong_seconds(problem: Problem) -> list[float] | None:
-    """`wrong_share` of each whole second, 0 where there is no match; None without a mask or a match."""
-    if wrong_share(problem, np.ones(problem.n_frames, dtype=np.bool_)) is None:
+class WrongSecond(NamedTuple):
+    """A whole second of the recording."""
+
+    second: float
+    """counted from the first frame"""
+    share: float
+    """of its matches that the mask excluded as wrong"""
+
+
+def worst_second(problem: Problem) -> WrongSecond | None:
+    """The (first) second with the largest share of wrong matches; None without a mask or a match.
+
+    Only seconds that have a frame are looked at: a span in nanoseconds has a billion others between two of them.
+    """
+    wrong = np.isin(problem.excluded, WRONG)
+    if not wrong.any():
         return None
-    second = (problem.sequence.t - problem.sequence.t[0]).astype(np.int64)
-    return [wrong_share(problem, second == s) or 0.0 for s in range(int(second[-1]) + 1)]
+    t, frame = problem.sequence.t, problem.sequence.observations.frame
+    seconds, place = np.unique(np.floor(t - t[0]), return_inverse=True)
+    every = np.bincount(place[frame], minlength=len(seconds))
+    share = np.bincount(place[frame[wrong]], minlength=len(seconds)) / np.maximum(every, 1)
+    worst = int(np.argmax(share))
+    return WrongSecond(float(seconds[worst]), float(share[worst]))

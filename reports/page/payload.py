@@ -9,6 +9,7 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.reprojections import WRONG
 from fgbaseline.reports.figures.view import TopView
+from fgbaseline.reports.moving_sum import moving_sum
 
 from .accuracy_verdict import compared
 from .charts import charts
@@ -122,5 +123,5 @@ def _most_excluded(problem: Problem) -> int | None:
     every = np.bincount(frame[problem.excluded != Excluded.FEATURE_NOT_CHOSEN], minlength=T)
     if not wrong.any():
         return None
-    window = np.ones(min(T, 1 + 2 * round(0.5 / float(np.median(problem.sequence.dt)))))
-    return int(np.argmax(np.convolve(wrong, window, "same") / np.maximum(1, np.convolve(every, window, "same"))))
+    half = round(min(0.5 / float(np.median(problem.sequence.dt)), T))
+    return int(np.argmax(moving_sum(wrong, 1 + 2 * half) / np.maximum(1, moving_sum(every, 1 + 2 * half))))

@@ -10,7 +10,7 @@ from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
 from .accuracy_verdict import by_products, compared, divergence_rmse, nearest_sentences, truth_sentences
-from .departure import AROUND, departure, far, wrong_seconds, wrong_share
+from .departure import AROUND, departure, far, worst_second, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
 from .numbers import counted, listed, number, per_cent
 
@@ -120,13 +120,12 @@ def _common_observations(run: Run) -> list[str]:
 
 def _mask(run: Run) -> list[str]:
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
-    shares = wrong_seconds(run.problem)
-    if overall is None or shares is None:
+    worst = worst_second(run.problem)
+    if overall is None or worst is None:
         return []
-    worst = int(np.argmax(shares))
     return [
         f"The mask excluded {per_cent(overall)} of the matches for contradicting their own tracks as the velocities "
-        f"carry them along, most in the second from {worst} s on: {per_cent(shares[worst])}."
+        f"carry them along, most in the second from {worst.second:.0f} s on: {per_cent(worst.share)}."
     ]
 
 

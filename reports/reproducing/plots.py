@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
@@ -73,7 +74,7 @@ def plot(
     handles += axes.plot(*xy.T, color=PATH, linewidth=1.4, label="path")
     if arrows:
         _arrows(axes, path)
-        handles.append(swatch(ARROW, "where x of the IMU points"))
+        handles.append(Line2D([], [], color=ARROW, linewidth=1.4, marker=">", markersize=6, label="x axis of the IMU"))
     known = xy[np.isfinite(xy).all(axis=1)]
     style: dict[str, Any] = {"color": ENDS, "linestyle": "none", "markersize": 7, "zorder": 5}
     handles += axes.plot(*known[:1].T, marker="s", label="start", **style)

@@ -34,7 +34,10 @@ function ticks(low, high, about) {
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = power * [1, 2, 5, 10].find(factor => factor * power >= raw * 0.999);
   const values = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  // Counted, since adding 1 to a number beyond 2^53 changes nothing.
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.min(2 * about + 2, Math.floor(high / step + 1e-9) - first);
+  for (let i = 0; i <= count; i++) values.push((first + i) * step);
   return values;
 }
 
@@ -44,6 +47,7 @@ function logTicks(low, high, about) {
   if (to - from < 1) return ticks(low, high, about);
   const every = Math.max(1, Math.ceil((to - from) / about));
   const values = [];
+  if (!Number.isFinite(to - from)) return values;
   for (let i = from; i <= to; i += every) values.push(10 ** i);
   return values;
 }
