@@ -12,13 +12,16 @@ def claimed_said(comparison: Comparison) -> list[str]:
     for result in comparison.results.values():
         claimed = result.claimed
         if claimed is None:
+            if result.entry.covariance is not None:
+                sentences.append(f"The covariances of {result.name} are not judged: {result.notes['nees']}.")
             continue
         known = claimed.nees[np.isfinite(claimed.nees)]
         if len(known):
             mean = float(np.mean(known))
             sentences.append(
                 f"{result.name}'s errors are {number(float(np.sqrt(mean / 6.0)))} times as large as its covariances "
-                f"say (mean NEES {number(mean)} over {number(len(known))} poses, 6 being expected)."
+                f"say (mean NEES {number(mean)} over {number(len(known))} poses, 6 being expected"
+                f"{'; ' if claimed.remark else ''}{claimed.remark})."
             )
         if claimed.not_positive_definite:
             sentences.append(

@@ -16,6 +16,7 @@ from fgbaseline.compare.travel import distance_travelled
 from .claimed import Claimed
 from .comparison import Comparison, Result
 from .pixels import Pixels
+from .samples import coverage, samples
 from .schema import Summary
 
 LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
@@ -58,6 +59,8 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
     return {
         "source": result.entry.trajectory.source,
         "poses": len(result.entry.trajectory),
+        "coverage": coverage(comparison, result),
+        "rank": comparison.ranking.rank(result.name),
         "caption": matched.caption,
         "pairing": {
             "pairs": len(matched),
@@ -93,6 +96,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
             "intervals": result.share_intervals.to_dict(orient="index"),
             "reliable": bool(result.share_intervals.attrs["reliable"]),
         },
+        "common": _common(comparison, result.name),
         "behind": _behind(comparison, result.name),
         "final_m": float(result.departure["position"].iloc[-1]),
         "passing": {
@@ -103,6 +107,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         **_pixels(result.pixels),
         "map": None if result.map is None else _map(result.map),
         "held_out": _held_out(comparison, result.name),
+        "samples": samples(comparison, result),
         "notes": result.notes,
     }
 
@@ -126,6 +131,14 @@ def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
         "official": segments.official,
         "by_length": segments.by_length.reset_index().to_dict(orient="records"),
     }
+
+
+def _common(comparison: Comparison, name: str) -> dict[str, Any] | None:
+    statistics = comparison.ranking.common.get(name)
+    if statistics is None:
+        return None
+    rmse = statistics.loc["rmse", ["value", "low", "high"]].to_dict()
+    return {"moments": comparison.ranking.moments, "rmse": rmse}
 
 
 def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:
