@@ -9,8 +9,9 @@ below `GATE` times the median of these (3 to 12 px). What is left out is explain
 favours none; what one path explains counts against all others.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -123,7 +124,7 @@ def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
     `n`, the observations, and `pieces`, those that lie where all paths have poses.
     """
     values = errors.error.to_numpy()
-    attrs = {"n": len(values), "pieces": errors.pieces}
+    attrs: Mapping[Hashable | None, Any] = {"n": len(values), "pieces": errors.pieces}
     columns = ["median", "low", "high", "behind", "behind_low", "behind_high", "p95", "under_3px"]
     if len(values) == 0:
         empty = pd.DataFrame(columns=columns, index=pd.Index([], name="estimator"), dtype=np.float64)

@@ -1,5 +1,8 @@
 """What a bench says, in sentences: what failed first, then who is best and how sure that is, then consistency."""
 
+from math import isfinite
+from typing import Any
+
 import pandas as pd
 
 from ..page.numbers import listed, number
@@ -60,8 +63,12 @@ def _best(results: Results) -> list[str]:
 def _winner(case: str, ranked: pd.DataFrame, metric: Metric) -> str:
     first, *others = records(ranked)
     runs = f" over {first['runs']} runs" if first["runs"] > 1 else ""
-    said = f"{case}: {first['estimator']} has the least {metric.title}, "
+    fewer = [row for row in others if row["runs"] < first["runs"]]
+    others = [row for row in others if row["runs"] == first["runs"]]
+    among = "of those with the most answers, " if fewer else ""
+    said = f"{case}: {among}{first['estimator']} has the least {metric.title}, "
     said += f"{interval(first['mean'], first['low'], first['high'])} {metric.unit}{runs}"
+    said += "".join(f"; {_with_fewer(row, first, metric)}" for row in fewer)
     tied = [row["estimator"] for row in others if row["tied"]]
     if tied:
         return f"{said}; these runs cannot tell {listed(tied)} from it."
@@ -69,6 +76,15 @@ def _winner(case: str, ranked: pd.DataFrame, metric: Metric) -> str:
         return f"{said}."
     margin = f"{others[0]['estimator']} follows with {number(others[0]['mean'])}"
     return f"{said}; {margin}."
+
+
+def _with_fewer(row: dict[str, Any], first: dict[str, Any], metric: Metric) -> str:
+    """An estimator with fewer answers, beside the first where both have one."""
+    answered = f"{row['estimator']} answered {row['runs']} of these runs"
+    if not isfinite(row["behind"]):
+        return f"{answered}, none of them with {first['estimator']}"
+    side = "above" if row["behind"] >= 0.0 else "below"
+    return f"{answered} and is {number(abs(row['behind']))} {metric.unit} {side} {first['estimator']} there"
 
 
 def _overall(results: Results) -> list[str]:

@@ -22,7 +22,8 @@ def held_out_sentences(run: Run) -> list[str]:
     names = [str(name) for name in ranking.index]
     medians = dict(zip(names, ranking["median"].tolist(), strict=True))
     sentence = (
-        f"On {number(run.held_out.errors.inliers)} pieces of held-out tracks, which no estimator saw, {names[0]} errs "
+        f"On {number(run.held_out.errors.inliers)} pieces of held-out tracks, which no estimator saw, where all have "
+        f"poses ({number(run.held_out.errors.pieces)} of {number(held.n_pieces)} pieces), {names[0]} errs "
         f"by {number(medians[names[0]])} px in the median"
     )
     if len(names) > 1:

@@ -7,9 +7,11 @@ import numpy as np
 
 from fgbaseline.compare import Verdict, divergence_summary, reprojection_summary
 from fgbaseline.data import Status
+from fgbaseline.reports.common_frames import known
 from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
+from .coverage import coverage_sentences, little_truth_sentences
 from .departure import AROUND, departure, far, path_length, wrong_seconds, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
 from .numbers import listed, number, per_cent
@@ -18,7 +20,9 @@ from .numbers import listed, number, per_cent
 def verdict(run: Run) -> list[str]:
     """Sentences on a run, what everything else leans on first."""
     parts: tuple[Callable[[Run], list[str]], ...] = (
+        little_truth_sentences,
         _reference,
+        coverage_sentences,
         _truth,
         _nearest,
         _departures,
@@ -36,7 +40,7 @@ def verdict(run: Run) -> list[str]:
 def compared(run: Run) -> list[Result]:
     """The results that can be held against the reference, nearest first: not itself."""
     others = [r for r in run.answered if r.name != run.reference and r.divergence is not None]
-    return sorted(others, key=_divergence)
+    return sorted(others, key=lambda r: _divergence(r) if r.divergence_common else np.inf)
 
 
 def by_products(run: Run) -> frozenset[str]:
@@ -109,7 +113,7 @@ def _departures(run: Run) -> list[str]:
     sentences = []
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     for result in compared(run):
-        if result.divergence is None or result.name in by_products(run) or not np.isfinite(_divergence(result)):
+        if result.divergence is None or result.name in by_products(run) or not known(result.divergence).any():
             continue
         limit, left = f"{far(result):.3g} m", departure(run, result)
         if left is None:
@@ -203,11 +207,11 @@ def _noise(run: Run) -> list[str]:
 
 
 def _divergence(result: Result) -> float:
-    return float("nan") if result.divergence is None else divergence_summary(result.divergence)["rmse"]
+    return float("nan") if result.divergence_common is None else result.divergence_common.rmse
 
 
 def _ate(result: Result) -> float:
-    return float("nan") if result.truth_aligned is None else divergence_summary(result.truth_aligned)["rmse"]
+    return float("nan") if result.ate_common is None else result.ate_common.rmse
 
 
 def _of_path(result: Result) -> str:
