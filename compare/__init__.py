@@ -7,7 +7,7 @@ from .block_bootstrap import error_statistics
 from .carried_covariance import of_other_body, scaled, since_first
 from .common_moments import common_moments, taking_part
 from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
-from .coverage import SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
+from .coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
 from .difference_shares import DifferenceShares, difference_shares
 from .drift import drift
 from .growth import Passing, first_beyond, growing_divergence, growth_by_part
@@ -39,6 +39,7 @@ from .trust import Trust, Verdict, trust
 from .whitened import track_chi_square, whitened_summary
 
 __all__ = [
+    "FEWEST_STRETCHES",
     "SMALLEST_COVERAGE",
     "SMALLEST_SAMPLE",
     "Align",

@@ -11,6 +11,8 @@ LONG_GAP = 3.0
 
 SMALLEST_SAMPLE, SMALLEST_COVERAGE = 30, 0.5
 """poses, or whatever a figure is taken over, and the share of the time that they have to cover, before it is judged"""
+FEWEST_STRETCHES = 3
+"""of errors of motions over a stretch of the path: of fewer, no statistic says more than a single one"""
 
 
 def covered(t: FloatArray, whole: FloatArray) -> float:
@@ -35,8 +37,12 @@ def spanned(start: FloatArray, end: FloatArray, whole: FloatArray) -> float:
 
 
 def too_small(sample: Mapping[str, float], smallest: int, coverage: float) -> bool:
-    """Whether a sample has `n` below the smallest, or a `coverage`, where it has any, below that asked for."""
-    return sample["n"] < smallest or sample.get("coverage", 1.0) < coverage
+    """Whether a sample has `n` below the smallest, or a `coverage`, where it has any, below that asked for, or
+
+    `stretches`, where it has any, below FEWEST_STRETCHES.
+    """
+    few = sample.get("stretches", FEWEST_STRETCHES) < min(FEWEST_STRETCHES, smallest)
+    return few or sample["n"] < smallest or sample.get("coverage", 1.0) < coverage
 
 
 def _without_gaps(t: FloatArray) -> float:

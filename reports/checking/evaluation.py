@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
-from fgbaseline.compare import too_small
+from fgbaseline.compare import FEWEST_STRETCHES, too_small
 from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
@@ -137,6 +137,9 @@ def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shorta
     coverage = limits.smallest_coverage if limit.smallest_coverage is None else limit.smallest_coverage
     if sample is None or not too_small(sample, smallest, coverage):
         return None
+    stretches = int(sample.get("stretches", FEWEST_STRETCHES))
+    if sample["n"] >= smallest and stretches < FEWEST_STRETCHES:
+        return Shortage(stretches, sample.get("coverage"), FEWEST_STRETCHES, coverage)
     return Shortage(int(sample["n"]), sample.get("coverage"), smallest, coverage)
 
 

@@ -20,7 +20,7 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
     """By the beginning of a metric's path: `n` of what it is taken over, and the `coverage` of the estimate's time.
 
     n are pairs of poses, of the reprojection observations, of the map landmarks; what is not spread over time has no
-    coverage.
+    coverage. Errors of motions have the number of `stretches` that they are of, too.
     """
     matched, whole = result.matched, result.entry.trajectory.t
     t = matched.estimate.t - matched.offset
@@ -34,7 +34,7 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
         stretches["segments"] = result.segments.table
     for key, table in stretches.items():
         start, end = (t[table[column].to_numpy()] for column in ("start", "end"))
-        found[key] = {"n": len(t), "coverage": compare.spanned(start, end, whole)}
+        found[key] = {"n": len(t), "coverage": compare.spanned(start, end, whole), "stretches": len(table)}
     if result.claimed is not None:
         found["nees"] = of(t[np.isfinite(result.claimed.nees)])
     if result.name in comparison.ranking.at:
