@@ -106,6 +106,7 @@ def test_a_run_with_little_truth_cannot_be_told_and_says_so_first(missing: int, 
         assert judged(document, tmp_path, LIMIT.format(metric)) == code
     assert judged(document, tmp_path, LIMIT.format("divergence.rmse")) == 0
     assert verdict(run)[0].startswith("Too little truth to judge by") == (code == 2)
+    assert any(sentence.startswith("Against the truth") for sentence in verdict(run)) == (code == 0)
 
 
 def test_what_is_too_little_is_said_first_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

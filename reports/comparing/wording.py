@@ -167,7 +167,8 @@ def _passing(comparison: Comparison) -> list[str]:
         bound = f"{number(result.bound)} m"
         if result.passing is None:
             most = float(result.departure["position"].max())
-            within = f"stays within {bound} throughout: " if most <= result.bound else "is "
+            where = "throughout" if comparison.ranking.same else f"over its {number(len(result.matched))} moments"
+            within = f"stays within {bound} {where}: " if most <= result.bound else "is "
             sentences.append(f"{result.name} {within}{number(most)} m off at most.")
             continue
         t = result.passing.t - float(result.matched.reference.t[0])

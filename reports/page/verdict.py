@@ -64,7 +64,7 @@ def _reference(run: Run) -> list[str]:
 
 def _truth(run: Run) -> list[str]:
     truth = run.problem.sequence.truth
-    if truth is None:
+    if truth is None or little_truth_sentences(run):
         return []
     source, n, T = PurePath(truth.source).name, int(truth.known.sum()), run.problem.n_frames
     coverage = (
