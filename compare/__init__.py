@@ -4,7 +4,10 @@ from .absolute import absolute_errors
 from .alignment import Align, Alignment, align, align_se3
 from .association import Association, Matched, associate
 from .block_bootstrap import error_statistics
+from .carried_covariance import of_other_body, scaled, since_first
+from .common_moments import common_moments, taking_part
 from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
+from .coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
 from .difference_shares import DifferenceShares, difference_shares
 from .drift import drift
 from .growth import Passing, first_beyond, growing_divergence, growth_by_part
@@ -36,6 +39,9 @@ from .trust import Trust, Verdict, trust
 from .whitened import track_chi_square, whitened_summary
 
 __all__ = [
+    "FEWEST_STRETCHES",
+    "SMALLEST_COVERAGE",
+    "SMALLEST_SAMPLE",
     "Align",
     "Alignment",
     "Association",
@@ -62,10 +68,12 @@ __all__ = [
     "anees",
     "associate",
     "body_error",
+    "common_moments",
     "commonly_used",
     "component_summary",
     "consistency_of",
     "covariance_state",
+    "covered",
     "difference_nees",
     "difference_shares",
     "divergence",
@@ -89,6 +97,7 @@ __all__ = [
     "nees_table",
     "nis_per_degree",
     "nis_summary",
+    "of_other_body",
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
@@ -99,11 +108,16 @@ __all__ = [
     "reprojection_summary",
     "residual_patterns",
     "rmse_difference",
+    "scaled",
     "segment_errors",
     "share_intervals",
     "sigma_ratio",
+    "since_first",
+    "spanned",
     "summarised",
+    "taking_part",
     "time_offset",
+    "too_small",
     "track_chi_square",
     "trust",
     "truth_errors",

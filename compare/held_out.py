@@ -9,8 +9,9 @@ below `GATE` times the median of these (3 to 12 px). What is left out is explain
 favours none; what one path explains counts against all others.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -116,12 +117,16 @@ def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
 
     `low` and `high` are a 95 % interval of the median, `behind` its distance from the best median with `behind_low`
     and `behind_high`: an interval that holds zero says that the two cannot be told apart. By resampling stretches of
-    `BLOCK` seconds (block bootstrap, 400 draws). Empty without observations.
+    `BLOCK` seconds (block bootstrap, 400 draws). Empty without observations. Its `attrs` have
+    `n`, the observations, and `pieces`, those that lie where all paths have poses.
     """
     values = errors.error.to_numpy()
+    attrs: Mapping[Hashable | None, Any] = {"n": len(values), "pieces": errors.pieces}
     columns = ["median", "low", "high", "behind", "behind_low", "behind_high", "p95", "under_3px"]
     if len(values) == 0:
-        return pd.DataFrame(columns=columns, index=pd.Index([], name="estimator"), dtype=np.float64)
+        empty = pd.DataFrame(columns=columns, index=pd.Index([], name="estimator"), dtype=np.float64)
+        empty.attrs = attrs
+        return empty
     median = np.median(values, axis=0)
     best = int(np.argmin(median))
     drawn = _drawn_medians(values, np.floor(errors.table["start"].to_numpy() / BLOCK).astype(np.int64))
@@ -142,7 +147,9 @@ def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
         },
         index=pd.Index(errors.error.columns, name="estimator"),
     )
-    return table.sort_values("median", kind="stable")
+    table = table.sort_values("median", kind="stable")
+    table.attrs = attrs
+    return table
 
 
 def _by_piece(held: HeldOut, everywhere: BoolArray) -> IntArray:

@@ -51,12 +51,19 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
     `behind_low` and `behind_high`: how much larger the error is on average, over the runs that both answered. `tied`
     where that interval does not lie above zero: these runs do not separate the two, and neither does a single one,
     which has no interval. An estimator with fewer answers ranks behind all with more, whatever its mean: it may have
-    failed where it was hard.
+    failed where it was hard; its `behind` can be negative. Those with equally many answers are ranked and averaged over
+    the runs that all of them answered, or their order and `behind` could contradict each other.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
+    answers = {name: int((~np.isnan(value)).sum()) for name, value in values.items()}
+    for n in set(answers.values()) - {0}:
+        alike = [name for name in values if answers[name] == n]
+        common = ~np.isnan([values[name] for name in alike]).any(axis=0)
+        if common.any():
+            values |= {name: np.where(common, values[name], np.nan) for name in alike}
     means = {name: mean_of(value) for name, value in values.items()}
-    order = sorted((name for name in values if means[name].n), key=lambda name: (-means[name].n, means[name].value))
+    order = sorted((name for name in values if answers[name]), key=lambda name: (-answers[name], means[name].value))
     rows = []
     for rank, name in enumerate(order, 1):
         with np.errstate(invalid="ignore"):
@@ -65,7 +72,7 @@ def ranking(errors: pd.DataFrame) -> pd.DataFrame:
         infinite = behind.value == np.inf and behind.n > 1
         tied = rank == 1 or not (behind.low > 0.0 or infinite)
         mean = means[name]
-        rows.append((rank, mean.n, mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
+        rows.append((rank, answers[name], mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
     return pd.DataFrame(rows, columns=columns, index=pd.Index(order, name="estimator"))
 
 

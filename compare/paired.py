@@ -27,8 +27,8 @@ class RmseDifference:
 
     @property
     def settled(self) -> bool:
-        """Whether the interval has a sign."""
-        return self.low > 0.0 or self.high < 0.0
+        """Whether the interval has a sign, and it is that of the difference."""
+        return (self.low > 0.0 and self.value > 0.0) or (self.high < 0.0 and self.value < 0.0)
 
 
 def rmse_difference(

@@ -1,7 +1,7 @@
 """A run: the answers of all estimators, and every comparison that tables, figures and the page draw on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
@@ -12,6 +12,7 @@ from fgbaseline.data.forks import shared
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
+from .common_frames import CommonRmse, common_rmse
 from .evidence import Evidence, HeldOutReport, gathered, held_out_report
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
@@ -35,6 +36,10 @@ class Result:
     nees: FloatArray | None
     """(T,) against truth"""
     evidence: Evidence
+    divergence_common: CommonRmse | None = None
+    """what ranks it: over the frames that all estimators have; None where it is not ranked"""
+    ate_common: CommonRmse | None = None
+    """the same of `truth_aligned`"""
 
     @property
     def name(self) -> str:
@@ -87,6 +92,13 @@ def compare_all(
     with shared(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
         parts = compared()
     results = {name: Result(estimates[name], **part) for name, part in zip(names, parts, strict=True)}
+    divergences = {n: r.divergence for n, r in results.items() if r.answered and r.divergence is not None}
+    truths = {n: r.truth_aligned for n, r in results.items() if r.answered and r.truth_aligned is not None}
+    from_reference, to_truth = common_rmse(divergences), common_rmse(truths)
+    results = {
+        name: replace(result, divergence_common=from_reference.get(name), ate_common=to_truth.get(name))
+        for name, result in results.items()
+    }
     held_out = None if held is None else held_out_report(problem, estimates.values(), held)
     return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings, held_out)
 

@@ -74,6 +74,13 @@ class TruthCount(_Part):
     missing: Annotated[int, Field(description="frames without truth, or that the estimator did not reach")]
 
 
+class CommonRmse(_Part):
+    """RMSE over the frames that all ranked estimators have, m."""
+
+    rmse: Number
+    frames: int
+
+
 class EstimatorSummary(_Part):
     """One estimator."""
 
@@ -86,6 +93,11 @@ class EstimatorSummary(_Part):
     reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
     components: dict[str, Component]
     divergence: Divergence | None
+    coverage: Annotated[float, Field(description="share of the recording's time in which it has poses")]
+    divergence_common: Annotated[
+        CommonRmse | None, Field(description="over the frames that all ranked estimators have: what ranks it")
+    ]
+    ate_common: Annotated[CommonRmse | None, Field(description="the same of the error to truth after alignment")]
     ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
     ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
     truth: TruthCount | None
@@ -100,6 +112,10 @@ class EstimatorSummary(_Part):
     held_out: HeldOutError | None
     landmarks: int
     observations: ObservationCount
+    samples: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of the time"),
+    ]
     events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
     notes: Annotated[dict[str, str], Field(description="why values are null: by key, for all below it; * for all")]
 

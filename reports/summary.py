@@ -16,13 +16,16 @@ from fgbaseline import compare
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.geometry import FloatArray
 
+from .common_frames import share_of_time
 from .comparison import Result, Run
 from .evidence_summary import evidence_reasons, evidence_summary, held_out_summary
 from .figures.view import TopView
 from .json_numbers import finite, nulls
+from .samples import samples
 from .schema import EstimatorSummary, Summary
 from .schema_base import INFINITE
 
+TOO_FEW = "it has too few frames in common with the other estimators to be ranked"
 LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
 
 
@@ -122,12 +125,16 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
         "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
         "components": compare.component_summary(table),
         "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
+        "coverage": share_of_time(run.problem.sequence.t, np.isfinite(estimate.world_T_imu[:, 0, 0])),
+        "divergence_common": None if result.divergence_common is None else asdict(result.divergence_common),
+        "ate_common": None if result.ate_common is None else asdict(result.ate_common),
         "ate": None if result.truth_aligned is None else compare.summarised(result.truth_aligned["position"]),
         "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
         "truth": None if result.truth is None else _truth_count(result.truth),
         **evidence_summary(run, result),
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
+        "samples": samples(run, result) if result.answered else {},
         "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
     }
     return {**values, "notes": notes(run, result, nulls(values))}
@@ -151,6 +158,8 @@ def notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict[
         "divergence.final": "it or the reference did not reach the last frame",
         "divergence.rotation_final_deg": "it or the reference did not reach the last frame",
         "ate": "the recording has no truth" if no_truth else "no frame has both a pose and a truth",
+        "ate_common": "the recording has no truth" if no_truth else TOO_FEW,
+        "divergence_common": "there is no reference to diverge from" if result.divergence is None else TOO_FEW,
         "ate_unaligned": "the recording has no truth" if no_truth else None,
         "ate_unaligned.final": last,
         "ate_unaligned.rotation_final_deg": last,

@@ -248,7 +248,7 @@ def test_stamps_that_are_no_frames_of_the_recording_are_told(files: Path) -> Non
     assert any(s.startswith("No pose of later and later2 is at a frame of ") for s in result.verdict)
 
 
-def test_covariances_that_came_along_are_judged_unaligned(files: Path) -> None:
+def test_covariances_that_came_along_are_judged_with_and_without_alignment(files: Path) -> None:
     t, poses = truth()
     deviation = np.repeat([0.1, 0.01], 3)
     error = deviation * np.random.default_rng(0).normal(size=(len(t), 6))
@@ -267,8 +267,10 @@ def test_covariances_that_came_along_are_judged_unaligned(files: Path) -> None:
     bad = compare(files / "truth.tum", files / "bad.npz", align="none")
     assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
     aligned = summarise(compare(files / "truth.tum", files / "mine.npz")).estimates["mine"]
-    assert aligned.nees is None
-    assert "hides errors" in aligned.notes["nees"]
+    assert aligned.nees is not None
+    assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
+    between = compare(files / "truth.tum", files / "mine.npz", association="interpolated")
+    assert any(s.startswith("The covariances of mine are not judged: poses were inter") for s in between.verdict)
 
 
 def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:

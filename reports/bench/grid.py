@@ -24,9 +24,10 @@ COST_COLUMNS = (("seconds", "time, s"), ("memory_mb", "peak memory, MB"))
 CAPTION = (
     "Means over the runs of a case; of errors in m and of held-out tracks with 95 % intervals where there are several "
     "runs (Student's t). Error to truth after SE(3) alignment (RMSE); divergence from the reference of each run (RMSE);"
-    " reprojection is the median over all observations, 'of common' over those that every estimator used. ANEES: 6 is "
-    "consistent; ↑ marks estimators that are surer than they may be, ↓ those less sure, by chi-square at 95 %. Best of "
-    "a case in bold."
+    " both over the frames that all estimators of a run have; coverage is the share of the time in which an estimator "
+    "has poses. Reprojection is the median over all observations, 'of common' over those that every estimator used. "
+    "ANEES: 6 is consistent; ↑ marks estimators that are surer than they may be, ↓ those less sure, by chi-square at "
+    "95 %. Best of a case in bold."
 )
 
 

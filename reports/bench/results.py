@@ -38,14 +38,15 @@ class Metric:
 
 
 METRICS = (
-    Metric("ate", ("ate", "rmse"), "error to truth", "m", ranked=True),
+    Metric("ate", ("ate_common", "rmse"), "error to truth", "m", ranked=True),
     Metric("held_out", ("held_out", "median"), "held-out error", "px", ranked=True),
-    Metric("divergence", ("divergence", "rmse"), "from the reference", "m"),
+    Metric("divergence", ("divergence_common", "rmse"), "from the reference", "m"),
     Metric("reprojection", ("reprojection", "median"), "reprojection", "px"),
     Metric("reprojection_common", ("reprojection_common", "median"), "reprojection of common", "px"),
     Metric("under_3px", ("reprojection", "under_3px"), "under 3 px", "share", most=1.0),
     Metric("nees", ("nees", "mean"), "NEES", ""),
     Metric("nees_reference", ("nees_reference", "median"), "NEES from the reference", ""),
+    Metric("coverage", ("coverage",), "coverage", "share", most=1.0),
     Metric("used", ("observations", "share"), "matches used", "share", most=1.0),
 )
 OF_THE_RUN = ("run", "case", "sequence", "seed", "reference", "trust", "frames", "features", "observations")

@@ -1,5 +1,8 @@
 """What a bench says, in sentences: what failed first, then who is best and how sure that is, then consistency."""
 
+from math import isfinite
+from typing import Any
+
 import pandas as pd
 
 from ..page.accuracy_verdict import SAME_GRAPH
@@ -71,7 +74,7 @@ def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset
     figures = {
         row["estimator"]: f"{interval(row['mean'], row['low'], row['high'])} {metric.unit}".rstrip() for row in rows
     }
-    fewer = [f"{row['estimator']} ({row['runs']} of {most})" for row in rows if row["runs"] < most]
+    fewer = [f"{row['estimator']} ({_answers(row, first, most, metric)})" for row in rows if row["runs"] < most]
     left_out = f"; not ranked for missing answers: {listed(fewer)}" if fewer else ""
     if not others:
         return f"{case}: {first['estimator']} has a {metric.title} of {figures[first['estimator']]}{left_out}."
@@ -88,6 +91,15 @@ def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset
     apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if row["estimator"] not in tied]
     larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
     return f"{said}{larger}{left_out}."
+
+
+def _answers(row: dict[str, Any], first: dict[str, Any], most: int, metric: Metric) -> str:
+    """How many runs an estimator answered, and how it is beside the first one where both did."""
+    answered = f"{row['runs']} of {most} runs"
+    if first["rank"] != 1 or not isfinite(row["behind"]):
+        return answered
+    side = "above" if row["behind"] >= 0.0 else "below"
+    return f"{answered}, {number(abs(row['behind']))} {metric.unit} {side} {first['estimator']} there"
 
 
 def _overall(results: Results) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import pandas as pd
 
-from fgbaseline.compare import Align, Matched, absolute_errors, associate, summarised
+from fgbaseline.compare import SMALLEST_SAMPLE, Align, Matched, absolute_errors, associate, covered, summarised
 from fgbaseline.compare.limits import Bounds, Outcome
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
 from fgbaseline.data.formats import read_trajectory
@@ -21,8 +21,8 @@ from .wording import bound, number
 
 AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
 """a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
-LONG_GAP = 3.0
-"""median intervals of a trajectory: two poses that are further apart have a gap between them"""
+AT_LEAST = ("coverage", "pairs")
+"""what is asked for at least; the rest at most"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +50,7 @@ def assert_accuracy(
     divergence_max: float | None = None,
     rotation_deg: float | None = None,
     coverage: float = 0.95,
+    smallest_sample: int = SMALLEST_SAMPLE,
     align: Align | str = Align.SE3,
     tolerance: float | None = None,
     figure: FilePath | None = None,
@@ -58,9 +59,10 @@ def assert_accuracy(
 
     At most: `ate` and `ate_max`, RMSE and largest distance (m) after alignment; `divergence` and `divergence_max`, the
     same without; `rotation_deg`, RMSE of the angle (deg) after alignment. At least: `coverage`, the share of the
-    reference's time in which there are paired poses. Poses are paired by time within `tolerance` (s; see
-    `compare.associate`), those of estimates and truths of a problem by frame. The figure is drawn where a limit falls
-    short, into the PNG `figure`, by default into a folder of its own among the temporary files.
+    reference's time in which there are paired poses, and `smallest_sample` pairs of poses. Poses are paired by time
+    within `tolerance` (s; see `compare.associate`), those of estimates and truths of a problem by frame. The figure is
+    drawn where a limit falls short, into the PNG `figure`, by default into a folder of its own among the temporary
+    files.
 
     Gives the figures by name, such as "ate.rmse". Raises InputError where nothing is asked, or a trajectory is none.
     """
@@ -72,6 +74,7 @@ def assert_accuracy(
         "divergence.max": divergence_max,
         "rotation.rmse": rotation_deg,
         "coverage": coverage,
+        "pairs": float(smallest_sample),
     }
     _require_bounds(asked)
     if isinstance(estimate, Estimate) and estimate.status is Status.FAILED:
@@ -80,30 +83,16 @@ def assert_accuracy(
     aligned = matched.aligned(align)
     tables = {"divergence": absolute_errors(matched), "ate": absolute_errors(aligned)}
     span = _trajectory(reference, "reference").t
-    values = _values(tables, covered(matched.reference.t, span))
+    values = _values(tables, covered(matched.reference.t, span)) | {"pairs": float(len(matched))}
     figures = [_figure(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
+    figures = [each for each in figures if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
     if all(each.outcome is Outcome.HOLDS for each in figures):
         return values
     raise AssertionError(_message(figures, aligned, _drawn(aligned, tables, asked, figure)))
 
 
-def covered(t: FloatArray, reference: FloatArray) -> float:
-    """The share of the time of rising stamps `reference` (n,) in which there are paired stamps t (m,).
-
-    The time between two stamps counts unless they are more than LONG_GAP of their median interval apart: what the
-    reference itself has not seen is not asked for.
-    """
-    whole = _without_gaps(reference)
-    return min(1.0, _without_gaps(t) / whole) if whole else 1.0
-
-
-def _without_gaps(t: FloatArray) -> float:
-    gaps = np.diff(t)
-    return float(gaps[gaps <= LONG_GAP * np.median(gaps)].sum()) if len(gaps) else 0.0
-
-
 def _require_bounds(asked: dict[str, float | None]) -> None:
-    if all(limit is None for metric, limit in asked.items() if metric != "coverage"):
+    if all(limit is None for metric, limit in asked.items() if metric not in AT_LEAST):
         raise InputError("accuracy: nothing is asked; give ate=0.5 or another limit")
     for metric, limit in asked.items():
         if limit is not None and not (math.isfinite(limit) and limit >= 0):
@@ -148,8 +137,8 @@ def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float
 
 
 def _figure(metric: str, value: float, limit: float) -> Figure:
-    bounds = Bounds(at_least=limit) if metric == "coverage" else Bounds(at_most=limit)
-    return Figure(metric, {"coverage": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
+    bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
+    return Figure(metric, {"coverage": "", "pairs": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
 
 
 def _drawn(

@@ -20,6 +20,7 @@ def as_json(checked: Checked) -> str:
         "summary": str(checked.measured.path),
         "limits": checked.limits,
         "baseline": checked.baseline,
+        "shortages": list(checked.shortages),
         "references": list(checked.references),
         "lines": [_line(line) for line in checked.lines],
     }
@@ -42,6 +43,8 @@ def _line(line: Line) -> dict[str, Any]:
         "change": line.change,
         "reason": line.reason,
         "missing": line.missing,
+        "sample": None if line.shortage is None else line.shortage.n,
+        "coverage": None if line.shortage is None else line.shortage.coverage,
         "limit_line": line.limit_line,
     }
 

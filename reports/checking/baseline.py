@@ -84,11 +84,15 @@ def refusal(checked: Checked, path: Path) -> str:
     if short:
         why = f"{short} of {len(checked.lines)} limits {'falls' if short == 1 else 'fall'} short"
         return f"{shown(path)}: not written, since {why}; mend that, or accept it with --accept-worse"
+    if checked.shortages:
+        return f"{shown(path)}: not written. {checked.shortages[0]}"
     return f"{shown(path)}: not written, since the reference is not trusted enough; see what the run says of it"
 
 
 def write_baseline(checked: Checked, path: Path) -> str:
     """Writes the new baseline whole, and says so. Raises InputError where a reference or a figure is not fit for it."""
+    if checked.shortages:
+        raise InputError(f"{shown(path)}: not written. {checked.shortages[0]}")
     if checked.undecided or checked.count[Outcome.CANNOT_TELL]:
         raise InputError(
             f"{shown(path)}: not written, since the reference is not trusted enough; see what the run says of it"

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
+from fgbaseline.compare import FEWEST_STRETCHES, too_small
 from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
@@ -11,7 +12,7 @@ from fgbaseline.data.toml_file import TomlFile
 from ..schema_base import INFINITE
 from .baseline import before, is_timing
 from .limits_file import Limit, Limits, Needed
-from .line import NEW, Checked, Line
+from .line import NEW, Checked, Line, Shortage
 from .measured import (
     DIGITS,
     NO_SUCH_METRIC,
@@ -22,6 +23,7 @@ from .measured import (
     metrics_of,
     missing_in,
     nearest,
+    sample_of,
     value_of,
 )
 
@@ -44,6 +46,7 @@ def evaluate(
     return Checked(
         lines=tuple(lines),
         references=tuple(sentence for sentence in told if sentence),
+        shortages=_shortages(lines, several=len(measured.runs) > 1),
         undecided=needed is not Needed.NONE and any(below(run, needed) for run in measured.runs.values()),
         measured=measured,
         limits=shown(limits.path),
@@ -95,13 +98,16 @@ def _lines(
     (name, run), (estimator, values) = named_run, named_values
     value, missing = value_of(values, limit.metric)
     old, unknown = before(baseline, name, run, estimator, limit.metric)
-    doubt = _doubt(limit.metric, run, limits.content.reference)
+    shortage = _shortage(limits.content, limit, values)
+    doubt = shortage.reason if shortage else _doubt(limit.metric, run, limits.content.reference)
 
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
         short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
         outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating, short)
         at, left_out = limits.line(("limit", index)), missing_in(values, limit.metric)
-        return Line(name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason, left_out)
+        return Line(
+            name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason, left_out, shortage
+        )
 
     if limit.bounds is not None:
         yield line(value, limit.bounds, "")
@@ -128,6 +134,33 @@ def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
     if not run.rests_on_reference(metric) or not below(run, needed):
         return ""
     return f"the reference is {run.reference.trust}"
+
+
+def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shortage | None:
+    """What the sample of a limit's metric lacks; None where it is large enough, or there is none."""
+    sample = sample_of(values, limit.metric)
+    smallest = limit.smallest_sample or limits.smallest_sample
+    coverage = limits.smallest_coverage if limit.smallest_coverage is None else limit.smallest_coverage
+    if sample is None or not too_small(sample, smallest, coverage):
+        return None
+    stretches = int(sample.get("stretches", FEWEST_STRETCHES))
+    if sample["n"] >= smallest and stretches < FEWEST_STRETCHES:
+        return Shortage(stretches, sample.get("coverage"), FEWEST_STRETCHES, coverage)
+    return Shortage(int(sample["n"]), sample.get("coverage"), smallest, coverage)
+
+
+def _shortages(lines: list[Line], *, several: bool) -> tuple[str, ...]:
+    """A sentence for each shortage, with the metrics and the estimators that it concerns."""
+    found: dict[tuple[Shortage, str], tuple[dict[str, None], dict[str, None]]] = {}
+    for line in lines:
+        if line.shortage is not None and line.value is not None:
+            metrics, names = found.setdefault((line.shortage, line.run if several else ""), ({}, {}))
+            metrics[line.metric], names[line.estimator] = None, None
+    return tuple(
+        f"Too little data{f' in {run}' if run else ''} to judge {', '.join(metrics)} of {', '.join(names)}: "
+        f"{shortage.reason} (smallest_sample, smallest_coverage)."
+        for (shortage, run), (metrics, names) in found.items()
+    )
 
 
 def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, given: bool) -> None:

@@ -20,8 +20,8 @@ def junit(checked: Checked) -> bytes:
         suite = ElementTree.SubElement(suites, "testsuite", {"name": _text(run or "trajectories"), **_counts(lines)})
         for line in lines:
             _case(suite, line, checked)
-        if checked.references:
-            ElementTree.SubElement(suite, "system-out").text = _text("\n".join(checked.references))
+        if said := [*checked.shortages, *checked.references]:
+            ElementTree.SubElement(suite, "system-out").text = _text("\n".join(said))
     if checked.undecided:
         _reference_suite(suites, checked)
     ElementTree.indent(suites)

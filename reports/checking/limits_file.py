@@ -6,11 +6,14 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE
 from fgbaseline.compare.limits import Better, Bounds
 from fgbaseline.data.toml_file import TomlFile, read_toml
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Share = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
 
 
 class _Part(BaseModel):
@@ -64,6 +67,9 @@ class Limit(_Part):
     at_most: Finite | None = None
     at_least: Finite | None = None
     baseline: Tolerance | None = None
+    smallest_sample: Count | None = None
+    """that of the file where it is left out"""
+    smallest_coverage: Share | None = None
 
     @property
     def patterns(self) -> tuple[str, ...]:
@@ -90,6 +96,10 @@ class Limits(_Part):
     """The file."""
 
     reference: Needed = Needed.DOUBTFUL
+    smallest_sample: Count = SMALLEST_SAMPLE
+    """poses, frames, observations: whatever a figure is taken over"""
+    smallest_coverage: Share = SMALLEST_COVERAGE
+    """of the time of the estimate; of a run, of the recording"""
     limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
 
 

@@ -14,6 +14,26 @@ NEW = "new in the baseline"
 
 
 @dataclass(frozen=True, slots=True)
+class Shortage:
+    """A sample that is too small to judge by."""
+
+    n: int
+    coverage: float | None
+    """share of the time; None for what is not spread over time"""
+    smallest: int
+    smallest_coverage: float
+
+    @property
+    def reason(self) -> str:
+        """What there is, and what is asked for."""
+        there, asked = f"{self.n}", f"{self.smallest}"
+        if self.coverage is not None:
+            there += f" over {100.0 * self.coverage:.3g} % of the time"
+            asked += f" over {100.0 * self.smallest_coverage:.3g} %"
+        return f"it has a sample of {there}, {asked} are asked for"
+
+
+@dataclass(frozen=True, slots=True)
 class Line:
     """A metric of an estimator against one limit."""
 
@@ -35,6 +55,8 @@ class Line:
     """why there is no value, or why nothing can be told"""
     missing: int = 0
     """errors that are NaN, which the value leaves out"""
+    shortage: Shortage | None = None
+    """None where its sample is large enough"""
 
     @property
     def margin(self) -> float | None:
@@ -57,6 +79,8 @@ class Checked:
     """in the order of the limits file, then of run and estimator"""
     references: tuple[str, ...]
     """what is to be said of references that are not trusted, a sentence for each run"""
+    shortages: tuple[str, ...]
+    """which samples are smaller than the limits ask for, a sentence each: what is said first of all"""
     undecided: bool
     """a reference is less trusted than the limits ask for"""
     measured: Measured

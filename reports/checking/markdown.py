@@ -21,7 +21,7 @@ def markdown(checked: Checked) -> str:
         [
             f"### Accuracy: {escaped(verdict(checked))}",
             "",
-            *(f"> {escaped(sentence)}\n" for sentence in checked.references),
+            *(f"> {escaped(sentence)}\n" for sentence in [*checked.shortages, *checked.references]),
             f"| {' | '.join(titles)} |",
             f"|{'|'.join(' :-- ' if title in WORDS else ' --: ' for title in titles)}|",
             *rows,

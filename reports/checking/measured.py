@@ -153,6 +153,16 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")
 
 
+def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] | None:
+    """What a metric is taken over: the `n` and the `coverage` under `samples` with the longest beginning of its path.
+
+    None for what is no statistic, such as a count or a time, and for the summaries of versions without samples.
+    """
+    samples: Mapping[str, Mapping[str, float]] = estimator.get("samples") or {}
+    keys = [key for key in samples if metric == key or metric.startswith(f"{key}.")]
+    return samples[max(keys, key=len)] if keys else None
+
+
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:
     """The paths of all numbers of an estimator."""
     return [path for path, _ in _numbers(estimator, "") if path.partition(".")[0] not in NO_METRICS]

@@ -14,7 +14,7 @@ UNWRAPPED = 160
 
 
 def print_check(checked: Checked) -> None:
-    """What is to be said of the reference first, then the table, then why, then how it went."""
+    """Prints what is too little and what is said of the reference, the table, the reasons, and how it went."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     titles = columns(checked)
     for title in titles:
@@ -24,7 +24,7 @@ def print_check(checked: Checked) -> None:
         table.add_row(*(texts[title] for title in titles), style=STYLE[line.outcome])
     console = Console()
     console = Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False)
-    for sentence in checked.references:
+    for sentence in [*checked.shortages, *checked.references]:
         console.print(sentence, markup=False, soft_wrap=True)
     console.print(table, markup=False)
     for sentence in [*remarks(checked), verdict(checked)]:

@@ -37,8 +37,9 @@ def command(
 
     On GitHub the table also goes to the page of the job (GITHUB_STEP_SUMMARY).
 
-    Exits 0 when all limits hold, 1 when some fall short, 2 when it cannot tell (the reference is untrusted, or there
-    is no baseline to compare with), and on bad input.
+    Exits 0 when all limits hold, 1 when some fall short, 2 when it cannot tell (a figure rests on fewer than 30 poses
+    or covers less than half of the time, the reference is untrusted, or there is no baseline to compare with), and on
+    bad input.
     """
     from ..checking.command import Outputs, check
 

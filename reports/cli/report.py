@@ -78,6 +78,9 @@ def _print_table(summary: "Summary") -> None:
         table.add_column(title, justify="left" if title in ("estimator", "status") else "right")
     if has_truth:
         table.add_column("ATE, m", justify="right")
+    uneven = len({e.coverage for e in summary.estimators.values()}) > 1
+    if uneven:
+        table.add_column("coverage", justify="right")
     for name, e in summary.estimators.items():
         row = [
             name,
@@ -89,7 +92,11 @@ def _print_table(summary: "Summary") -> None:
             if name == summary.reference.name
             else _number(None if e.divergence is None else e.divergence.rmse),
         ]
-        table.add_row(*row, *([_number(None if e.ate is None else e.ate.rmse)] if has_truth else []))
+        table.add_row(
+            *row,
+            *([_number(None if e.ate is None else e.ate.rmse)] if has_truth else []),
+            *([f"{e.coverage:.1%}"] if uneven else []),
+        )
     console = Console()
     Console(width=None if console.is_terminal else max(console.width, UNWRAPPED)).print(table)
 

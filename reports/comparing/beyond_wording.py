@@ -12,13 +12,16 @@ def claimed_said(comparison: Comparison) -> list[str]:
     for result in comparison.results.values():
         claimed = result.claimed
         if claimed is None:
+            if result.entry.covariance is not None:
+                sentences.append(f"The covariances of {result.name} are not judged: {result.notes['nees']}.")
             continue
         known = claimed.nees[~np.isnan(claimed.nees)]
         if len(known):
             mean = float(np.mean(known))
             sentences.append(
                 f"Normalized error RMS of {result.name} by its covariances: {number(float(np.sqrt(mean / 6.0)))}, "
-                f"1 being expected (mean NEES {number(mean)} over {counted(len(known), 'pose')}, 6 being expected)."
+                f"1 being expected (mean NEES {number(mean)} over {counted(len(known), 'pose')}, 6 being expected"
+                f"{'; ' if claimed.remark else ''}{claimed.remark})."
             )
         if claimed.not_positive_definite:
             sentences.append(

@@ -12,6 +12,7 @@ from fgbaseline.geometry import FloatArray
 from .claimed import Claimed
 from .entries import Entry
 from .pixels import Pixels
+from .ranking import Ranking
 from .settings import Settings
 
 
@@ -57,6 +58,11 @@ class Result:
         """What tables and figures call it."""
         return self.entry.name
 
+    @property
+    def rmse(self) -> float:
+        """Of the positions over all of its own moments, m."""
+        return float(self.statistics["translation"]["value"]["rmse"])
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Comparison:
@@ -70,12 +76,23 @@ class Comparison:
     """(3,) in the reference's world"""
     deltas: tuple[str, ...]
     settings: Settings
-    behind: dict[str, RmseDifference]
-    """by how much each estimate is farther from the reference than the nearest rival; that one is missing"""
+    ranking: Ranking
     held_out: pd.DataFrame | None
     """see `compare.held_out_ranking`: the reference among them"""
     sequence: str | None
     """the recording that the reprojection is of"""
+
+    @property
+    def behind(self) -> dict[str, RmseDifference]:
+        """By how much each estimate is farther from the reference than the nearest rival; that one is missing."""
+        return self.ranking.behind
+
+    @property
+    def ranked(self) -> list[Result]:
+        """Nearest to the reference first; what could not be ranked last, in the order given."""
+        order = list(self.ranking.at)
+        last = len(order)
+        return sorted(self.results.values(), key=lambda r: order.index(r.name) if r.name in order else last)
 
     @property
     def table(self) -> pd.DataFrame:

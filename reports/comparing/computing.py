@@ -17,16 +17,14 @@ from .comparison import Comparison, Result
 from .entries import Entries, Entry
 from .mapping import map_of
 from .pixels import Pixels, held_out_of, paths_of, pixels_of, up_of_problem
-from .ranking import behind_nearest
+from .ranking import ranking_of
 from .settings import Delta, Settings
+from .spreading import spread
 
 Computed = TypeVar("Computed")
 
 FAR, FAR_SHARE = 5.0, 0.01
 """m, and share of the path: the smaller of both is the bound that says when an estimate has left the reference"""
-AT_MOST = 100_000_000
-"""errors that a bootstrap draws"""
-REPETITIONS = 1000
 TILT = 10.0
 """deg: worlds whose ups are farther apart are not both level"""
 FEWEST = 2
@@ -56,7 +54,13 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
         up=up,
         deltas=tuple(delta.text for delta in deltas),
         settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
-        behind=behind_nearest(results, settings.seed),
+        ranking=ranking_of(
+            errors={name: r.absolute["translation"] for name, r in results.items()},
+            stamps={name: r.matched.reference.t for name, r in results.items()},
+            tolerance=min(r.matched.tolerance for r in results.values()),
+            by_products=frozenset(name for name, r in results.items() if r.entry.by_product),
+            seed=settings.seed,
+        ),
         held_out=held_out_of(entries.problem, entries.held, paths),
         sequence=None if entries.problem is None else entries.problem.sequence.name,
     )
@@ -144,12 +148,6 @@ def _passing(matched: Matched, departure: pd.DataFrame, bound: float, notes: dic
         return compare.first_beyond(departure, bound)
     notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
     return None
-
-
-def spread(errors: "pd.Series[float]", seed: int) -> pd.DataFrame:
-    """`compare.error_statistics` with fewer repetitions for very long paths: a tenth of them tells an interval too."""
-    repetitions = int(np.clip(AT_MOST // max(len(errors), 1), 100, REPETITIONS))
-    return compare.error_statistics(errors, repetitions=repetitions, seed=seed)
 
 
 def _relative(matched: Matched, delta: Delta, settings: Settings, notes: dict[str, str]) -> pd.DataFrame | None:

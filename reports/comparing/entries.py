@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.compare import Trust
+from fgbaseline.compare import Trust, of_other_body
 from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.formats import read_kitti, read_landmarks, read_pose_covariances, read_times, read_trajectory
 from fgbaseline.data.formats.named_file import shown
@@ -101,7 +101,9 @@ def _entry(
         return Entry(path, None, covariance)
     if imu_T_cam is None:
         raise InputError(f"{path.source or path.name}: its poses are the camera's; add --sequence or --extrinsic FILE")
-    return Entry(path.with_poses(path.world_T_body @ se3.inverse(imu_T_cam)))
+    if covariance is not None:
+        covariance = of_other_body(covariance, se3.inverse(imu_T_cam))
+    return Entry(path.with_poses(path.world_T_body @ se3.inverse(imu_T_cam)), None, covariance)
 
 
 def _split(given: str) -> tuple[str | None, str]:

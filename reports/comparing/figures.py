@@ -23,7 +23,6 @@ from .comparison import Comparison, Result
 from .lines import colours, line
 from .motion_figures import relative, segments
 from .pixel_figure import reprojection
-from .ranking import ranked, rmse
 
 TITLES = {
     "position": "distance, m",
@@ -101,8 +100,9 @@ def errors(comparison: Comparison) -> Figure:
         panel.set_ylabel(title)
         _fit(panel, column, series)
     axes[-1].set_xlabel("time, s" if comparison.reference.trajectory.stamped else "frame")
-    rivals = [r for r in ranked(comparison) if not r.entry.by_product] or ranked(comparison)
-    nearest = [f"{plain(r.name)} {rmse(r):.3g} m" for r in rivals]
+    rivals = [r for r in comparison.ranked if not r.entry.by_product] or comparison.ranked
+    ranking = comparison.ranking
+    nearest = [f"{plain(r.name)} {ranking.rmse(r.name):.3g} m" for r in rivals if r.name in ranking.at]
     said = ", ".join(nearest) if sum(map(len, nearest)) < LETTERS else f"nearest {nearest[0]}"
     head(figure, f"Difference from {plain(comparison.reference.name)} (RMSE: {said})", handles)
     return figure

@@ -24,8 +24,8 @@ CAPTIONS: Mapping[str, str] = {
     "segments": "Mean over all segments of a length, per metre.",
     "map": "Landmarks of the same number. In the world the drift of the paths is in it; as the "
     "cameras see them it is not.",
-    "three_sigma": "The error of each pose in its own body frame, without any alignment, and the band that its "
-    "covariances claim.",
+    "three_sigma": "The error of each pose in its own body frame and the band that its covariances claim; both since "
+    "the first pose where an alignment was asked for and the covariances grow from there.",
     "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
     "with it.",
 }

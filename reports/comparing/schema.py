@@ -109,6 +109,13 @@ class Consistency(Part):
     not_positive_definite: Annotated[int, Field(description="covariances that are none; left out")]
 
 
+class Common(Part):
+    """The positions over the moments that all estimates have which are ranked."""
+
+    moments: int
+    rmse: Annotated[Statistic, Field(description="m; what the ranks are by")]
+
+
 class Behind(Statistic):
     """The RMSE of the positions less that of the estimate nearest to the reference, of a paired block bootstrap."""
 
@@ -170,6 +177,11 @@ class EstimateSummary(Part):
 
     source: str
     poses: int
+    coverage: Annotated[Number, Field(description="share of the reference's time in which there are paired poses")]
+    rank: Annotated[
+        int | None,
+        Field(description="1 for the nearest over the common moments; null for by-products and for too few moments"),
+    ]
     caption: Annotated[str, Field(description="what was paired and how it was aligned, in words")]
     pairing: Pairing
     alignment: AlignmentSummary
@@ -183,6 +195,7 @@ class EstimateSummary(Part):
         Consistency | None, Field(description="of its own covariances, against a reference taken for the truth")
     ]
     shares: Shares
+    common: Annotated[Common | None, Field(description="null where there is no such moment, or it has too few")]
     behind: Annotated[Behind | None, Field(description="null for the nearest, and for by-products of the reference")]
     final_m: Number
     passing: Passing
@@ -195,6 +208,10 @@ class EstimateSummary(Part):
     ]
     map: MapDifference | None
     held_out: HeldOutFigures | None
+    samples: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of its own time"),
+    ]
     notes: Annotated[dict[str, str], Field(description="why something is null or missing, by key")]
 
 

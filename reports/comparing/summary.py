@@ -17,6 +17,7 @@ from ..schema_base import INFINITE
 from .claimed import Claimed
 from .comparison import Comparison, Result
 from .pixels import Pixels
+from .samples import coverage, samples
 from .schema import Summary
 
 LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
@@ -59,6 +60,8 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
     values = {
         "source": result.entry.trajectory.source,
         "poses": len(result.entry.trajectory),
+        "coverage": coverage(comparison, result),
+        "rank": comparison.ranking.rank(result.name),
         "caption": matched.caption,
         "pairing": {
             "pairs": len(matched),
@@ -94,6 +97,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
             "intervals": result.share_intervals.to_dict(orient="index"),
             "reliable": bool(result.share_intervals.attrs["reliable"]),
         },
+        "common": _common(comparison, result.name),
         "behind": _behind(comparison, result.name),
         "final_m": float(result.departure["position"].iloc[-1]),
         "passing": {
@@ -104,6 +108,8 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         **_pixels(result.pixels),
         "map": None if result.map is None else _map(result.map),
         "held_out": _held_out(comparison, result.name),
+        "samples": samples(comparison, result),
+        "notes": result.notes,
     }
     infinite = {path: INFINITE for path, is_infinite in nulls(values) if is_infinite}
     return {**values, "notes": result.notes | infinite}
@@ -129,6 +135,14 @@ def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
         "official": segments.official,
         "by_length": segments.by_length.reset_index().to_dict(orient="records"),
     }
+
+
+def _common(comparison: Comparison, name: str) -> dict[str, Any] | None:
+    statistics = comparison.ranking.common.get(name)
+    if statistics is None:
+        return None
+    rmse = statistics.loc["rmse", ["value", "low", "high"]].to_dict()
+    return {"moments": comparison.ranking.moments, "rmse": rmse}
 
 
 def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:

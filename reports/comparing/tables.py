@@ -24,6 +24,8 @@ class Column:
     """of keys under `estimates.NAME`"""
     compared: bool = True
     """whether the smallest is the best"""
+    same_data: bool = False
+    """whether it is taken over the same moments or observations for all, whatever each one covers"""
 
     @property
     def title(self) -> str:
@@ -52,8 +54,14 @@ ABSENT = Value(float("nan"), float("nan"), float("nan"))
 
 def columns(comparison: Comparison) -> list[Column]:
     """The columns that some estimate has a value for."""
+    ranking = comparison.ranking
     every = [
+        Column("coverage", "share of the reference's time", ("coverage",), compared=False),
         Column("absolute error", "RMSE, m", ("translation", "rmse")),
+    ]
+    if not ranking.same and ranking.moments:
+        every.append(Column("absolute error", "RMSE over common moments, m", ("common", "rmse"), same_data=True))
+    every += [
         Column("absolute error", "RMSE above the nearest's, m", ("behind",), compared=False),
         Column("absolute error", "largest, m", ("translation", "max")),
         Column("absolute error", "rotation RMSE, °", ("rotation_deg", "rmse")),
@@ -73,11 +81,11 @@ def columns(comparison: Comparison) -> list[Column]:
         Column(segments, "%", ("segments", "intervals", "translation_percent")),
         Column(segments, "°/m", ("segments", "intervals", "rotation_deg_per_m")),
         Column("reprojection, median px", "its landmarks", ("reprojection", "median")),
-        Column("reprojection, median px", "of common", ("reprojection_common", "median")),
+        Column("reprojection, median px", "of common", ("reprojection_common", "median"), same_data=True),
         Column("reprojection, median px", "triangulated", ("reprojection_along", "median")),
         Column("map, median distance of landmarks", "in the world, m", ("map", "median")),
         Column("map, median distance of landmarks", "as seen, m", ("map", "median_seen")),
-        Column("held-out tracks", "median, px", ("held_out", "median")),
+        Column("held-out tracks", "median, px", ("held_out", "median"), same_data=True),
     ]
     known = values(comparison)
     return [c for c in every if any(np.isfinite(value_at(e, c.path).value) for e in known.values())]
@@ -151,8 +159,8 @@ def text_table(comparison: Comparison) -> tuple[list[str], list[Line]]:
     for column in chosen:
         cells = [value_at(known[name], column.path) for name in names]
         others = [c.value for n, c in zip(names, cells, strict=True) if n in rivals and np.isfinite(c.value)]
-        least = min(others) if column.compared and len(others) > 1 else None
-        text = None if least is None else number(least)
+        compared = column.compared and (column.same_data or comparison.ranking.same)
+        text = number(min(others)) if compared and len(others) > 1 else None
         best = [n in rivals and number(c.value) == text for n, c in zip(names, cells, strict=True)]
         lines.append(Line(column.group, column.heading, [c.text for c in cells], best))
     return names, lines

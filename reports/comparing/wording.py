@@ -1,16 +1,16 @@
 """What the numbers of a comparison mean, in words: the trust in the reference first, and none that flatters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from fgbaseline.compare import Verdict
+from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, RmseDifference, Verdict, too_small
 from fgbaseline.compare.travel import distance_travelled
 
 from ..page.numbers import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
-from .ranking import ranked, rmse
+from .samples import coverage, samples
 
 MEANING = {
     Verdict.DOUBTFUL: "a small distance from it says more than a large one",
@@ -33,6 +33,7 @@ def caption(comparison: Comparison) -> str:
 def verdict(comparison: Comparison) -> list[str]:
     """Sentences on a comparison, what everything else leans on first."""
     parts: tuple[Callable[[Comparison], list[str]], ...] = (
+        _too_little,
         _reference,
         _nearest,
         _passing,
@@ -51,6 +52,22 @@ def verdict(comparison: Comparison) -> list[str]:
     return [sentence for part in parts for sentence in part(comparison)]
 
 
+def _too_little(comparison: Comparison) -> list[str]:
+    """Which estimates have so few pairs that no figure of theirs says much."""
+    sentences = []
+    for name, result in comparison.results.items():
+        sample = samples(comparison, result)["translation"]
+        if too_small(sample, SMALLEST_SAMPLE, SMALLEST_COVERAGE):
+            n, poses = len(result.matched), len(result.entry.trajectory)
+            sentences.append(
+                f"Too little to judge {name} by: {number(n)} of its {number(poses)} poses "
+                f"{'has' if n == 1 else 'have'} a partner in {comparison.reference.name}, over "
+                f"{per_cent(sample['coverage'])} of its time; fgbaseline check asks for {SMALLEST_SAMPLE} over "
+                f"{per_cent(SMALLEST_COVERAGE)}."
+            )
+    return sentences
+
+
 def _interval(result: Result) -> tuple[float, float]:
     table = result.statistics["translation"]
     return float(table["low"]["rmse"]), float(table["high"]["rmse"])
@@ -67,39 +84,70 @@ def _reference(comparison: Comparison) -> list[str]:
 
 
 def _nearest(comparison: Comparison) -> list[str]:
-    own = [result for result in ranked(comparison) if result.entry.by_product]
+    """The order over the moments that all have; where these are not all moments, beside what each one covers."""
+    ranking, name = comparison.ranking, comparison.reference.name
     sentences = [
         f"{result.name} is the same run, each pose as known when its frame came: {_with_interval(result)} away."
-        for result in own
+        for result in comparison.ranked
+        if result.entry.by_product
     ]
-    others = [result for result in ranked(comparison) if not result.entry.by_product]
+    others = [result for result in comparison.ranked if not result.entry.by_product]
     if not others:
         return sentences
-    first, *rest = others
-    path = float(first.departure["travelled"].iloc[-1])
-    of_path = f", {per_cent(rmse(first) / path)} of its path of {number(path)} m" if path > 0 else ""
-    text = f"{first.name} is {_with_interval(first)} from {comparison.reference.name} (RMSE of the positions){of_path}"
-    if rest:
-        text = f"Nearest: {text}; then " + listed(f"{r.name} with {_with_interval(r)}" for r in rest)
-    sentences.insert(0, text + ".")
-    sentences[1:1] = _order(comparison, first)
-    return sentences
+    if ranking.same:
+        first, *rest = others
+        text = f"{first.name} is {_with_interval(first)} from {name} (RMSE of the positions){_of_path(first)}"
+        if rest:
+            text = f"Nearest: {text}; then " + listed(f"{r.name} with {_with_interval(r)}" for r in rest)
+        return [f"{text}.", *_order(comparison), *sentences]
+    each = listed(f"{r.name} {_with_interval(r)} over {_covers(comparison, r)}" for r in others)
+    return [*_over_common(comparison), f"Each over all of its own moments: {each}.", *sentences]
 
 
-def _order(comparison: Comparison, first: Result) -> list[str]:
+def _over_common(comparison: Comparison) -> list[str]:
+    """The ranking of estimates that do not have the same moments, and what is left out of it."""
+    ranking, name = comparison.ranking, comparison.reference.name
+    apart = [r.name for r in comparison.ranked if not r.entry.by_product and ranking.rank(r.name) is None]
+    if len(ranking.rivals) < 2:
+        return [f"Not ranked, since they do not have enough moments in common: {listed([*ranking.rivals, *apart])}."]
+    places = [f"{n} with {number(ranking.rmse(n))} m" for n in ranking.rivals]
+    text = (
+        f"Over the {number(ranking.moments)} moments that {'the others' if apart else 'all'} have, "
+        f"{places[0]} is nearest to {name} (RMSE of the positions), then {listed(places[1:])}."
+    )
+    missing = [f"Not ranked, since it has too few moments of {name}: {listed(apart)}."] if apart else []
+    return [text, *_order(comparison), *missing]
+
+
+def _covers(comparison: Comparison, result: Result) -> str:
+    pairs = number(len(result.matched))
+    return f"{pairs} moments ({per_cent(coverage(comparison, result))} of {comparison.reference.name}'s time)"
+
+
+def _of_path(result: Result) -> str:
+    path = float(result.departure["travelled"].iloc[-1])
+    return f", {per_cent(result.rmse / path)} of its path of {number(path)} m" if path > 0 else ""
+
+
+def _order(comparison: Comparison) -> list[str]:
     """Whether the recording settles who is nearest: by blocks of moments drawn for both."""
+    return order_in_words(comparison.ranking.rivals[0], comparison.behind) if comparison.behind else []
+
+
+def order_in_words(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
+    """What the differences of others from the `first`, which is the nearest, say of the order."""
     unsettled: list[str] = []
     settled: list[str] = []
-    for name, d in comparison.behind.items():
+    for name, d in behind.items():
         said = f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])"
         (settled if d.settled else unsettled).append(said)
     sentences = []
     if settled:
-        sentences.append(f"Farther than {first.name}, by paired bootstrap of their RMSE: {listed(settled)}.")
+        sentences.append(f"Farther than {first}, by paired bootstrap of their RMSE: {listed(settled)}.")
     if unsettled:
         sentences.append(
-            f"This recording does not settle whether {first.name} is nearer than {listed(unsettled)}: the paired "
-            "interval of the difference holds zero."
+            f"This recording does not settle whether {first} is nearer than {listed(unsettled)}: the paired "
+            "interval of the difference is not above zero."
         )
     return sentences
 
@@ -111,17 +159,18 @@ def _signed(metres: float) -> str:
 def _with_interval(result: Result) -> str:
     low, high = _interval(result)
     if not (np.isfinite(low) and np.isfinite(high)):
-        return f"{number(rmse(result))} m"
-    return f"{number(rmse(result))} m [{number(low)}, {number(high)}]"
+        return f"{number(result.rmse)} m"
+    return f"{number(result.rmse)} m [{number(low)}, {number(high)}]"
 
 
 def _passing(comparison: Comparison) -> list[str]:
     sentences = []
-    for result in ranked(comparison):
+    for result in comparison.ranked:
         bound = f"{number(result.bound)} m"
         if result.passing is None:
             most = float(result.departure["position"].max())
-            within = f"stays within {bound} throughout: " if most <= result.bound else "is "
+            where = "throughout" if comparison.ranking.same else f"over its {number(len(result.matched))} moments"
+            within = f"stays within {bound} {where}: " if most <= result.bound else "is "
             sentences.append(f"{result.name} {within}{number(most)} m off at most.")
             continue
         t = result.passing.t - float(result.matched.reference.t[0])
@@ -133,7 +182,7 @@ def _passing(comparison: Comparison) -> list[str]:
 
 def _shares(comparison: Comparison) -> list[str]:
     sentences = []
-    for result in ranked(comparison):
+    for result in comparison.ranked:
         s = result.shares
         if not np.isfinite(s.noise):
             continue

@@ -12,6 +12,7 @@ import numpy as np
 from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
 from fgbaseline.reports.comparison import Result, Run
 
+from .coverage import little_truth_sentences
 from .departure import path_length
 from .numbers import listed, number, per_cent
 
@@ -54,7 +55,7 @@ def claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
 def truth_sentences(run: Run) -> list[str]:
     """The errors to the truth, and whether it is settled that the reference has the larger one."""
     truth = run.problem.sequence.truth
-    if truth is None:
+    if truth is None or little_truth_sentences(run):
         return []
     source, n, T = PurePath(truth.source).name, int(truth.known.sum()), run.problem.n_frames
     coverage = (
@@ -71,7 +72,7 @@ def truth_sentences(run: Run) -> list[str]:
     sentences = [f"Against the truth ({source}; {coverage}), the error of the aligned path is {each} (RMSE)."]
     if run.reference not in known:
         return sentences
-    errors = {name: tables[name]["position"].to_numpy() for name in known}
+    errors = {name: tables[name]["position"].to_numpy() for name in known if run.results[name].ate_common is not None}
     return sentences + _against_reference(run, errors)
 
 
@@ -109,7 +110,11 @@ def nearest_sentences(run: Run) -> list[str]:
     known = [r for r in compared(run) if not np.isnan(divergence_rmse(r))]
     rivals = {r.name: r for r in known if r.name not in unranked(run)}
     sentences = []
-    errors = {r.name: r.divergence["position"].to_numpy() for r in rivals.values() if r.divergence is not None}
+    errors = {
+        r.name: r.divergence["position"].to_numpy()
+        for r in rivals.values()
+        if r.divergence is not None and r.divergence_common is not None
+    }
     found = paired_ranking(errors)
     if found.rmse:
         sentences.append(_nearest(run, rivals, found))

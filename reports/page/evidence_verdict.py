@@ -30,8 +30,9 @@ def held_out_sentences(run: Run) -> list[str]:
     names = [str(name) for name in ranking.index]
     medians = dict(zip(names, ranking["median"].tolist(), strict=True))
     sentence = (
-        f"On {counted(errors.inliers, 'piece')} of held-out tracks, which no estimator saw, "
-        f"{names[0]} errs by {number(medians[names[0]])} px in the median"
+        f"On {counted(errors.inliers, 'piece')} of held-out tracks, which no estimator saw, where all have "
+        f"poses ({number(errors.pieces)} of {counted(held.n_pieces, 'piece')}), {names[0]} errs "
+        f"by {number(medians[names[0]])} px in the median"
     )
     if len(names) > 1:
         sentence += ", " + listed(f"{name} by {number(medians[name])} px" for name in names[1:])

@@ -6,6 +6,9 @@ from itertools import groupby
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
+from fgbaseline.reports.common_frames import same_frames
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
 from fgbaseline.reports.schema_base import INFINITE
@@ -27,22 +30,44 @@ class Column:
     """-1: the smallest is best, 1: the largest is, 0: neither says which is better"""
     absent: str = "no such figure"
     """why it may be missing"""
+    own_frames: bool = False
+    """whether it is taken over the frames that each one has: it says which is best only where these are the same"""
+    uneven: bool = False
+    """whether it stands in the table only where they are not the same"""
 
 
-TRUTH, REFERENCE, REPROJECTION, COST = "error to truth", "divergence", "reprojection error", "cost"
+COVERAGE, TRUTH, REFERENCE, REPROJECTION, COST = (
+    "coverage",
+    "error to truth",
+    "divergence",
+    "reprojection error",
+    "cost",
+)
+NO_TRUTH = "no frame has both a pose and truth"
 NO_LANDMARK = "no observed landmark was estimated"
 COLUMNS = (
-    Column(TRUTH, "RMSE, m", ("ate", "rmse"), best=-1, absent="no frame has both a pose and truth"),
-    Column(TRUTH, "largest, m", ("ate", "max"), best=-1, absent="no frame has both a pose and truth"),
+    Column(COVERAGE, "of the time, %", ("coverage",), 100.0, uneven=True),
+    Column(TRUTH, "RMSE, m", ("ate", "rmse"), best=-1, own_frames=True, absent=NO_TRUTH),
+    Column(TRUTH, "RMSE over common frames, m", ("ate_common", "rmse"), best=-1, uneven=True),
+    Column(TRUTH, "largest, m", ("ate", "max"), best=-1, own_frames=True, absent=NO_TRUTH),
     Column(TRUTH, "NEES, median", ("nees", "median"), absent="no positive definite covariance"),
-    Column(REFERENCE, "RMSE, m", ("divergence", "rmse"), best=-1),
-    Column(REFERENCE, "largest, m", ("divergence", "max"), best=-1),
-    Column(REFERENCE, "final, m", ("divergence", "final"), best=-1),
-    Column(REFERENCE, "rotation RMSE, °", ("divergence", "rotation_rmse_deg"), best=-1),
-    Column(REPROJECTION, "median, px", ("reprojection", "median"), best=-1, absent=NO_LANDMARK),
-    Column(REPROJECTION, "95\N{NO-BREAK SPACE}%, px", ("reprojection", "p95"), best=-1, absent=NO_LANDMARK),
+    Column(REFERENCE, "RMSE, m", ("divergence", "rmse"), best=-1, own_frames=True),
+    Column(REFERENCE, "RMSE over common frames, m", ("divergence_common", "rmse"), best=-1, uneven=True),
+    Column(REFERENCE, "largest, m", ("divergence", "max"), best=-1, own_frames=True),
+    Column(REFERENCE, "final, m", ("divergence", "final"), best=-1, own_frames=True),
+    Column(REFERENCE, "rotation RMSE, °", ("divergence", "rotation_rmse_deg"), best=-1, own_frames=True),
+    Column(REPROJECTION, "median, px", ("reprojection", "median"), best=-1, own_frames=True, absent=NO_LANDMARK),
     Column(
-        REPROJECTION, "under 3\N{NO-BREAK SPACE}px, %", ("reprojection", "under_3px"), 100.0, best=1, absent=NO_LANDMARK
+        REPROJECTION, "95\N{NO-BREAK SPACE}%, px", ("reprojection", "p95"), best=-1, own_frames=True, absent=NO_LANDMARK
+    ),
+    Column(
+        REPROJECTION,
+        "under 3\N{NO-BREAK SPACE}px, %",
+        ("reprojection", "under_3px"),
+        100.0,
+        best=1,
+        own_frames=True,
+        absent=NO_LANDMARK,
     ),
     Column(
         REPROJECTION,
@@ -106,8 +131,10 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
     values = {c: {name: _value(estimators[name], c) for name in answered} for c in chosen}
     columns = [c for c in chosen if any(value is not None for value in values[c].values())]
     columns = [c for c in columns if c.group != REFERENCE or len(answered) > 1]
+    even = same_frames(np.isfinite(run.results[n].estimate.world_T_imu[:, 0, 0]) for n in answered)
+    columns = [c for c in columns if not (c.uneven and even)]
     opens = {c: i > 0 and columns[i - 1].group != c.group for i, c in enumerate(columns)}
-    best = {c: _best(run, c, values[c]) for c in columns}
+    best = {c: None if c.own_frames and not even else _best(run, c, values[c]) for c in columns}
     best_text = {c: None if value is None else number(float(value) * c.scale) for c, value in best.items()}
     notes: dict[str, str] = {}
 

@@ -6,10 +6,12 @@ import numpy as np
 
 from fgbaseline.compare import Verdict, divergence_summary, reprojection_summary
 from fgbaseline.data import Status
+from fgbaseline.reports.common_frames import known
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
-from .accuracy_verdict import by_products, compared, divergence_rmse, nearest_sentences, truth_sentences
+from .accuracy_verdict import by_products, compared, nearest_sentences, truth_sentences
+from .coverage import coverage_sentences, little_truth_sentences
 from .departure import AROUND, departure, far, worst_second, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
 from .numbers import counted, listed, number, per_cent
@@ -18,7 +20,9 @@ from .numbers import counted, listed, number, per_cent
 def verdict(run: Run) -> list[str]:
     """Sentences on a run, what everything else leans on first."""
     parts: tuple[Callable[[Run], list[str]], ...] = (
+        little_truth_sentences,
         _reference,
+        coverage_sentences,
         truth_sentences,
         nearest_sentences,
         _departures,
@@ -51,7 +55,7 @@ def _departures(run: Run) -> list[str]:
     sentences = []
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     for result in compared(run):
-        if result.divergence is None or result.name in by_products(run) or not np.isfinite(divergence_rmse(result)):
+        if result.divergence is None or result.name in by_products(run) or not known(result.divergence).any():
             continue
         limit, left = f"{far(result):.3g} m", departure(run, result)
         if left is None:
