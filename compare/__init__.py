@@ -5,6 +5,17 @@ from .alignment import Align, Alignment, align, align_se3
 from .association import Association, Matched, associate
 from .block_bootstrap import error_statistics
 from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
+from .conventions import (
+    BodyRotation,
+    are_conjugated,
+    body_rotation,
+    fits_clearly_better,
+    is_constant,
+    rmse_of_inverses,
+    travel_misfit,
+    turning_misfit,
+    world_rotation,
+)
 from .difference_shares import DifferenceShares, difference_shares
 from .drift import drift
 from .growth import Passing, first_beyond, growing_divergence, growth_by_part
@@ -39,6 +50,7 @@ __all__ = [
     "Align",
     "Alignment",
     "Association",
+    "BodyRotation",
     "Consistency",
     "CovarianceState",
     "Difference",
@@ -59,8 +71,10 @@ __all__ = [
     "align",
     "align_se3",
     "anees",
+    "are_conjugated",
     "associate",
     "body_error",
+    "body_rotation",
     "commonly_used",
     "component_summary",
     "consistency_of",
@@ -72,11 +86,13 @@ __all__ = [
     "drift",
     "error_statistics",
     "first_beyond",
+    "fits_clearly_better",
     "growing_divergence",
     "growth_by_part",
     "held_out_errors",
     "held_out_ranking",
     "interpolated",
+    "is_constant",
     "map_by_depth",
     "map_difference",
     "matched_pairs",
@@ -97,13 +113,17 @@ __all__ = [
     "reprojection_summary",
     "residual_patterns",
     "rmse_difference",
+    "rmse_of_inverses",
     "segment_errors",
     "share_intervals",
     "sigma_ratio",
     "summarised",
     "time_offset",
     "track_chi_square",
+    "travel_misfit",
     "trust",
     "truth_errors",
+    "turning_misfit",
     "whitened_summary",
+    "world_rotation",
 ]

@@ -60,7 +60,8 @@ class Matched:
         )
         shifted = f", {self.estimate.name} {self.offset:+.4g} s" if self.offset else ""
         left = f"left out: {self.left_out_reference} of the reference, {self.left_out_estimate} of the estimate"
-        return f"{len(self)} poses paired ({how} {self.tolerance:.3g} s{shifted}; {left}); {self.alignment.caption}"
+        how = f"{how} {self.tolerance:.3g} s{shifted}" if self.reference.stamped else "by frame"
+        return f"{len(self)} poses paired ({how}; {left}); {self.alignment.caption}"
 
     def aligned(
         self, kind: Align | str, *, first: int | None = None, up: FloatArray | tuple[float, ...] = (0.0, 0.0, 1.0)

@@ -9,7 +9,7 @@ from fgbaseline.compare import Align, Association, CovarianceState, Matched
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, InputError
 
-from .entries import Entry
+from .entry import Entry
 
 
 @dataclass(frozen=True, eq=False, slots=True)

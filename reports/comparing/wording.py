@@ -10,6 +10,7 @@ from ..page.numbers import listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
 from .ranking import ranked, rmse
+from .recognized import recognized, up_of
 
 MEANING = {
     Verdict.DOUBTFUL: "a small distance from it says more than a large one",
@@ -24,7 +25,7 @@ def caption(comparison: Comparison) -> str:
         said.setdefault(result.matched.caption, []).append(result.name)
     parts = [text if len(said) == 1 else f"{listed(names)}: {text}" for text, names in said.items()]
     return (
-        f"Compared with {comparison.reference.name}: {'. '.join(parts)}. "
+        f"Compared with {comparison.reference.name}: {'. '.join(parts)}. {up_of(comparison)} "
         "In brackets 95 % confidence intervals of a block bootstrap."
     )
 
@@ -33,6 +34,7 @@ def verdict(comparison: Comparison) -> list[str]:
     """Sentences on a comparison, what everything else leans on first."""
     parts: tuple[Callable[[Comparison], list[str]], ...] = (
         _reference,
+        recognized,
         _nearest,
         _passing,
         _shares,
