@@ -14,6 +14,7 @@ from .conventions import (
     rmse_of_inverses,
     travel_misfit,
     turning_misfit,
+    turning_rotation,
     world_rotation,
 )
 from .difference_shares import DifferenceShares, difference_shares
@@ -124,6 +125,7 @@ __all__ = [
     "trust",
     "truth_errors",
     "turning_misfit",
+    "turning_rotation",
     "whitened_summary",
     "world_rotation",
 ]

@@ -57,6 +57,13 @@ def world_rotation(matched: Matched) -> FloatArray | None:
     return None if motion.free or spread[1] / np.sqrt(len(matched)) < CLEARLY * rmse else motion.rotation
 
 
+def turning_rotation(reference: FloatArray, estimate: FloatArray) -> FloatArray:
+    """(3, 3) `reference_R_estimate` of the worlds by what paired rotations (n, 3, 3) turn about over STEP poses."""
+    k = min(STEP, len(reference) - 1)
+    turned = [so3.log_so3(R[k:] @ np.swapaxes(R[:-k], 1, 2)) for R in (reference, estimate)]
+    return _nearest(turned[0].T @ turned[1])
+
+
 def turning_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> float:
     """The median angle, deg, by which rotations (n, 3, 3) over STEP poses differ, each about axes in the world.
 
@@ -137,6 +144,6 @@ def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) ->
 
 
 def _nearest(matrix: FloatArray) -> FloatArray:
-    """The rotation (3, 3) nearest to a sum of rotations."""
+    """The rotation (3, 3) nearest to a matrix (3, 3)."""
     U, _, Vt = np.linalg.svd(matrix)
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3, so3
+from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..observations import IntArray
 from ..sequence import Sequence, Truth
@@ -17,7 +17,6 @@ from .trajectory_file import TrajectoryFile, read_trajectory_file, settled
 BodyFrame = Literal["camera", "imu"]
 FASTER = 3.0
 """times the recording's: lines that are so much farther apart are not one for each frame"""
-TURN = np.deg2rad(5.0)
 
 
 def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> Sequence:
@@ -49,7 +48,7 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
 def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, list[str]]:
     """The poses (T, 4, 4) in the file's own world, NaN where it has none, and what there is to say of them."""
     file = read_trajectory_file(path)
-    if file.rotation is None or (file.orientation_is_constant and _turns(sequence)):
+    if file.has_positions_only:
         raise InputError(
             "it has positions without orientations, which a run needs to bring it to its own world; run without it and "
             "compare the run with it: fgbaseline compare TRUTH trajectories/NAME.tum --lever-arm X,Y,Z"
@@ -98,25 +97,16 @@ def _frames(sequence: Sequence, file: TrajectoryFile) -> IntArray:
 def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
     """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
     n = len(file.position)
-    recorded = np.median(np.linalg.norm(sequence.linear_velocity[: n - 1], axis=1) * sequence.dt[: n - 1]) if n > 1 else 0
+    recorded = (
+        np.median(np.linalg.norm(sequence.linear_velocity[: n - 1], axis=1) * sequence.dt[: n - 1]) if n > 1 else 0
+    )
     true = np.median(np.linalg.norm(np.diff(file.position, axis=0), axis=1)) if n > 1 else 0
     if n < sequence.n_frames and true > FASTER * recorded > 0:
         raise InputError(
-            f"it has {n} poses for {sequence.n_frames} frames, and they are {true / recorded:.1f} times as far apart as "
-            "the recording moves from frame to frame, so line k is not frame k; number the lines (13 columns), or give "
-            "a TUM file with stamps"
+            f"it has {n} poses for {sequence.n_frames} frames, {true / recorded:.1f} times as far apart as the "
+            "recording moves from frame to frame: line k is not frame k; number the lines (13 columns), or give a TUM "
+            "file with stamps"
         )
-
-
-def _turns(sequence: Sequence) -> bool:
-    """Whether the recording turns by more than TURN: then the true orientation cannot be constant."""
-    steps = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
-    R = np.eye(3)
-    for step in steps:
-        R = R @ step
-        if so3.rotation_angle(R) > TURN:
-            return True
-    return False
 
 
 def _unit(sequence: Sequence, file: TrajectoryFile) -> TimeUnit:

@@ -50,9 +50,11 @@ def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
         stamps = stamps_of(lines.column(0), table.values[:, 0], None)
         require_rising(stamps, table.line)
         units, settled = possible_units(stamps)
-        if unit is None and len(units) > 1 and "s" not in units:
-            raise InputError(f"its time stamps may be in {' or '.join(units)}; give --time-unit")
-        return stamps.seconds(unit if unit is not None and not settled else units[0])
+        if unit is not None and not settled:
+            return stamps.seconds(unit)
+        if "s" not in units and len(units) != 1:
+            raise InputError("its time stamps may be in several units; give --time-unit")
+        return stamps.seconds(units[0])
 
 
 def write_kitti(path: FilePath, world_T_body: FloatArray) -> None:

@@ -1,4 +1,4 @@
-"""Text files of numbers, the same count on each line: decoded, split into lines, and read with the line of each fault."""
+"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line."""
 
 import gzip
 import re

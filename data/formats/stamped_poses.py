@@ -18,7 +18,10 @@ def require_rising(stamps: Stamps, line: IntArray) -> None:
     late = np.flatnonzero(~stamps.rising())
     if len(late):
         i = late[0] + 1
-        shown = [repr(float(x)) if stamps.whole is None else str(stamps.whole[i - k]) for k, x in ((0, stamps.value[i]), (1, stamps.value[i - 1]))]
+        shown = [
+            repr(float(x)) if stamps.whole is None else str(stamps.whole[i - k])
+            for k, x in ((0, stamps.value[i]), (1, stamps.value[i - 1]))
+        ]
         raise InputError(
             f"line {line[i]}: the time stamp {shown[0]} is not after {shown[1]} "
             f"(line {line[i - 1]}); sort the lines and remove repeated ones"

@@ -55,6 +55,13 @@ class Stamps:
             return np.array([stamp / per_second for stamp in self.whole])
         return self.value / per_second
 
+    @property
+    def interval(self) -> float | None:
+        """The median from one stamp to the next, in their unit; None with less than two."""
+        steps = np.diff(self.value)
+        steps = steps[steps > 0]
+        return float(np.median(steps)) if len(steps) else None
+
     def rising(self) -> BoolArray:
         """(n - 1,) whether each stamp is after the one before."""
         if self.whole is None:
@@ -86,17 +93,14 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
 def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
     """The units that stamps may have, the likeliest first, and whether header or size settle it.
 
-    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. Raises InputError
-    where header and size contradict each other, or no unit fits.
+    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. None where
+    no unit makes their rate a recorder's; both where header and size contradict each other.
     """
-    interval = _interval(stamps.value)
+    interval = stamps.interval
     since_1970 = _since_1970(stamps.value, interval)
     if stamps.unit is not None:
-        if since_1970 is not None and since_1970 != stamps.unit:
-            raise InputError(
-                f"its header has time stamps in {NAMES[stamps.unit]}, but {stamps.longest} is a time since 1970 in "
-                f"{NAMES[since_1970]}; give --time-unit {stamps.unit} or {since_1970}"
-            )
+        if since_1970 not in (None, stamps.unit):
+            return (stamps.unit, since_1970), False
         return (stamps.unit,), True
     if since_1970 is not None:
         return (since_1970,), True
@@ -104,18 +108,7 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
         return ("s",), False
     units: list[TimeUnit] = ["s"] if interval <= SLOWEST and interval >= FASTEST else []
     units += [u for u in ("ms", "us", "ns") if FASTEST <= interval / PER_SECOND[u] <= USUAL]
-    if not units:
-        raise InputError(
-            f"the poses are {interval:.3g} apart in time, which is none of a recorder in seconds, milliseconds, "
-            "microseconds or nanoseconds; give --time-unit"
-        )
     return tuple(units), False
-
-
-def _interval(value: FloatArray) -> float | None:
-    steps = np.diff(value)
-    steps = steps[steps > 0]
-    return float(np.median(steps)) if len(steps) else None
 
 
 def _since_1970(value: FloatArray, interval: float | None) -> TimeUnit | None:
@@ -151,7 +144,7 @@ def lost_digits(stamps: Stamps, moved: BoolArray) -> str | None:
     if (stamps.value == stamps.value.astype(np.float32)).all() and np.abs(stamps.value).max() >= 2**24:
         return f"its time stamps have lost digits: they are float32, and {share}; write them as float64"
     if stamps.whole is not None and max(map(abs, stamps.whole)) > EXACT_INTEGER:
-        return f"its time stamps have lost digits: integers beyond 2^53 went through a double, and {share}; write them whole"
+        return f"its time stamps have lost digits: integers beyond 2^53 became doubles, and {share}; write them whole"
     return f"its time stamps have lost digits: {share}; write them in full"
 
 
@@ -161,8 +154,8 @@ def _letter(stamps: Stamps) -> str:
         return ""
     letters = {stamp >> SYMBOL for stamp in stamps.whole}
     index = stamps.whole[-1] & ((1 << SYMBOL) - 1)
-    letter = chr(letters.pop()) if len(letters) == 1 else ""
-    return letter if letter.isascii() and letter.isalpha() and index < 2**40 else ""
+    letter = chr(min(letters)) if len(letters) == 1 and max(letters) < 128 else ""
+    return letter if letter.isalpha() and index < 2**40 else ""
 
 
 def _digits(word: str) -> int:

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3, so3
+from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import BoolArray, IntArray
 from ..trajectory import Trajectory
@@ -24,6 +24,7 @@ TrajectoryFormat = Literal["tum", "kitti", "euroc", "npz"]
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
+STRAIGHT = 1e-3
 FORWARD = 0.9
 """the cosine of the angle to the body's x axis: a body that travels so is no camera"""
 
@@ -48,7 +49,7 @@ class TrajectoryFile:
     stamps: Stamps | None = None
     """None where the file has none"""
     units: tuple[TimeUnit, ...] = ("s",)
-    """that the stamps may have, the likeliest first"""
+    """that the stamps may have, the likeliest first; none where no unit makes their rate a recorder's"""
     unit_settled: bool = True
     """whether header or size of the stamps show their unit"""
     frame: IntArray | None = None
@@ -73,7 +74,7 @@ class TrajectoryFile:
         Poses without stamps take those of `times` that have one for each frame; without such, t is the number of the
         frame. `oriented` False leaves the orientations out. Raises InputError where no times fit.
         """
-        t, stamped = self._seconds(unit or self.units[0], times)
+        t, stamped = self._seconds(unit or (self.units[0] if self.units else "s"), times)
         rotation = self.rotation_in(order or self.orders[0]) if oriented else None
         poses = np.tile(np.eye(4), (len(t), 1, 1))
         poses[:, :3, 3] = self.position
@@ -100,6 +101,11 @@ class TrajectoryFile:
         R = self.rotation
         return R is not None and len(R) > 1 and bool(np.abs(R - R[0]).max() < 1e-12)
 
+    @property
+    def has_positions_only(self) -> bool:
+        """Whether there are no orientations, or one throughout although the path bends."""
+        return self.rotation is None or (self.orientation_is_constant and bends(self.position))
+
     def _seconds(self, unit: TimeUnit, times: Sequence[FloatArray]) -> tuple[FloatArray, bool]:
         if self.stamps is not None:
             return self.stamps.seconds(unit), True
@@ -118,6 +124,14 @@ class TrajectoryFile:
                 "number on each line pose k is that of frame k; give --times for each file, one stamp for each pose"
             )
         return fitting[0][frame], True
+
+
+def bends(position: FloatArray) -> bool:
+    """Whether a path (n, 3) leaves a straight line by more than STRAIGHT of its extent."""
+    if len(position) < 3:
+        return False
+    extent = np.linalg.svd(position - position.mean(axis=0), compute_uv=False)
+    return bool(extent[1] > STRAIGHT * extent[0])
 
 
 def read_trajectory(
@@ -148,13 +162,26 @@ def settled(file: TrajectoryFile, unit: TimeUnit | None, order: Order | None) ->
 
     Raises InputError where the stamps may have several units, and seconds are not among them.
     """
+    if unit is None and "s" not in file.units and len(file.units) != 1:
+        raise InputError(in_doubt(file))
     chosen = file.units[0] if unit is None or file.unit_settled else unit
-    if unit is None and len(file.units) > 1 and "s" not in file.units:
-        raise InputError(
-            f"{file.source}: its time stamps may be in {' or '.join(NAMES[u] for u in file.units)}; "
-            f"give --time-unit {' or '.join(file.units)}"
-        )
     return chosen, (file.orders[0] if order is None or len(file.orders) == 1 else order)
+
+
+def in_doubt(file: TrajectoryFile, units: Sequence[TimeUnit] | None = None) -> str:
+    """What to say where the stamps of a file may have several units, or have none that fits a recorder."""
+    assert file.stamps is not None
+    possible = file.units if units is None else units
+    if not possible:
+        return (
+            f"{file.source}: its poses are {file.stamps.interval:.3g} apart in time, which is none of a recorder in "
+            "seconds, milliseconds, microseconds or nanoseconds; give --time-unit"
+        )
+    names = " or ".join(NAMES[unit] for unit in possible)
+    return (
+        f"{file.source}: its time stamps, {file.stamps.interval:.3g} apart, may be in {names}; give --time-unit "
+        f"{' or '.join(possible)}"
+    )
 
 
 def read_pose_covariances(path: FilePath) -> FloatArray | None:
@@ -166,13 +193,19 @@ def read_pose_covariances(path: FilePath) -> FloatArray | None:
 
 
 def read_tum(path: FilePath) -> tuple[FloatArray, FloatArray]:
-    """Time stamps (n,), s, strictly rising, and poses (n, 4, 4) `world_T_body` of a TUM file; see `read_trajectory`."""
-    read = read_trajectory(path, "tum")
+    """Time stamps (n,), s as they stand, strictly rising, and poses (n, 4, 4) `world_T_body` of a TUM file.
+
+    Raises as `read_trajectory`.
+    """
+    read = read_trajectory_file(path, "tum").trajectory("s", "xyzw")
     return read.t, read.world_T_body
 
 
 def read_euroc(path: FilePath) -> tuple[FloatArray, FloatArray]:
-    """Time stamps (n,), s, strictly rising, and poses (n, 4, 4) `world_T_body` of a EuRoC CSV; see `read_trajectory`."""
+    """Time stamps (n,), s, strictly rising, and poses (n, 4, 4) `world_T_body` of a EuRoC CSV.
+
+    Raises as `read_trajectory`, and for stamps that are no whole nanoseconds.
+    """
     read = read_trajectory(path, "euroc")
     return read.t, read.world_T_body
 
@@ -274,7 +307,7 @@ def _known(
         columns, pose = replace(columns, quaternion=(), covariance=()), pose[:, :3]
     else:
         remarks = []
-    unknown = np.isnan(pose).any(axis=1)
+    unknown: BoolArray = np.asarray(np.isnan(pose).any(axis=1))
     if has_stamp and np.isnan(table.values[~unknown, 0]).any():
         i = int(np.flatnonzero(~unknown & np.isnan(table.values[:, 0]))[0])
         raise InputError(f"line {table.line[i]}: the time stamp is NaN; remove the line or mend it")
@@ -296,9 +329,7 @@ def _with_stamps(
     assert place is not None
     words = lines.column(place)
     rest = None if columns.nanoseconds is None else lines.column(columns.nanoseconds)
-    stamps = stamps_of(
-        [words[i] for i in kept], value, columns.unit, None if rest is None else [rest[i] for i in kept]
-    )
+    stamps = stamps_of([words[i] for i in kept], value, columns.unit, None if rest is None else [rest[i] for i in kept])
     moved: BoolArray = np.asarray((np.diff(pose, axis=0) != 0).any(axis=1))
     reason = lost_digits(stamps, moved)
     if reason:
@@ -310,7 +341,9 @@ def _with_stamps(
     require_rising(stamps, line)
     remarks = file.remarks
     if repeated.any():
-        many = f"{int(repeated.sum()):,} of {len(repeated):,} lines repeat the time stamp before; the first pose is kept"
+        many = (
+            f"{int(repeated.sum()):,} of {len(repeated):,} lines repeat the time stamp before; the first pose is kept"
+        )
         remarks = (*remarks, many)
     if columns.time is None and stamps.whole is not None and max(map(abs, stamps.whole)) < 10**7:
         return replace(file, frame=np.array(stamps.whole, dtype=np.int64), remarks=remarks), left
@@ -339,8 +372,8 @@ def _up_of_camera(position: FloatArray, rotation: FloatArray) -> FloatArray | No
     """Up in the world of a camera; None where the body travels along its x axis, as no camera's frame does."""
     steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
     length = np.linalg.norm(steps, axis=1)
-    moving = length > 0.1 * np.percentile(length, 90) if len(length) else np.zeros(0, dtype=np.bool_)
-    if moving.any() and np.median(np.abs(steps[moving, 0]) / length[moving]) > FORWARD:
+    moving = np.asarray(length > 0.1 * np.max(length, initial=0.0))
+    if np.any(moving) and np.median(np.abs(steps[moving, 0]) / length[moving]) > FORWARD:
         return None
     return np.array(UP_OF_CAMERA)
 
@@ -363,7 +396,7 @@ def _require_form(form: TrajectoryFormat | None, lines: Lines, columns: Columns)
         "euroc": "8 or 17 numbers (EuRoC) between commas",
         "kitti": "12 numbers (KITTI)",
     }
-    if form in wrong and wrong[form]:
+    if form is not None and wrong.get(form):
         raise InputError(f"line {lines.number[0]}: expected {expected[form]}, got {lines.text[0][:60]!r}")
 
 

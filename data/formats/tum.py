@@ -19,4 +19,4 @@ def write_tum(path: FilePath, t: FloatArray, world_T_imu: FloatArray) -> None:
     rows = np.concatenate([stamps[:, None], poses[:, :3, 3], so3.quaternion_xyzw(poses[:, :3, :3])], axis=1)
     lines = [" ".join(map(repr, row)) for row in rows.tolist()]
     with written_beside(path) as file:
-        file.write("\n".join(["# timestamp tx ty tz qx qy qz qw", *lines, ""]).encode("ascii"))
+        file.write("\n".join(["# timestamp [s] tx ty tz qx qy qz qw", *lines, ""]).encode("ascii"))

@@ -40,7 +40,7 @@ class Direction(click.ParamType[tuple[float, ...]]):
 @click.option(
     "--up",
     type=Direction(),
-    help="Up in the reference's world.  [default: 0,-1,0 for KITTI's camera; else by the run or --sequence, else 0,0,1]",
+    help="Up in the reference's world.  [default: 0,-1,0 in KITTI files; else by the run or --sequence, else 0,0,1]",
 )
 @click.option(
     "--association",

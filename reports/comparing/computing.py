@@ -212,6 +212,6 @@ def _matched(
             f"{here.source or here.name}: only {len(matched)} of its poses has a partner in {there.name}, "
             f"{FEWEST} are needed; give a larger --tolerance, or an --offset"
         )
-    if Align(kind) is Align.FIRST_POSE:
+    if kind == Align.FIRST_POSE:
         _oriented(matched)
     return matched.aligned(kind, first=settings.align_first, up=up), found

@@ -11,6 +11,7 @@ from fgbaseline.data import Trajectory
 from fgbaseline.data.formats import Order, TimeUnit, TrajectoryFile
 from fgbaseline.data.formats.shared_clock import Spans, units_in_common
 from fgbaseline.data.formats.stamps import NAMES, PER_SECOND
+from fgbaseline.data.formats.trajectory_file import bends, in_doubt
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .settings import Settings
@@ -18,10 +19,10 @@ from .settings import Settings
 Source = TrajectoryFile | Trajectory
 Times = Sequence[FloatArray]
 """stamps of frames, for files without: each takes those that have one for each of its poses"""
+FEWEST = 10
+"""pairs of poses, below which orders of quaternions are not judged"""
 TURNED = np.deg2rad(1.0)
 """by which orientations differ that are not constant"""
-BENT = 5.0
-"""deg; a path that changes its direction by more is not that of a body with a constant orientation"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,14 +110,10 @@ def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
 
 
 def _only(source: Source, spans: Spans) -> TimeUnit:
-    """The unit, where there is one. Raises InputError where there are several."""
-    if len(spans) < 2 or isinstance(source, Trajectory):
+    """The unit, where there is one. Raises InputError where there are several, or none although there are stamps."""
+    if isinstance(source, Trajectory) or source.stamps is None or len(spans) == 1:
         return next(iter(spans), "s")
-    names = " or ".join(NAMES[unit] for unit in spans)
-    raise InputError(
-        f"{source.source}: its time stamps may be in {names}, and the other file does not show which; give "
-        f"--time-unit {' or '.join(spans)}"
-    )
+    raise InputError(in_doubt(source, list(spans)))
 
 
 def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
@@ -159,7 +156,8 @@ def _asked_for(each: Resolved, order: Order | None) -> Resolved:
 def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Settings) -> FloatArray | None:
     """Angles, deg, by which the rotations differ: a row for each order of the reference, a column for the estimate's.
 
-    None where they have no orientations, are hardly paired, or the positions do not show how the worlds are turned.
+    The positions show how the worlds are turned, or else the rotations themselves. None where there are no
+    orientations or hardly a pair.
     """
     if len(reference.orders) == len(estimate.orders) == 1:
         return None
@@ -168,12 +166,13 @@ def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Se
         cells = []
         for column in estimate.orders:
             matched = paired(reference.trajectory(times, row), estimate.trajectory(times, column), settings)
-            world = None if matched is None else compare.world_rotation(matched)
-            if matched is None or world is None:
+            if matched is None or len(matched) < FEWEST or not (_vary(matched.reference) and _vary(matched.estimate)):
                 return None
-            if not (_vary(matched.reference) and _vary(matched.estimate)):
-                return None
-            cells.append(compare.turning_misfit(matched.reference.rotation, matched.estimate.rotation, world))
+            rotations = matched.reference.rotation, matched.estimate.rotation
+            world = compare.world_rotation(matched)
+            cells.append(
+                compare.turning_misfit(*rotations, compare.turning_rotation(*rotations) if world is None else world)
+            )
         rows.append(cells)
     return np.array(rows)
 
@@ -217,7 +216,7 @@ def _without_constant_orientations(every: list[Resolved], times: Times) -> list[
     result = []
     for each, path, turns in zip(every, paths, turning, strict=True):
         constant = path.oriented and len(path) > 1 and bool(np.abs(path.rotation - path.rotation[0]).max() < 1e-12)
-        if constant and not turns and (any(turning) or compare.travel_misfit(path.position, path.rotation) > BENT):
+        if constant and not turns and (any(turning) or bends(path.position)):
             said = "all its orientations are the same: it has positions and no orientations"
             each = replace(each, oriented=False, remarks=(*each.remarks, said))
         result.append(each)
