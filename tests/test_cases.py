@@ -17,6 +17,7 @@ from .conftest import RECORDINGS
 RMSE = "translation.rmse"
 ROTATION = "rotation_deg.rmse"
 SECOND = "relative.1 s.translation.rmse"
+SEGMENTS = "segments.intervals"
 
 RIGHT: dict[str, tuple[tuple[str, ...], dict[str, Any], dict[str, float]]] = {
     "01-tum-fr2-desk": (("gt.txt", "est.txt"), {}, {RMSE: 0.005771, ROTATION: 1.1334}),
@@ -32,7 +33,7 @@ RIGHT: dict[str, tuple[tuple[str, ...], dict[str, Any], dict[str, float]]] = {
     "08-kitti-13-columns": (
         ("gt.txt", "est13.txt"),
         {"align": "sim3"},
-        {RMSE: 6.630, "segments.intervals.translation_percent": 3.331, "segments.intervals.rotation_deg_per_m": 0.00307},
+        {RMSE: 6.630, f"{SEGMENTS}.translation_percent": 3.331, f"{SEGMENTS}.rotation_deg_per_m": 0.00307},
     ),
     "09-kitti-up": (
         ("gt.txt", "est.txt"), {"align": "yaw", "times": "times.txt"}, {RMSE: 7.10, "shares.intervals.heading": 0.94}
