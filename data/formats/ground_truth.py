@@ -1,31 +1,36 @@
-"""Ground truth from a file of its own, KITTI or TUM, brought to the recording's frames and to its world."""
+"""Ground truth from a trajectory file, brought to the recording's frames and to its world."""
 
 from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import IntArray
 from ..sequence import Sequence, Truth
+from .columns import Order
 from .named_file import FilePath, reading, shown
 from .shared_clock import units_in_common
 from .stamps import NAMES, PER_SECOND, TimeUnit
 from .trajectory_file import TrajectoryFile, read_trajectory_file, settled
 
 BodyFrame = Literal["camera", "imu"]
+STEP = 20
+"""frames between two whose rotation is compared"""
+CLEARLY, LEAST_MISFIT = 3.0, np.deg2rad(0.5)
+"""by how many times, and from which misfit on, another order of quaternions has to fit better"""
 FASTER = 3.0
 """times the recording's: lines that are so much farther apart are not one for each frame"""
 
 
 def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> Sequence:
-    """The recording with the truth of a KITTI file (12 numbers a line) or a TUM file (8 numbers a line).
+    """The recording with the truth of a trajectory file (see `read_trajectory_file`).
 
-    `frame` says whose poses they are: "camera" (the left one) or "imu". The result is `world_T_imu` with the world
-    being the IMU's frame at frame 0. Line k of a KITTI file is frame k; frames beyond its end have no truth. In a TUM
-    file the pose of a frame is the one nearest in time, if it lies within half the median interval of the frames; one
-    pose belongs to one frame. Frames without truth are NaN and counted in a remark.
+    `frame` is the body whose poses they are: "camera" (the left one) or "imu". The result is `world_T_imu` with the
+    world being the IMU's frame at frame 0. Line k of a KITTI file is frame k, or that of its number; frames beyond its
+    end have no truth. In a file with stamps the pose of a frame is the one nearest in time, if it lies within half the
+    median interval of the frames; one pose belongs to one frame. Frames without truth are NaN and counted in a remark.
 
     It replaces what truth the recording has. Raises InputError naming file and line for bad text, and when `frame` is
     missing, the file has more lines than the recording has frames (KITTI), no stamp fits (TUM), or frame 0 has no pose.
@@ -35,7 +40,7 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
             f"{shown(path)}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
     with reading(path), np.errstate(all="ignore"):
-        poses, remarks = _poses_of_frames(sequence, path)
+        poses, remarks = _poses_of_frames(sequence, path, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
         truth = Truth.from_any_world(poses, source=shown(path))
@@ -45,7 +50,7 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
         return replace(sequence, truth=truth, remarks=(*sequence.remarks, *remarks))
 
 
-def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, list[str]]:
+def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> tuple[FloatArray, list[str]]:
     """The poses (T, 4, 4) in the file's own world, NaN where it has none, and what there is to say of them."""
     file = read_trajectory_file(path)
     if file.has_positions_only:
@@ -63,6 +68,12 @@ def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, li
         remarks.append(f"The time stamps of {shown(path)} are in {NAMES[unit]}: divided by {PER_SECOND[unit]:,}.")
     read = file.trajectory(unit)
     frames, nearest = match_stamps(sequence.t, read.t)
+    order = _order(sequence, file, frame, frames, nearest)
+    if order != file.orders[0]:
+        remarks.append(
+            f"The quaternions of {shown(path)} are read as {' '.join(order)}: so they turn as the gyroscope."
+        )
+        read = file.trajectory(unit, order)
     if not len(frames):
         raise InputError(
             f"none of its time stamps ({float(read.t[0])!r} to {float(read.t[-1])!r} s) is near one of the recording's "
@@ -73,6 +84,31 @@ def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, li
     if apart:
         remarks.append(f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart.")
     return poses, remarks
+
+
+def _order(
+    sequence: Sequence, file: TrajectoryFile, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
+) -> Order:
+    """The order of quaternions with which the truth turns as the gyroscope measured, clearly; else the usual one."""
+    if len(file.orders) == 1 or len(frames) <= STEP:
+        return file.orders[0]
+    increments = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
+    turned = np.tile(np.eye(3), (sequence.n_frames, 1, 1))
+    for k, increment in enumerate(increments):
+        turned[k + 1] = turned[k] @ increment
+    body_R_imu = sequence.imu_T_cam[:3, :3].T if frame == "camera" else np.eye(3)
+
+    def over_steps(R: FloatArray) -> FloatArray:
+        return np.asarray(np.swapaxes(R[:-STEP], 1, 2) @ R[STEP:])
+
+    measured = over_steps(turned[frames])
+    misfits = []
+    for order in file.orders:
+        rotation = file.rotation_in(order)
+        assert rotation is not None
+        true = over_steps(rotation[nearest] @ body_R_imu)
+        misfits.append(float(np.median(so3.rotation_angle(np.swapaxes(measured, 1, 2) @ true))))
+    return file.orders[1 if misfits[0] > LEAST_MISFIT and CLEARLY * misfits[1] <= misfits[0] else 0]
 
 
 def _frames(sequence: Sequence, file: TrajectoryFile) -> IntArray:

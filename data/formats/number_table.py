@@ -114,7 +114,7 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
         )
     except ValueError as error:
         raise _culprit(lines, wanted, nan=nan) from error
-    if np.isinf(values).any() or (np.isnan(values).any() and not nan):
+    if len(values) != len(texts) or np.isinf(values).any() or (np.isnan(values).any() and not nan):
         raise _culprit(lines, wanted, nan=nan)
     return NumberTable(values, np.array(lines.number, dtype=np.int64))
 

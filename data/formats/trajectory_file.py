@@ -113,7 +113,7 @@ class TrajectoryFile:
         if not len(times):
             return frame.astype(np.float64), False
         if self.frame is not None:
-            fitting = [t for t in times if len(t) > frame[-1]]
+            fitting = [t for t in times if len(t) > frame[-1] and frame[0] >= 0]
         else:
             fitting = [t for t in times if len(t) == len(frame)]
         if not fitting:
@@ -262,6 +262,8 @@ def _of_text(empty: TrajectoryFile, lines: Lines, columns: Columns) -> Trajector
     places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
     stamp = columns.time if columns.time is not None else columns.number
     table = numbers_of(lines, places if stamp is None else [stamp, *places], nan=True)
+    if columns.nanoseconds is not None:
+        numbers_of(lines, [columns.nanoseconds])
     pose = table.values if stamp is None else table.values[:, 1:]
     n_pose = len(columns.matrix) or len(columns.position) + len(columns.quaternion)
     kept, columns, remarks = _known(table, pose[:, :n_pose], columns, stamp is not None)
