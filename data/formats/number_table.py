@@ -44,6 +44,14 @@ class Lines:
     """the first line, where no word of it is a number"""
     comments: tuple[str, ...]
     """the comments above the first line of data, without their marks"""
+    title_line: int = 1
+
+    def require_some(self) -> None:
+        """Raises InputError where there is no line of data."""
+        if not self.text and self.title is not None:
+            raise InputError(f"line {self.title_line}: {_short(self.title)} has no number, and no poses follow")
+        if not self.text:
+            raise InputError("the file has no poses in it; check that it is the right one")
 
     @property
     def width(self) -> int:
@@ -67,7 +75,7 @@ def read_lines(file: Path) -> Lines:
     numbers: list[int] = []
     texts: list[str] = []
     comments: list[str] = []
-    title = None
+    title, title_line = None, 1
     for number, line in enumerate(_text(file).split("\n"), start=1):
         bare, _, comment = line.partition("#")
         content = bare.strip()
@@ -79,14 +87,14 @@ def read_lines(file: Path) -> Lines:
         if not content:
             continue
         if not texts and title is None and _has_no_number(content):
-            title = content
+            title, title_line = content, number
             continue
         numbers.append(number)
         texts.append(content)
     separator = _separator(texts[0], numbers[0]) if texts else None
     if separator is not None:
         texts = [text.removesuffix(separator).rstrip() for text in texts]
-    return Lines(numbers, texts, separator, title, tuple(comments))
+    return Lines(numbers, texts, separator, title, tuple(comments), title_line)
 
 
 def split(text: str, separator: str | None) -> list[str]:
@@ -100,8 +108,7 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
     Raises InputError naming the line where it is not as wide as the first, or a word is no finite number; with `nan`
     that one is allowed.
     """
-    if not lines.text:
-        raise InputError("the file has no poses in it; check that it is the right one")
+    lines.require_some()
     width = lines.width
     for number, text in zip(lines.number, lines.text, strict=True):
         if (words := _count(text, lines.separator)) != width:
@@ -121,8 +128,7 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
 
 def require_width(lines: Lines, counts: dict[int, str]) -> None:
     """Raises InputError where the first line has none of these counts of numbers; they come with what they mean."""
-    if not lines.text:
-        raise InputError("the file has no poses in it; check that it is the right one")
+    lines.require_some()
     if lines.width not in counts:
         expected = " or ".join(f"{n} ({name})" for n, name in counts.items())
         raise InputError(

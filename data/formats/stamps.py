@@ -15,7 +15,7 @@ PER_SECOND: dict[TimeUnit, int] = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9
 NAMES: dict[TimeUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 EPOCH = (6e8, 4e9)
 """s since 1970: 1989 to 2096"""
-FASTEST, USUAL, SLOWEST = 2e-4, 20.0, 1e4
+FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
 """s between two poses: of no recorder, of a recorder, of keyframes at most"""
 CERTAIN_BELOW = 5.0
 """s between two poses: stamps that are nearer in seconds are taken to be seconds"""

@@ -227,8 +227,7 @@ def read_trajectory_file(
         if form == "npz" or (form is None and _is_zip(file)):
             return _of_npz(empty, file)
         lines = read_lines(file)
-        if not lines.text:
-            raise InputError("the file has no poses in it; check that it is the right one")
+        lines.require_some()
         columns = named_columns(lines) if form != "kitti" else None
         named = columns is not None
         if columns is None:
