@@ -223,6 +223,16 @@ def test_inverse_poses_and_conjugated_quaternions_are_recognized(tmp_path: Path)
     assert "jpl: its orientations fit once transposed" in said
 
 
+def test_a_straight_path_may_have_one_orientation_throughout(tmp_path: Path) -> None:
+    straight = Path3D(tuple(k * 10**8 for k in range(60)), np.tile(np.eye(4), (60, 1, 1)))
+    straight.poses[:, 0, 3] = np.arange(60.0)
+    (tmp_path / "truth.tum").write_text(tum(straight))
+    (tmp_path / "mine.tum").write_text(tum(astray(straight, 1)))
+    result = compare(tmp_path / "truth.tum", tmp_path / "mine.tum")
+    assert result.reference.trajectory.oriented
+    assert "rotation_deg" not in result.results["mine"].notes
+
+
 DAMAGED = {
     "six figures": (lambda p: rows([f"{s / 1e9:.6g}" for s in p.ns], p.numbers()), "lost digits: .* significant"),
     "float32": (

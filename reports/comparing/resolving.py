@@ -21,8 +21,8 @@ Times = Sequence[FloatArray]
 """stamps of frames, for files without: each takes those that have one for each of its poses"""
 FEWEST = 10
 """pairs of poses, below which orders of quaternions are not judged"""
-TURNED = np.deg2rad(1.0)
-"""by which orientations differ that are not constant"""
+VARIED, TURNED = np.deg2rad(1.0), np.deg2rad(10.0)
+"""by which orientations differ that are not constant, and those of a body that cannot have gone straight"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -210,9 +210,9 @@ def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> M
 
 
 def _without_constant_orientations(every: list[Resolved], times: Times) -> list[Resolved]:
-    """Positions only, where a file has one orientation throughout while its path bends or another file's turn."""
+    """Positions only, where a file has one orientation throughout while its path bends or another file turns."""
     paths = [each.trajectory(times) for each in every]
-    turning = [path.oriented and _vary(path) for path in paths]
+    turning = [path.oriented and _vary(path, TURNED) for path in paths]
     result = []
     for each, path, turns in zip(every, paths, turning, strict=True):
         constant = path.oriented and len(path) > 1 and bool(np.abs(path.rotation - path.rotation[0]).max() < 1e-12)
@@ -223,5 +223,6 @@ def _without_constant_orientations(every: list[Resolved], times: Times) -> list[
     return result
 
 
-def _vary(path: Trajectory) -> bool:
-    return bool(so3.rotation_angle(path.rotation[0].T @ path.rotation).max() > TURNED)
+def _vary(path: Trajectory, by: float = VARIED) -> bool:
+    """Whether orientations differ from the first by more than an angle, rad."""
+    return bool(so3.rotation_angle(path.rotation[0].T @ path.rotation).max() > by)
