@@ -12,6 +12,9 @@ from .entry import Entry
 from .resolving import paired
 from .settings import Settings
 
+LEAST_MISFIT = 1e-3
+"""of the reference's extent: paths that fit better are not inverted"""
+
 
 def moved_body(entry: Entry, body_T_other: FloatArray) -> Entry:
     """The poses of another point of the same rigid body: world_T_body @ body_T_other (4, 4).
@@ -75,10 +78,6 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     estimate_T_reference = np.eye(4)
     estimate_T_reference[:3, :3] = found.rotation
     return _remarked(moved_body(entry, estimate_T_reference), f"{said}, which is removed")
-
-
-LEAST_MISFIT = 1e-3
-"""of the reference's extent: paths that fit better are not inverted"""
 
 
 def _extent(path: Trajectory) -> float:
