@@ -318,7 +318,8 @@ def _known(
         raise InputError("every pose is NaN, so there is no trajectory; check that it is the right file")
     if unknown.any():
         count = int(unknown.sum())
-        remarks.append(f"{count:,} of {len(unknown):,} lines have NaN in place of a pose and are left out")
+        have = "has NaN in place of a pose and is" if count == 1 else "have NaN in place of a pose and are"
+        remarks.append(f"{count:,} of {len(unknown):,} lines {have} left out")
     return np.flatnonzero(~unknown), columns, remarks
 
 
@@ -342,10 +343,9 @@ def _with_stamps(
     require_rising(stamps, line)
     remarks = file.remarks
     if repeated.any():
-        many = (
-            f"{int(repeated.sum()):,} of {len(repeated):,} lines repeat the time stamp before; the first pose is kept"
-        )
-        remarks = (*remarks, many)
+        count = int(repeated.sum())
+        said = f"{count:,} of {len(repeated):,} lines {'repeats' if count == 1 else 'repeat'} the time stamp before"
+        remarks = (*remarks, f"{said}; the first pose is kept")
     if columns.time is None and stamps.whole is not None and max(map(abs, stamps.whole)) < 10**7:
         return replace(file, frame=np.array(stamps.whole, dtype=np.int64), remarks=remarks), left
     if stamps.unit == "ns" and stamps.whole is None:
