@@ -7,6 +7,18 @@ from .block_bootstrap import error_statistics
 from .carried_covariance import of_other_body, scaled, since_first
 from .common_moments import common_moments, taking_part
 from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
+from .conventions import (
+    BodyRotation,
+    are_conjugated,
+    body_rotation,
+    fits_clearly_better,
+    is_constant,
+    rmse_of_inverses,
+    travel_misfit,
+    turning_misfit,
+    turning_rotation,
+    world_rotation,
+)
 from .coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
 from .difference_shares import DifferenceShares, difference_shares
 from .drift import drift
@@ -45,6 +57,7 @@ __all__ = [
     "Align",
     "Alignment",
     "Association",
+    "BodyRotation",
     "Consistency",
     "CovarianceState",
     "Difference",
@@ -66,8 +79,10 @@ __all__ = [
     "align",
     "align_se3",
     "anees",
+    "are_conjugated",
     "associate",
     "body_error",
+    "body_rotation",
     "common_moments",
     "commonly_used",
     "component_summary",
@@ -81,11 +96,13 @@ __all__ = [
     "drift",
     "error_statistics",
     "first_beyond",
+    "fits_clearly_better",
     "growing_divergence",
     "growth_by_part",
     "held_out_errors",
     "held_out_ranking",
     "interpolated",
+    "is_constant",
     "map_by_depth",
     "map_difference",
     "matched_pairs",
@@ -108,6 +125,7 @@ __all__ = [
     "reprojection_summary",
     "residual_patterns",
     "rmse_difference",
+    "rmse_of_inverses",
     "scaled",
     "segment_errors",
     "share_intervals",
@@ -119,7 +137,11 @@ __all__ = [
     "time_offset",
     "too_small",
     "track_chi_square",
+    "travel_misfit",
     "trust",
     "truth_errors",
+    "turning_misfit",
+    "turning_rotation",
     "whitened_summary",
+    "world_rotation",
 ]

@@ -61,9 +61,8 @@ class Matched:
         )
         shifted = f", {self.estimate.name} {self.offset:+.4g} s" if self.offset else ""
         left = f"left out: {self.left_out_reference} of the reference, {self.left_out_estimate} of the estimate"
-        stamps = f"{how} {self.tolerance:.3g} s" if self.reference.stamped else "by their number"
-        paired = f"{plural(len(self), 'pose')} paired ({stamps}{shifted}; {left})"
-        return f"{paired}; {self.alignment.caption}"
+        stamps = f"{how} {self.tolerance:.3g} s{shifted}" if self.reference.stamped else "by frame"
+        return f"{plural(len(self), 'pose')} paired ({stamps}; {left}); {self.alignment.caption}"
 
     def aligned(
         self, kind: Align | str, *, first: int | None = None, up: FloatArray | tuple[float, ...] = (0.0, 0.0, 1.0)

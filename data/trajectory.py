@@ -39,6 +39,8 @@ class Trajectory:
     """(T,) the line or row of `source` that each pose stands in, for errors"""
     stamped: bool = True
     """False where the source has no time: then nothing can be said per second"""
+    oriented: bool = True
+    """False where the source has positions only: then the rotations are the identity and mean nothing"""
     proven: InitVar[bool] = False
     """True leaves out the checks: for what was made of a checked trajectory"""
 

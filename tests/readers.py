@@ -24,9 +24,11 @@ from fgbaseline.reports.comparing.run_folder import read_run_folder
 
 from .summaries import estimator, summary
 from .synthetic import Scene, drive, plain_problem
+from .trajectory_writers import VARIANTS, Path3D
 
 PACKED = 128
 """first bytes from here on pack the variable behind them"""
+OTHERS = ("TUM, packed", "TUM, UTF-16", "OpenVINS", "VINS-Fusion", "OKVIS2", "rostopic", "bagpy", "positions")
 TUM = b"0.0 0 0 0 0 0 0 1\n0.1 1 0 0 0 0 0 1\n"
 
 
@@ -282,6 +284,10 @@ def readers() -> dict[str, Reader]:
         ),
         "EuRoC": Reader(
             _file("a.csv", *paths, read_euroc), lambda: [_written(lambda p: data.write_euroc(p, t, poses))]
+        ),
+        "other trajectories": Reader(
+            _file("a.csv", *paths),
+            lambda: [VARIANTS[name].write(Path3D((0, 10**8, 2 * 10**8), poses[:3])) for name in OTHERS],
         ),
         "trajectory npz": Reader(_member_read(trajectory, "a.npz", *paths), lambda: _member_seeds(trajectory)),
         "landmarks": Reader(_file("a.csv", read_landmarks), lambda: [b"id,x,y,z,n_used\n0,1.5,2,3,7\n12,4,5,-6e3,1\n"]),

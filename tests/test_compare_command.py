@@ -165,12 +165,12 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(
     assert everything_in(made) == before
 
 
-def test_nan_stamps_and_poses_are_told_with_their_line(
+def test_stamps_and_poses_that_are_no_numbers_are_told_with_their_line(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     lines = (made / "mine.tum").read_text().splitlines()
-    for k, (column, word) in enumerate([(0, "nan"), (3, "nan"), (7, "9.0")]):
+    for k, (column, word) in enumerate([(0, "nan"), (3, "inf"), (7, "9.0")]):
         words = lines[5].split()
         words[column] = word
         (tmp_path / f"{k}.tum").write_text("\n".join([*lines[:5], " ".join(words), *lines[6:]]))

@@ -11,6 +11,9 @@ from fgbaseline.data.formats import attach_truth, read, write_tum
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.geometry import InputError, se3
 
+from .synthetic import drive
+from .trajectory_writers import Path3D, tum
+
 
 @pytest.fixture
 def recorded(tmp_path, course_arrays):
@@ -49,6 +52,7 @@ def test_every_way_of_writing_the_same_truth(tmp_path, recorded, body, form):
 
 def test_frames_beyond_the_end_of_a_kitti_file_are_counted(tmp_path, recorded):
     sequence, poses = recorded
+    sequence = replace(sequence, linear_velocity=10.0 * sequence.linear_velocity)
     path = write_kitti(tmp_path / "truth", poses[:4])
     attached = attach_truth(sequence, path, "imu")
     assert attached.truth is not None
@@ -81,10 +85,43 @@ def test_truth_that_does_not_belong_to_the_recording(tmp_path, recorded):
     with pytest.raises(InputError, match=r"truth\) has no pose for frame 0"):
         attach_truth(sequence, tmp_path / "truth", "imu")
     (tmp_path / "truth").write_text("1 2 3\n")
-    with pytest.raises(InputError, match=r"line 1: expected 8 \(TUM\) or 12 \(KITTI\) numbers, got 3"):
+    with pytest.raises(InputError, match=r"line 1: it has 3 words"):
         attach_truth(sequence, tmp_path / "truth", "imu")
     with pytest.raises(InputError, match="there is no such file"):
         attach_truth(sequence, tmp_path / "missing", "imu")
+
+
+@pytest.mark.parametrize("body", ["camera", "imu"])
+@pytest.mark.parametrize("order", ["xyzw", "wxyz"])
+@pytest.mark.parametrize("unit", ["s", "ms", "ns"])
+def test_truth_in_any_unit_and_order_of_quaternions_is_that_of_the_recording(tmp_path, body, order, unit):
+    sequence = drive(seconds=12.0)
+    assert sequence.truth is not None
+    poses = sequence.truth.world_T_imu if body == "imu" else sequence.truth.world_T_imu @ sequence.imu_T_cam
+    path = Path3D(tuple(round(1e9 * t) for t in sequence.t.tolist()), poses)
+    (tmp_path / "truth.txt").write_text(tum(path, unit, order))
+    attached = attach_truth(sequence, tmp_path / "truth.txt", body)
+    assert attached.truth is not None
+    np.testing.assert_allclose(attached.truth.world_T_imu, sequence.truth.world_T_imu, atol=1e-9)
+    assert any("quaternions" in remark for remark in attached.remarks) == (order == "wxyz")
+    assert any("divided by" in remark for remark in attached.remarks) == (unit != "s")
+
+
+def test_positions_and_every_tenth_pose_are_no_truth_of_a_run(tmp_path):
+    sequence = drive(seconds=12.0)
+    assert sequence.truth is not None
+    poses = sequence.truth.world_T_imu
+    rows = np.concatenate([sequence.t[:, None], poses[:, :3, 3]], axis=1)
+    np.savetxt(tmp_path / "prism.txt", rows, fmt="%.9f")
+    with pytest.raises(InputError, match=r"prism\.txt: it has positions without orientations"):
+        attach_truth(sequence, tmp_path / "prism.txt", "imu")
+    with pytest.raises(InputError, match=r"keys\.txt: it has \d+ poses for \d+ frames, .* line k is not frame k"):
+        attach_truth(sequence, write_kitti(tmp_path / "keys.txt", poses[::10]), "imu")
+    numbered = np.concatenate([np.arange(len(poses))[::10, None], poses[::10, :3].reshape(-1, 12)], axis=1)
+    np.savetxt(tmp_path / "numbered.txt", numbered, fmt="%.17g")
+    attached = attach_truth(sequence, tmp_path / "numbered.txt", "imu").truth
+    assert attached is not None
+    assert np.flatnonzero(attached.known).tolist() == list(range(0, len(poses), 10))
 
 
 @pytest.mark.parametrize("body", [None, "body"])

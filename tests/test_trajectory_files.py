@@ -86,10 +86,9 @@ def test_we_read_the_same_as_evo_from_a_euroc_state_file(tmp_path):
     for k in range(4):
         rows.append(f"140363658083855539{k},4.6,-1.7,{0.5 + k},0.5,-0.5,0.5,-0.5" + ",0.1" * 9)
     (tmp_path / "data.csv").write_text("\n".join(rows))
-    with pytest.raises(InputError, match=r"data\.csv: line 3: the time stamp .* is not after"):
+    with pytest.raises(InputError, match=r"data\.csv: line 3: its time stamp .* repeats"):
         read_trajectory(tmp_path / "data.csv")  # stamps a nanosecond apart are one double
-    (tmp_path / "data.csv").write_text("\n".join(rows).replace("539", "5390"))
-    (tmp_path / "data.csv").write_text("\n".join(rows[:1] + [rows[k + 1].replace("140", f"14{k}") for k in range(4)]))
+    (tmp_path / "data.csv").write_text("\n".join(rows[:1] + [rows[k + 1].replace("6580", f"658{k}") for k in range(4)]))
     ours = read_trajectory(tmp_path / "data.csv")
     theirs = file_interface.read_euroc_csv_trajectory(tmp_path / "data.csv")
     np.testing.assert_allclose(ours.world_T_body, np.array(theirs.poses_se3), atol=1e-12)
@@ -106,7 +105,7 @@ def test_kitti_poses_take_the_times_that_are_given(tmp_path):
     assert read.stamped
     assert read.name == "mine"
     assert read.t.tobytes() == t.tobytes()
-    with pytest.raises(InputError, match=r"00\.txt: it has 4 poses, but there are only 3 time stamps"):
+    with pytest.raises(InputError, match=r"00\.txt: it has 4 poses but there are 3 time stamps"):
         read_trajectory(path, times=t[:3])
     (tmp_path / "times.txt").write_text("0.0\n0.1\n0.1\n")
     with pytest.raises(InputError, match=r"times\.txt: line 3: the time stamp 0.1 is not after 0.1"):
@@ -141,15 +140,19 @@ def test_a_recording_is_the_trajectory_of_its_truth(tmp_path):
 GOOD = "1000000000,0,0,0,1,0,0,0"
 BAD_TEXT = {
     "seven words": ("1 2 3 4 5 6 7\n", "line 1: it has 7 words"),
-    "three between commas": ("1,2,3\n", "line 1: expected 8 .* or 17 .* numbers between commas, got 3"),
+    "three between commas": ("1,2,3\n", "line 1: it has 3 words"),
     "word": (f"#h\n{GOOD}\n2000000000,0,0,x,1,0,0,0\n", "line 3: 'x' is no finite number"),
-    "NaN": (f"#h\n{GOOD}\n2000000000,0,0,nan,1,0,0,0\n", "line 3: 'nan' is no finite number"),
+    "NaN stamp": (f"#h\n{GOOD}\nnan,0,0,1,1,0,0,0\n", "line 3: the time stamp is NaN"),
+    "infinite": (f"#h\n{GOOD}\n2000000000,0,0,inf,1,0,0,0\n", "line 3: 'inf' is no finite number"),
     "missing": (f"{GOOD}\n2000000000,0,0,1,0,0,0\n", "line 2: expected 8 numbers, got 7"),
     "empty cell": (f"{GOOD}\n2000000000,0,,0,1,0,0,0\n", "line 2: '' is no finite number"),
-    "half a nanosecond": ("1.5,0,0,0,1,0,0,0\n", "line 1: the time stamp 1.5 is no whole number of nanoseconds"),
+    "half a nanosecond": ("#t [ns],x,y,z,qw,qx,qy,qz\n1.5,0,0,0,1,0,0,0\n", "line 2: the time stamp 1.5 is no whole n"),
     "long quaternion": (f"{GOOD}\n2000000000,0,0,0,1,0.1,0,0\n", r"line 2: the quaternion \[0.1, 0.0, 0.0, 1.0\] has"),
-    "unsorted": (f"{GOOD}\n500000000,0,0,0,1,0,0,0\n", r"line 2: the time stamp 0.5 is not after 1.0 \(line 1\)"),
-    "repeated": (f"{GOOD}\n{GOOD}\n", r"line 2: the time stamp 1.0 is not after 1.0 \(line 1\)"),
+    "unsorted": (
+        f"{GOOD}\n500000000,0,0,0,1,0,0,0\n",
+        r"line 2: the time stamp 500000000 is not after 10{9} \(line 1\)",
+    ),
+    "digits lost": (f"{GOOD}\n{GOOD.replace('0,0,0,1', '1,0,0,1')}\n", "its time stamps have lost digits"),
     "nothing": ("# only words\n", "the file has no poses"),
 }
 

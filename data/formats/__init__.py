@@ -1,17 +1,31 @@
 """Readers and writers: recordings (course npz, ours, UTIAS .mat), trajectories and truth (TUM, KITTI, EuRoC, npz)."""
 
-from .euroc import read_euroc, write_euroc
+from .columns import Order
+from .euroc import write_euroc
 from .ground_truth import BodyFrame, attach_truth
-from .kitti import read_kitti, read_times, write_kitti
+from .kitti import read_times, write_kitti
 from .landmark_file import read_landmarks
 from .npz_writer import write_npz
 from .recording import read
-from .trajectory_file import TrajectoryFormat, read_pose_covariances, read_trajectory
+from .stamps import TimeUnit
+from .trajectory_file import (
+    TrajectoryFile,
+    TrajectoryFormat,
+    read_euroc,
+    read_kitti,
+    read_pose_covariances,
+    read_trajectory,
+    read_trajectory_file,
+    read_tum,
+)
 from .trajectory_npz import write_trajectory_npz
-from .tum import read_tum, write_tum
+from .tum import write_tum
 
 __all__ = [
     "BodyFrame",
+    "Order",
+    "TimeUnit",
+    "TrajectoryFile",
     "TrajectoryFormat",
     "attach_truth",
     "read",
@@ -21,6 +35,7 @@ __all__ = [
     "read_pose_covariances",
     "read_times",
     "read_trajectory",
+    "read_trajectory_file",
     "read_tum",
     "write_euroc",
     "write_kitti",

@@ -1,28 +1,36 @@
-"""Ground truth from a file of its own, KITTI or TUM, brought to the recording's frames and to its world."""
+"""Ground truth from a trajectory file, brought to the recording's frames and to its world."""
 
 from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import IntArray
 from ..sequence import Sequence, Truth
-from . import kitti, tum
-from .named_file import FilePath, reading, regular_file, shown
-from .number_table import read_numbers
+from .columns import Order
+from .named_file import FilePath, reading, shown
+from .shared_clock import units_in_common
+from .stamps import NAMES, PER_SECOND, TimeUnit
+from .trajectory_file import TrajectoryFile, read_trajectory_file, settled
 
 BodyFrame = Literal["camera", "imu"]
+STEP = 20
+"""frames between two whose rotation is compared"""
+CLEARLY, LEAST_MISFIT = 3.0, np.deg2rad(0.5)
+"""by how many times, and from which misfit on, another order of quaternions has to fit better"""
+FASTER = 3.0
+"""times the recording's: lines that are so much farther apart are not one for each frame"""
 
 
 def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> Sequence:
-    """The recording with the truth of a KITTI file (12 numbers a line) or a TUM file (8 numbers a line).
+    """The recording with the truth of a trajectory file (see `read_trajectory_file`).
 
-    `frame` says whose poses they are: "camera" (the left one) or "imu". The result is `world_T_imu` with the world
-    being the IMU's frame at frame 0. Line k of a KITTI file is frame k; frames beyond its end have no truth. In a TUM
-    file the pose of a frame is the one nearest in time, if it lies within half the median interval of the frames; one
-    pose belongs to one frame. Frames without truth are NaN and counted in a remark.
+    `frame` is the body whose poses they are: "camera" (the left one) or "imu". The result is `world_T_imu` with the
+    world being the IMU's frame at frame 0. Line k of a KITTI file is frame k, or that of its number; frames beyond its
+    end have no truth. In a file with stamps the pose of a frame is the one nearest in time, if it lies within half the
+    median interval of the frames; one pose belongs to one frame. Frames without truth are NaN and counted in a remark.
 
     It replaces what truth the recording has. Raises InputError naming file and line for bad text, and when `frame` is
     missing, the file has more lines than the recording has frames (KITTI), no stamp fits (TUM), or frame 0 has no pose.
@@ -32,7 +40,7 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
             f"{shown(path)}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
     with reading(path), np.errstate(all="ignore"):
-        poses, remarks = _poses_of_frames(sequence, path)
+        poses, remarks = _poses_of_frames(sequence, path, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
         truth = Truth.from_any_world(poses, source=shown(path))
@@ -42,29 +50,110 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
         return replace(sequence, truth=truth, remarks=(*sequence.remarks, *remarks))
 
 
-def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, list[str]]:
+def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> tuple[FloatArray, list[str]]:
     """The poses (T, 4, 4) in the file's own world, NaN where it has none, and what there is to say of them."""
-    table = read_numbers(regular_file(path), {tum.NUMBERS: "TUM", kitti.NUMBERS: "KITTI"})
+    file = read_trajectory_file(path)
+    if file.has_positions_only:
+        raise InputError(
+            "it has positions without orientations, which a run needs to bring it to its own world; run without it and "
+            "compare the run with it: fgbaseline compare TRUTH trajectories/NAME.tum --lever-arm X,Y,Z"
+        )
+    remarks = [f"{shown(path)}: {remark}." for remark in file.remarks]
     poses = np.full((sequence.n_frames, 4, 4), np.nan)
-    if table.values.shape[1] == kitti.NUMBERS:
-        lines = kitti.kitti_poses(table)
-        if len(lines) > sequence.n_frames:
-            raise InputError(
-                f"it has {len(lines)} lines, but line k is frame k and the recording has only {sequence.n_frames} "
-                "frames; give the truth of this recording, or cut off what lies beyond its end"
-            )
-        poses[: len(lines)] = lines
-        return poses, []
-    t, recorded = tum.tum_poses(table)
-    frames, nearest = match_stamps(sequence.t, t)
+    if file.stamps is None:
+        poses[_frames(sequence, file)] = file.trajectory().world_T_body
+        return poses, remarks
+    unit = _unit(sequence, file)
+    if unit != "s":
+        remarks.append(f"The time stamps of {shown(path)} are in {NAMES[unit]}: divided by {PER_SECOND[unit]:,}.")
+    read = file.trajectory(unit)
+    frames, nearest = match_stamps(sequence.t, read.t)
+    order = _order(sequence, file, frame, frames, nearest)
+    if order != file.orders[0]:
+        remarks.append(
+            f"The quaternions of {shown(path)} are read as {' '.join(order)}: so they turn as the gyroscope."
+        )
+        read = file.trajectory(unit, order)
     if not len(frames):
         raise InputError(
-            f"none of its time stamps ({float(t[0])!r} to {float(t[-1])!r} s) is near one of the recording's "
+            f"none of its time stamps ({float(read.t[0])!r} to {float(read.t[-1])!r} s) is near one of the recording's "
             f"({float(sequence.t[0])!r} to {float(sequence.t[-1])!r} s); give the truth of this recording, on its clock"
         )
-    poses[frames] = recorded[nearest]
-    apart = float(np.abs(sequence.t[frames] - t[nearest]).max())
-    return poses, [f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart."] if apart else []
+    poses[frames] = read.world_T_body[nearest]
+    apart = float(np.abs(sequence.t[frames] - read.t[nearest]).max())
+    if apart:
+        remarks.append(f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart.")
+    return poses, remarks
+
+
+def _order(
+    sequence: Sequence, file: TrajectoryFile, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
+) -> Order:
+    """The order of quaternions with which the truth turns as the gyroscope measured, clearly; else the usual one."""
+    if len(file.orders) == 1 or len(frames) <= STEP:
+        return file.orders[0]
+    increments = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
+    turned = np.tile(np.eye(3), (sequence.n_frames, 1, 1))
+    for k, increment in enumerate(increments):
+        turned[k + 1] = turned[k] @ increment
+    body_R_imu = sequence.imu_T_cam[:3, :3].T if frame == "camera" else np.eye(3)
+
+    def over_steps(R: FloatArray) -> FloatArray:
+        return np.asarray(np.swapaxes(R[:-STEP], 1, 2) @ R[STEP:])
+
+    measured = over_steps(turned[frames])
+    misfits = []
+    for order in file.orders:
+        rotation = file.rotation_in(order)
+        assert rotation is not None
+        true = over_steps(rotation[nearest] @ body_R_imu)
+        misfits.append(float(np.median(so3.rotation_angle(np.swapaxes(measured, 1, 2) @ true))))
+    return file.orders[1 if misfits[0] > LEAST_MISFIT and CLEARLY * misfits[1] <= misfits[0] else 0]
+
+
+def _frames(sequence: Sequence, file: TrajectoryFile) -> IntArray:
+    """The frames (n,) of poses without stamps: by their numbers, else line by line."""
+    n = len(file.position)
+    if file.frame is not None:
+        if file.frame[0] < 0 or file.frame[-1] >= sequence.n_frames:
+            raise InputError(
+                f"its frames are numbered {file.frame[0]} to {file.frame[-1]}, but the recording has only "
+                f"{sequence.n_frames}; give the truth of this recording"
+            )
+        return file.frame
+    if n > sequence.n_frames:
+        raise InputError(
+            f"it has {n} lines, but line k is frame k and the recording has only {sequence.n_frames} "
+            "frames; give the truth of this recording, or cut off what lies beyond its end"
+        )
+    _require_same_speed(sequence, file)
+    return np.arange(n)
+
+
+def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
+    """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
+    n = len(file.position)
+    recorded = (
+        np.median(np.linalg.norm(sequence.linear_velocity[: n - 1], axis=1) * sequence.dt[: n - 1]) if n > 1 else 0
+    )
+    true = np.median(np.linalg.norm(np.diff(file.position, axis=0), axis=1)) if n > 1 else 0
+    if n < sequence.n_frames and true > FASTER * recorded > 0:
+        raise InputError(
+            f"it has {n} poses for {sequence.n_frames} frames, {true / recorded:.1f} times as far apart as the "
+            "recording moves from frame to frame: line k is not frame k; number the lines (13 columns), or give a TUM "
+            "file with stamps"
+        )
+
+
+def _unit(sequence: Sequence, file: TrajectoryFile) -> TimeUnit:
+    """The unit of the stamps, by the time that they share with the recording where they leave it open."""
+    assert file.stamps is not None
+    spans = {unit: (float(t[0]), float(t[-1])) for unit in file.units for t in (file.stamps.seconds(unit),)}
+    found = units_in_common({"s": (float(sequence.t[0]), float(sequence.t[-1]))}, spans)
+    if found is None:
+        unit, _ = settled(file, None, None)
+        return unit
+    return found[1]
 
 
 def match_stamps(t: FloatArray, recorded: FloatArray) -> tuple[IntArray, IntArray]:

@@ -4,10 +4,12 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from ..observations import IntArray
 from .beside import written_beside
 from .named_file import FilePath, reading, regular_file
-from .number_table import NumberTable, read_numbers
+from .number_table import numbers_of, read_lines, require_width
 from .stamped_poses import require_rising, writable
+from .stamps import TimeUnit, possible_units, stamps_of
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
@@ -16,26 +18,19 @@ EXACT = 1e-14
 """up to which they are left as they are"""
 
 
-def read_kitti(path: FilePath) -> FloatArray:
-    """Poses (n, 4, 4) `world_T_body` of a KITTI file, their rotations made exact (the nearest one).
+def kitti_poses(values: FloatArray, line: IntArray) -> FloatArray:
+    """Poses (n, 4, 4) of the 12 numbers (n, 12) on the lines (n,), their rotations made exact (the nearest one).
 
-    Raises InputError naming file and line for what is no number, and for a rotation that is off by more than
-    ROTATION_TOLERANCE.
+    Raises InputError naming the line of a rotation that is off by more than ROTATION_TOLERANCE.
     """
-    with reading(path), np.errstate(all="ignore"):
-        return kitti_poses(read_numbers(regular_file(path), {NUMBERS: "KITTI"}))
-
-
-def kitti_poses(table: NumberTable) -> FloatArray:
-    """Poses (n, 4, 4) of the lines of a KITTI file. Raises InputError naming the line."""
-    poses = np.tile(np.eye(4), (len(table.values), 1, 1))
-    poses[:, :3, :] = table.values.reshape(-1, 3, 4)
+    poses = np.tile(np.eye(4), (len(values), 1, 1))
+    poses[:, :3, :] = values.reshape(-1, 3, 4)
     defect = so3.rotation_defect(poses[:, :3, :3])
     wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
     if len(wrong):
         i = wrong[0]
         raise InputError(
-            f"line {table.line[i]}: the first three columns are no rotation (off by {defect[i]:.3g}, allowed "
+            f"line {line[i]}: the first three columns are no rotation (off by {defect[i]:.3g}, allowed "
             f"{ROTATION_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
         )
     rough = defect > EXACT
@@ -43,16 +38,23 @@ def kitti_poses(table: NumberTable) -> FloatArray:
     return poses
 
 
-def read_times(path: FilePath) -> FloatArray:
+def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
     """The stamps (n,), s, strictly rising, of a KITTI `times.txt`: line k is when frame k was taken.
 
-    Raises InputError naming file and line.
+    `unit` is that of stamps whose size does not show it. Raises InputError naming file and line.
     """
     with reading(path), np.errstate(all="ignore"):
-        table = read_numbers(regular_file(path), {1: "a time stamp in seconds"})
-        t = table.values[:, 0].copy()
-        require_rising(t, table.line)
-        return t
+        lines = read_lines(regular_file(path))
+        require_width(lines, {1: "a time stamp"})
+        table = numbers_of(lines)
+        stamps = stamps_of(lines.column(0), table.values[:, 0], None)
+        require_rising(stamps, table.line)
+        units, settled = possible_units(stamps)
+        if unit is not None and not settled:
+            return stamps.seconds(unit)
+        if "s" not in units and len(units) != 1:
+            raise InputError("its time stamps may be in several units; give --time-unit")
+        return stamps.seconds(units[0])
 
 
 def write_kitti(path: FilePath, world_T_body: FloatArray) -> None:

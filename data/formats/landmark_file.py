@@ -6,7 +6,7 @@ from fgbaseline.geometry import InputError
 
 from ..estimate import Landmarks
 from .named_file import FilePath, reading, regular_file
-from .number_table import Lines, numbers_of, read_lines
+from .number_table import numbers_of, read_lines, require_width, split
 
 COLUMNS = ("id", "x", "y", "z")
 
@@ -19,17 +19,17 @@ def read_landmarks(path: FilePath) -> Landmarks:
     """
     with reading(path), np.errstate(all="ignore"):
         lines = read_lines(regular_file(path))
-        titles = [title.strip() for title in lines.text[0].split(",")]
+        titles = split(lines.title or "", ",")
         missing = [title for title in COLUMNS if title not in titles]
         if missing:
             raise InputError(
-                f"line {lines.number[0]}: expected a header with id,x,y,z, but {', '.join(missing)} is missing from "
-                f"{','.join(titles)[:60]!r}"
+                f"line 1: expected a header with id,x,y,z, but {', '.join(missing)} is missing from "
+                f"{(lines.title or '')[:60]!r}"
             )
-        if len(lines.text) == 1:
+        if not lines.text:
             return Landmarks.none()
-        body = Lines(lines.number[1:], lines.text[1:])
-        table = numbers_of(body, {len(titles): f"{','.join(titles)}"}, ",")
+        require_width(lines, {len(titles): f"{','.join(titles)}"})
+        table = numbers_of(lines)
         columns = [titles.index(title) for title in COLUMNS]
         number, position = table.values[:, columns[0]], table.values[:, columns[1:]]
         wrong = np.flatnonzero((number < 0) | (number != np.floor(number)) | (number >= 2**53))

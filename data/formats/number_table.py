@@ -1,5 +1,9 @@
-"""Text files of numbers, a fixed count to a line, read fast and yet with the line named where something is wrong."""
+"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line."""
 
+import gzip
+import re
+import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,10 +13,17 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import IntArray
 
+GZIP = b"\x1f\x8b"
+MOST_BYTES = 2**30
+"""of a file once unpacked"""
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
+WINDOWS_NAN = re.compile(r"nan\([a-z]*\)", re.IGNORECASE)
+
 
 @dataclass(frozen=True, slots=True)
 class NumberTable:
-    """n lines of m finite numbers, and where in the file each of them stands."""
+    """n lines of m numbers, and where in the file each of them stands."""
 
     values: FloatArray
     """(n, m)"""
@@ -22,90 +33,187 @@ class NumberTable:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The lines of a text file that say something, without comments."""
+    """The lines of a text file that hold data, without comments, and what stands above them."""
 
     number: list[int]
     """where in the file each stands, from 1"""
     text: list[str]
+    separator: str | None
+    """a comma, a semicolon, or None for blanks and tabs"""
+    title: str | None
+    """the first line, where no word of it is a number"""
+    comments: tuple[str, ...]
+    """the comments above the first line of data, without their marks"""
+    title_line: int = 1
 
-    @property
-    def separator(self) -> str | None:
-        """What stands between the words of the first line: a comma, or None for blanks."""
-        return "," if "," in self.text[0] else None
+    def require_some(self) -> None:
+        """Raises InputError where there is no line of data."""
+        if not self.text and self.title is not None:
+            raise InputError(f"line {self.title_line}: {_short(self.title)} has no number, and no poses follow")
+        if not self.text:
+            raise InputError("the file has no poses in it; check that it is the right one")
 
     @property
     def width(self) -> int:
-        """How many words the first line has."""
-        return len(self.text[0].split(self.separator))
+        """Number of words on the first line of data."""
+        return len(self.words(0))
+
+    def words(self, i: int) -> list[str]:
+        """The words of line i of the data."""
+        return split(self.text[i], self.separator)
+
+    def column(self, k: int) -> list[str]:
+        """The k-th word of each line, without blanks or quotes; all lines must be as wide as the first."""
+        return [line.split(self.separator)[k].strip(' \t"') for line in self.text]
 
 
 def read_lines(file: Path) -> Lines:
-    """The lines of a text file; blank lines and everything behind a `#` are left out.
+    """The lines of a text file (UTF-8 or UTF-16, also packed by gzip), without blank lines and comments.
 
-    Raises InputError naming the line for what is no text, and where nothing is left; OSError as `open` does.
+    Raises InputError naming the line for what is no text or has decimal commas; OSError as `open` does.
     """
-    numbers, texts = [], []
+    numbers: list[int] = []
+    texts: list[str] = []
+    comments: list[str] = []
+    title, title_line = None, 1
     for number, line in enumerate(_text(file).split("\n"), start=1):
-        content = line.partition("#")[0].strip()
-        if content:
-            numbers.append(number)
-            texts.append(content)
-    if not texts:
-        raise InputError("the file has no poses in it; check that it is the right one")
-    return Lines(numbers, texts)
+        bare, _, comment = line.partition("#")
+        content = bare.strip()
+        if content.startswith("%"):
+            content, comment = "", content
+        if not texts and comment.strip():
+            comments.append(comment.strip("# \t,;"))
+        content = content.rstrip(" \t")
+        if not content:
+            continue
+        if not texts and title is None and _has_no_number(content):
+            title, title_line = content, number
+            continue
+        numbers.append(number)
+        texts.append(content)
+    separator = _separator(texts[0], numbers[0]) if texts else None
+    if separator is not None:
+        texts = [text.removesuffix(separator).rstrip() for text in texts]
+    return Lines(numbers, texts, separator, title, tuple(comments), title_line)
 
 
-def read_numbers(file: Path, counts: dict[int, str]) -> NumberTable:
-    """The numbers of a text file, separated by blanks. Raises as `read_lines` and `numbers_of`."""
-    return numbers_of(read_lines(file), counts)
+def split(text: str, separator: str | None) -> list[str]:
+    """The words of a line, without blanks or quotes around them."""
+    return [word.strip(' \t"') for word in text.split(separator)]
 
 
-def numbers_of(lines: Lines, counts: dict[int, str], separator: str | None = None) -> NumberTable:
-    """The numbers of lines, separated by blanks (or by `separator`).
+def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool = False) -> NumberTable:
+    """The numbers of all columns, or of some of them.
 
-    `counts` says how many numbers a line may have, and what such a file is called; the first line decides. Raises
-    InputError naming the line for a word that is no number, a wrong count, NaN or infinity.
+    Raises InputError naming the line where it is not as wide as the first, or a word is no finite number; with `nan`
+    that one is allowed.
     """
-    width = len(lines.text[0].split(separator))
-    if width not in counts:
-        expected = " or ".join(f"{n} ({name})" for n, name in counts.items())
-        kind = "numbers" if separator is None else "numbers between commas"
-        raise InputError(f"line {lines.number[0]}: expected {expected} {kind}, got {width}: {_short(lines.text[0])}")
+    lines.require_some()
+    width = lines.width
+    for number, text in zip(lines.number, lines.text, strict=True):
+        if (words := _count(text, lines.separator)) != width:
+            raise InputError(f"line {number}: expected {width} numbers, got {words}: {_short(text)}")
+    wanted = list(range(width)) if columns is None else list(columns)
+    texts = [WINDOWS_NAN.sub("nan", text) for text in lines.text] if nan else lines.text
     try:
-        values = np.loadtxt(lines.text, dtype=np.float64, comments=None, ndmin=2, delimiter=separator)
+        values = np.loadtxt(
+            texts, np.float64, comments=None, ndmin=2, delimiter=lines.separator, usecols=wanted, quotechar='"'
+        )
     except ValueError as error:
-        raise _culprit(lines, width, separator) from error
-    if values.shape[1] != width or not np.isfinite(values).all():
-        raise _culprit(lines, width, separator)
+        raise _culprit(lines, wanted, nan=nan) from error
+    if len(values) != len(texts) or np.isinf(values).any() or (np.isnan(values).any() and not nan):
+        raise _culprit(lines, wanted, nan=nan)
     return NumberTable(values, np.array(lines.number, dtype=np.int64))
+
+
+def require_width(lines: Lines, counts: dict[int, str]) -> None:
+    """Raises InputError where the first line has none of these counts of numbers; they come with what they mean."""
+    lines.require_some()
+    if lines.width not in counts:
+        expected = " or ".join(f"{n} ({name})" for n, name in counts.items())
+        raise InputError(
+            f"line {lines.number[0]}: expected {expected} numbers, got {lines.width}: {_short(lines.text[0])}"
+        )
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number as every language writes it; NaN and infinity are numbers too."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return "_" not in word and word.isascii()
 
 
 def _text(file: Path) -> str:
     content = file.read_bytes()
+    if content.startswith(GZIP):
+        content = _unpacked(file)
+    encoding = _encoding(content)
     try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(f"line {line}: it is not text (byte {content[error.start]:#04x}); give a text file") from error
 
 
-def _culprit(lines: Lines, width: int, separator: str | None) -> InputError:
-    """The error for the first line that is not `width` finite numbers."""
-    for number, text in zip(lines.number, lines.text, strict=True):
-        words = [word.strip() for word in text.split(separator)]
-        if len(words) != width:
-            return InputError(f"line {number}: expected {width} numbers, got {len(words)}: {_short(text)}")
-        for word in words:
-            if not _is_finite_number(word):
-                return InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
-    return InputError(f"the file is no table of {width} numbers a line; check that it is the right one")
-
-
-def _is_finite_number(word: str) -> bool:
+def _unpacked(file: Path) -> bytes:
     try:
-        return bool(np.isfinite(float(word))) and "_" not in word and word.isascii()
-    except ValueError:
-        return False
+        with gzip.open(file) as packed:
+            content = packed.read(MOST_BYTES + 1)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(f"it is packed by gzip and damaged ({error}); pack it again") from error
+    if len(content) > MOST_BYTES:
+        raise InputError(f"it unpacks to more than {MOST_BYTES >> 20} MiB, which is no trajectory; check the file")
+    return content
+
+
+def _encoding(content: bytes) -> str:
+    """UTF-16 by its mark, or by the zero bytes that it has in every second place; else UTF-8."""
+    if content.startswith(UTF_16):
+        return "utf-16"
+    head = content[:200]
+    for first, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(head) > 8 and head[first::2].count(0) > 0.9 * len(head[first::2]) and head[1 - first :: 2].count(0) == 0:
+            return name
+    return "utf-8-sig"
+
+
+def _separator(text: str, number: int) -> str | None:
+    """What stands between the numbers of a line. Raises InputError for decimal commas."""
+    if ";" in text:
+        words, found = text.split(";"), ";"
+    elif "\t" in text:
+        words, found = text.split("\t"), None
+    else:
+        words, found = text.split(), None
+    decimal = [word for word in words if DECIMAL_COMMA.fullmatch(word.strip())]
+    if len(words) > 1 and 2 * len(decimal) >= len(words):
+        raise InputError(
+            f"line {number}: {decimal[0].strip()!r} is written with a decimal comma; write decimals with points"
+        )
+    return "," if found is None and "," in text else found
+
+
+def _has_no_number(text: str) -> bool:
+    words = re.split(r"[,;\s]+", text)
+    return len(words) > 1 and not any(is_number(word) for word in words)
+
+
+def _count(text: str, separator: str | None) -> int:
+    return len(text.split()) if separator is None else text.count(separator) + 1
+
+
+def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
+    """The error for the first line whose `columns` are not all numbers."""
+    for i, number in enumerate(lines.number):
+        words = lines.words(i)
+        for k in columns:
+            word = words[k]
+            if is_number(word) and (np.isfinite(float(word)) or (nan and np.isnan(float(word)))):
+                continue
+            return InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
+    return InputError(f"the file is no table of {lines.width} numbers a line; check that it is the right one")
 
 
 def _short(text: str) -> str:

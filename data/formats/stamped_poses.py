@@ -5,6 +5,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import IntArray
+from .stamps import Stamps
 
 UNIT_TOLERANCE = 1e-3
 """how far from 1 the length of a quaternion may be: files with four decimals are within it; it is made exact here"""
@@ -12,21 +13,25 @@ ROTATION_TOLERANCE = 1e-6
 """how far from a rotation a matrix may be that is written"""
 
 
-def require_rising(t: FloatArray, line: IntArray) -> None:
-    """Raises InputError naming the first of the lines (n,) whose stamp of t (n,), s, is not after the one before."""
-    late = np.flatnonzero(~(np.diff(t) > 0))
+def require_rising(stamps: Stamps, line: IntArray) -> None:
+    """Raises InputError naming the first of the lines (n,) whose stamp is not after the one before."""
+    late = np.flatnonzero(~stamps.rising())
     if len(late):
         i = late[0] + 1
+        shown = [
+            repr(float(x)) if stamps.whole is None else str(stamps.whole[i - k])
+            for k, x in ((0, stamps.value[i]), (1, stamps.value[i - 1]))
+        ]
         raise InputError(
-            f"line {line[i]}: the time stamp {float(t[i])!r} is not after {float(t[i - 1])!r} "
+            f"line {line[i]}: the time stamp {shown[0]} is not after {shown[1]} "
             f"(line {line[i - 1]}); sort the lines and remove repeated ones"
         )
 
 
-def poses_of_quaternions(position: FloatArray, xyzw: FloatArray, line: IntArray, expected: str) -> FloatArray:
-    """Poses (n, 4, 4) of positions (n, 3), m, and quaternions (n, 4), x y z w, on the lines (n,).
+def rotations_of_quaternions(xyzw: FloatArray, line: IntArray, expected: str) -> FloatArray:
+    """Rotations (n, 3, 3) of quaternions (n, 4), x y z w, on the lines (n,).
 
-    Raises InputError naming the line where a quaternion is not of length 1 (within UNIT_TOLERANCE); `expected` says
+    Raises InputError naming the line where a quaternion is not of length 1 (within UNIT_TOLERANCE); `expected` states
     what a line should hold.
     """
     length = np.linalg.norm(xyzw, axis=1)
@@ -36,10 +41,7 @@ def poses_of_quaternions(position: FloatArray, xyzw: FloatArray, line: IntArray,
         raise InputError(
             f"line {line[i]}: the quaternion {xyzw[i].tolist()} has length {length[i]:.6g}; expected {expected}"
         )
-    poses = np.tile(np.eye(4), (len(position), 1, 1))
-    poses[:, :3, 3] = position
-    poses[:, :3, :3] = so3.rotation_from_quaternion(xyzw)
-    return poses
+    return so3.rotation_from_quaternion(xyzw)
 
 
 def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, FloatArray]:

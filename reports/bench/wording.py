@@ -77,7 +77,7 @@ def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset
     fewer = [f"{row['estimator']} ({_answers(row, first, most, metric)})" for row in rows if row["runs"] < most]
     left_out = f"; not ranked for missing answers: {listed(fewer)}" if fewer else ""
     if not others:
-        return f"{case}: {first['estimator']} has a {metric.title} of {figures[first['estimator']]}{left_out}."
+        return f"{case}: the {metric.title} of {first['estimator']} is {figures[first['estimator']]}{left_out}."
     if most == 1:
         each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
         return f"{case}: {metric.title} {each}; one run does not rank them{left_out}."

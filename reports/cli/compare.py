@@ -40,7 +40,7 @@ class Direction(click.ParamType[tuple[float, ...]]):
 @click.option(
     "--up",
     type=Direction(),
-    help="Up in the reference's world; 0,-1,0 in a camera's.  [default: by the run or --sequence, else 0,0,1]",
+    help="Up in the reference's world.  [default: 0,-1,0 in KITTI files; else by the run or --sequence, else 0,0,1]",
 )
 @click.option(
     "--association",
@@ -66,7 +66,28 @@ class Direction(click.ParamType[tuple[float, ...]]):
     type=click.Choice(["tum", "kitti", "euroc", "npz"]),
     help="Insist on a format of the files.  [default: told from their content]",
 )
-@click.option("--times", type=click.Path(path_type=Path), help="Time stamps of KITTI files, one a line.")
+@click.option(
+    "--times",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Time stamps of KITTI files, one a line; may be given again: each file takes those that are as many.",
+)
+@click.option(
+    "--time-unit",
+    type=click.Choice(["s", "ms", "us", "ns"]),
+    help="Of time stamps whose unit is in doubt.  [default: by header, size, rate and the other file]",
+)
+@click.option(
+    "--quaternion",
+    type=click.Choice(["xyzw", "wxyz"]),
+    help="Order of quaternions that no header names.  [default: as usual in the format, unless the other fits better]",
+)
+@click.option(
+    "--lever-arm",
+    type=Direction(),
+    help="The point that the reference follows, m, in the estimate's body, whose orientations carry it.",
+)
+@click.option("--align-body", is_flag=True, help="Remove a constant rotation between the bodies.")
 @click.option(
     "--sequence",
     type=click.Path(path_type=Path),
@@ -118,7 +139,11 @@ def command(
     deltas: tuple[str, ...],
     all_pairs: bool,
     form: Literal["tum", "kitti", "euroc", "npz"] | None,
-    times: Path | None,
+    times: tuple[Path, ...],
+    time_unit: Literal["s", "ms", "us", "ns"] | None,
+    quaternion: Literal["xyzw", "wxyz"] | None,
+    lever_arm: tuple[float, float, float] | None,
+    align_body: bool,
     sequence: Path | None,
     landmarks: tuple[str, ...],
     held_out: float,
@@ -150,6 +175,10 @@ def command(
         all_pairs=all_pairs,
         form=form,
         times=times,
+        time_unit=time_unit,
+        quaternion=quaternion,
+        lever_arm=lever_arm,
+        align_body=align_body,
         sequence=sequence,
         held_out=held_out,
         extrinsic=extrinsic,

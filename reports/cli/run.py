@@ -52,7 +52,7 @@ class FeatureCount(click.ParamType[int | str]):
     show_default=True,
     help="Whether the documented SLAM updates landmarks in turn with the pose or holds the mapping's.",
 )
-@click.option("--truth", type=click.Path(path_type=Path), help="Ground truth: a KITTI or TUM file.")
+@click.option("--truth", type=click.Path(path_type=Path), help="Ground truth: a trajectory file.")
 @click.option(
     "--truth-frame", type=click.Choice(["camera", "imu"]), help="The body whose poses the ground truth gives."
 )

@@ -13,7 +13,7 @@ from .computing import compare_entries
 from .entries import Given, read_entries
 from .settings import Delta, Settings
 
-FILES = ("times", "sequence", "extrinsic")
+FILES = ("sequence", "extrinsic")
 
 
 def compare(
@@ -35,6 +35,8 @@ def compare(
     Raises InputError, in one sentence, for whatever is wrong with a file or an option.
     """
     options |= {name: Path(options[name]) for name in FILES if options.get(name) is not None}
+    times = options.pop("times", None) or ()
+    options["times"] = tuple(map(Path, [times] if isinstance(times, str | Path) else times))
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
     given = [item if isinstance(item, Trajectory) else str(item) for item in (reference, *estimates)]
     with np.errstate(all="ignore"):

@@ -9,7 +9,7 @@ from fgbaseline.compare import Align, Association, CovarianceState, Matched
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, InputError
 
-from .entries import Entry
+from .entry import Entry
 
 SINCE_FIRST = "both since the first pose"
 ALIGNED = "the alignment takes out a part of the errors"

@@ -10,7 +10,7 @@ from fgbaseline.compare import DifferenceShares, Matched, Passing, RmseDifferenc
 from fgbaseline.geometry import FloatArray
 
 from .claimed import Claimed
-from .entries import Entry
+from .entry import Entry
 from .pixels import Pixels
 from .ranking import Ranking
 from .settings import Settings
@@ -74,6 +74,8 @@ class Comparison:
     """by name, in the order given"""
     up: FloatArray
     """(3,) in the reference's world"""
+    up_from: str
+    """from where that is known"""
     deltas: tuple[str, ...]
     settings: Settings
     ranking: Ranking

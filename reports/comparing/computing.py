@@ -12,9 +12,11 @@ from fgbaseline.compare import Align, Matched, Passing, TimeOffset
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..page.numbers import listed
 from .claimed import claimed_by
 from .comparison import Comparison, Result
-from .entries import Entries, Entry
+from .entries import Entries
+from .entry import Entry
 from .mapping import map_of
 from .pixels import Pixels, held_out_of, paths_of, pixels_of, up_of_problem
 from .ranking import ranking_of
@@ -33,7 +35,7 @@ FEWEST = 2
 
 def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     """All comparisons. Raises InputError where an estimate has too little in common with the reference."""
-    up = _up(entries, settings)
+    up, up_from = _up(entries, settings)
     kind = settings.align or (Align.NONE if entries.one_world else Align.SE3)
     everything = [entries.reference, *entries.estimates]
     if kind == Align.YAW:
@@ -52,6 +54,7 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
         reference_pixels=pixels.get(entries.reference.name),
         results=results,
         up=up,
+        up_from=up_from,
         deltas=tuple(delta.text for delta in deltas),
         settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
         ranking=ranking_of(
@@ -66,17 +69,22 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     )
 
 
-def _up(entries: Entries, settings: Settings) -> FloatArray:
-    """(3,) what points up in the reference's world: as asked for, as the run or the recording says, else +z."""
+def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
+    """(3,) what points up in the reference's world, and from where that is known.
+
+    As asked for, as the format of the reference defines it, as the run or the recording says, else +z.
+    """
     if settings.up is not None:
         up = np.asarray(settings.up, dtype=np.float64)
         if not (np.isfinite(up).all() and np.linalg.norm(up) > 0):
             raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
-        return up / np.linalg.norm(up)
+        return up / np.linalg.norm(up), "--up"
+    if entries.reference.up is not None:
+        return entries.reference.up, "KITTI's camera frame"
     if entries.up is not None:
-        return entries.up
+        return entries.up, "the run"
     found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
-    return np.array([0.0, 0.0, 1.0]) if found is None else found
+    return (np.array([0.0, 0.0, 1.0]), "by default") if found is None else (found, "the recording")
 
 
 def _require_one_up(entries: Entries, up: FloatArray) -> None:
@@ -113,6 +121,11 @@ def _compared(
     matched, offset = _matched(reference, entry, kind, up, settings)
     absolute = compare.absolute_errors(matched)
     departure = compare.growing_divergence(matched, up)
+    bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
+    if bare:
+        absolute[["rotation_deg", "rotation_chord", "pose"]] = np.nan
+        departure[["rotation_deg", "heading_deg"]] = np.nan
+        notes["rotation_deg"] = f"{listed(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
     bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
     relative = {d.text: _relative(matched, d, settings, notes) for d in deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
@@ -124,9 +137,9 @@ def _compared(
         absolute=absolute,
         departure=departure,
         relative=tables,
-        segments=_or_note("segments", notes, lambda: compare.segment_errors(matched)),
-        claimed=_or_note("nees", notes, lambda: claimed_by(reference, entry, matched)),
-        drift=_or_note("drift", notes, lambda: compare.drift(matched, seed=seed)),
+        segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
+        claimed=_or_note("nees", notes, lambda: claimed_by(reference, entry, _oriented(matched))),
+        drift=_or_note("drift", notes, lambda: compare.drift(_oriented(matched), seed=seed)),
         shares=compare.difference_shares(matched, up),
         share_intervals=compare.share_intervals(matched, up, seed=seed),
         bound=bound,
@@ -142,6 +155,14 @@ def _compared(
     )
 
 
+def _oriented(matched: Matched) -> Matched:
+    """The same. Raises InputError where reference or estimate has positions only."""
+    for path in (matched.reference, matched.estimate):
+        if not path.oriented:
+            raise InputError(f"{path.name} has no orientations, so no motion of a body can be compared")
+    return matched
+
+
 def _passing(matched: Matched, departure: pd.DataFrame, bound: float, notes: dict[str, str]) -> Passing | None:
     """Where the estimate leaves the reference; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
@@ -154,7 +175,7 @@ def _relative(matched: Matched, delta: Delta, settings: Settings, notes: dict[st
     return _or_note(
         f"relative.{delta.text}",
         notes,
-        lambda: compare.relative_errors(matched, delta.length, delta.unit, all_pairs=settings.all_pairs),
+        lambda: compare.relative_errors(_oriented(matched), delta.length, delta.unit, all_pairs=settings.all_pairs),
     )
 
 
@@ -189,4 +210,6 @@ def _matched(
             f"{here.source or here.name}: only {len(matched)} of its poses has a partner in {there.name}, "
             f"{FEWEST} are needed; give a larger --tolerance, or an --offset"
         )
+    if kind == Align.FIRST_POSE:
+        _oriented(matched)
     return matched.aligned(kind, first=settings.align_first, up=up), found

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.compare import Trust, of_other_body
 from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
-from fgbaseline.data.formats import read_kitti, read_landmarks, read_pose_covariances, read_times, read_trajectory
+from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
 
+from .bodies import moved_body, with_body_recognized, with_lever_arm
+from .entry import Entry
 from .posing import posed
+from .resolving import Resolved, Source, resolve
 from .run_folder import RunFolder, read_run_folder
 from .settings import Body, Settings
 
@@ -20,28 +22,10 @@ Given = str | Path | Trajectory
 """[NAME=]FILE, or a trajectory that is at hand"""
 
 
+CUT_OFF = 0.01
+"""of a recording's frames: so many may be missing at the end of a file of poses, one for each frame"""
 ONLINE = "-online"
 """what is added to the name of a smoother for its poses as known when their frames came"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Entry:
-    """A trajectory, and what came with it."""
-
-    trajectory: Trajectory
-    landmarks: Landmarks | None = None
-    """in the trajectory's own world"""
-    covariance: FloatArray | None = None
-    """(n, 6, 6) of the right perturbation of each pose"""
-    trust: Trust | None = None
-    """in a run's reference; a file says nothing of it"""
-    by_product: bool = False
-    """whether the reference's own run gave it along: near to it by nature"""
-
-    @property
-    def name(self) -> str:
-        """What tables and figures call it."""
-        return self.trajectory.name
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,19 +48,18 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     """Reads all of it. Raises InputError, naming the file, for whatever is wrong."""
     run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
     problem, held = posed(settings, run)
-    times = _times(settings, problem)
-    imu_T_cam = _extrinsic(settings, problem)
+    own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
+    sources = own if run is None else [run.trajectory(run.reference), *own]
+    settled, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
     if run is None:
-        first = _entry(reference, settings, times, settings.reference_body, imu_T_cam)
-        beside: list[Entry] = []
+        first, beside = settled, []
     else:
-        first = Entry(run.trajectory(run.reference), run.landmarks(run.reference), None, run.trust)
+        first = replace(settled, landmarks=run.landmarks(run.reference), trust=run.trust)
         beside = [
             Entry(run.trajectory(name), run.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
             for name in _beside(run, settings.beside)
         ]
-    own = [_entry(given, settings, times, settings.estimate_body, imu_T_cam) for given in estimates]
-    entries = _named_apart([first, *beside, *own])
+    entries = _named_apart([first, *beside, *others])
     entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)
     if len(entries) == 1:
         raise InputError("estimate: there is nothing to compare; name at least one trajectory besides the reference")
@@ -88,22 +71,43 @@ def _is_folder(given: Given) -> bool:
     return isinstance(given, str | Path) and Path(given).is_dir()
 
 
-def _entry(
-    given: Given, settings: Settings, times: FloatArray | None, body: Body, imu_T_cam: FloatArray | None
-) -> Entry:
+def _opened(given: Given, settings: Settings) -> Source:
     if isinstance(given, Trajectory):
-        path, covariance = given, None
-    else:
-        name, file = _split(str(given))
-        path = read_trajectory(file, settings.form, times, name)
-        covariance = read_pose_covariances(file)
-    if body == "imu":
-        return Entry(path, None, covariance)
+        return given
+    name, file = _split(str(given))
+    return read_trajectory_file(file, settings.form, name)
+
+
+def _in_one_body(
+    every: list[Resolved], settings: Settings, problem: Problem | None, run: RunFolder | None
+) -> list[Entry]:
+    """Entries whose poses are those of one body: the IMU, or the point that a reference of positions follows."""
+    times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
+    reference, *estimates = [
+        Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
+    ]
+    bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
+    if settings.lever_arm is not None and bodies[0] != bodies[1]:
+        raise InputError("lever-arm: it leads to the reference's point already; leave out the bodies")
+    if settings.lever_arm is not None:
+        estimates = [with_lever_arm(each, np.array(settings.lever_arm)) for each in estimates]
+    elif not reference.trajectory.oriented and bodies[0] != bodies[1]:
+        imu_T_cam = _required(imu_T_cam, reference)
+        arm = imu_T_cam[:3, 3] if bodies[0] == "camera" else se3.inverse(imu_T_cam)[:3, 3]
+        estimates = [with_lever_arm(each, arm) for each in estimates]
+    elif reference.trajectory.oriented:
+        if bodies[0] == "camera":
+            reference = moved_body(reference, se3.inverse(_required(imu_T_cam, reference)))
+        if bodies[1] == "camera":
+            estimates = [moved_body(each, se3.inverse(_required(imu_T_cam, each))) for each in estimates]
+    return [reference, *(with_body_recognized(reference.trajectory, each, settings) for each in estimates)]
+
+
+def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
+    path = entry.trajectory
     if imu_T_cam is None:
         raise InputError(f"{path.source or path.name}: its poses are the camera's; add --sequence or --extrinsic FILE")
-    if covariance is not None:
-        covariance = of_other_body(covariance, se3.inverse(imu_T_cam))
-    return Entry(path.with_poses(path.world_T_body @ se3.inverse(imu_T_cam)), None, covariance)
+    return imu_T_cam
 
 
 def _split(given: str) -> tuple[str | None, str]:
@@ -116,10 +120,14 @@ def _split(given: str) -> tuple[str | None, str]:
     return name, file
 
 
-def _times(settings: Settings, problem: Problem | None) -> FloatArray | None:
-    if settings.times is not None:
-        return read_times(settings.times)
-    return None if problem is None else problem.sequence.t
+def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
+    """Stamps for files without: those given, else those of the recording, of which the last few may be missing."""
+    if settings.times:
+        return [read_times(file, settings.time_unit) for file in settings.times]
+    if problem is None:
+        return []
+    t = problem.sequence.t
+    return [t[: len(t) - k] for k in range(int(CUT_OFF * len(t)) + 1)]
 
 
 def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:

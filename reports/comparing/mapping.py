@@ -10,7 +10,7 @@ from fgbaseline.compare import Alignment, Matched
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.geometry import FloatArray, InputError
 
-from .entries import Entry
+from .entry import Entry
 
 
 def map_of(

@@ -13,7 +13,7 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, se3
 
-from .entries import Entry
+from .entry import Entry
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -66,8 +66,16 @@ class Settings:
     """of relative errors; empty for 1 s (where there are stamps; else 1 frame) and 10 m"""
     all_pairs: bool = False
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None
-    times: Path | None = None
-    """stamps for KITTI files"""
+    times: tuple[Path, ...] = ()
+    """stamps for KITTI files: each takes those with one for each of its poses"""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """of stamps whose unit neither a header nor their size shows"""
+    quaternion: Literal["xyzw", "wxyz"] | None = None
+    """the order of quaternions that no header names"""
+    lever_arm: tuple[float, float, float] | None = None
+    """m, in the body of the estimates: the point whose positions the reference has"""
+    align_body: bool = False
+    """whether a constant rotation between the bodies is removed"""
     sequence: Path | None = None
     """a recording, or the folder of an exported problem"""
     held_out: float = 0.0
@@ -94,7 +102,11 @@ class Settings:
             "deltas": ",".join(f"{delta.length:g}{delta.unit}" for delta in self.deltas),
             "all_pairs": self.all_pairs,
             "format": self.form,
-            "times": _text(self.times),
+            "times": ",".join(map(str, self.times)) or None,
+            "time_unit": self.time_unit,
+            "quaternion": self.quaternion,
+            "lever_arm": None if self.lever_arm is None else ",".join(f"{x:g}" for x in self.lever_arm),
+            "align_body": self.align_body,
             "sequence": _text(self.sequence),
             "held_out": self.held_out,
             "extrinsic": _text(self.extrinsic),

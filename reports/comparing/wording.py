@@ -10,6 +10,7 @@ from fgbaseline.compare.travel import distance_travelled
 from ..page.numbers import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
+from .recognized import recognized, up_of
 from .samples import coverage, samples
 
 MEANING = {
@@ -25,7 +26,7 @@ def caption(comparison: Comparison) -> str:
         said.setdefault(result.matched.caption, []).append(result.name)
     parts = [text if len(said) == 1 else f"{listed(names)}: {text}" for text, names in said.items()]
     return (
-        f"Compared with {comparison.reference.name}: {'. '.join(parts)}. "
+        f"Compared with {comparison.reference.name}: {'. '.join(parts)}. {up_of(comparison)} "
         "In brackets 95 % confidence intervals of a block bootstrap."
     )
 
@@ -35,6 +36,7 @@ def verdict(comparison: Comparison) -> list[str]:
     parts: tuple[Callable[[Comparison], list[str]], ...] = (
         _too_little,
         _reference,
+        recognized,
         _nearest,
         _passing,
         _shares,

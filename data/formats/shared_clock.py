@@ -1,0 +1,30 @@
+"""In which units two sets of time stamps are, by the stretch of time that they share."""
+
+from collections.abc import Mapping
+from itertools import product
+
+from .stamps import TimeUnit
+
+Spans = Mapping[TimeUnit, tuple[float, float]]
+"""first and last stamp, s, by the unit that they would be in"""
+CLEARLY = 10.0
+"""times the next best: a unit is decided by so much more time in common"""
+
+
+def units_in_common(first: Spans, second: Spans) -> tuple[TimeUnit, TimeUnit] | None:
+    """The units by which two sets of stamps share the most time, as a part of the time that either covers.
+
+    None where no other units are clearly worse (CLEARLY).
+    """
+    choices = list(product(first, second))
+    if len(choices) == 1:
+        return choices[0]
+    shares = sorted(((_shared(first[a], second[b]), (a, b)) for a, b in choices), reverse=True)
+    (best, chosen), (next_best, _) = shares[0], shares[1]
+    return chosen if best > 0.0 and best >= CLEARLY * next_best else None
+
+
+def _shared(a: tuple[float, float], b: tuple[float, float]) -> float:
+    common = min(a[1], b[1]) - max(a[0], b[0])
+    union = max(a[1], b[1]) - min(a[0], b[0])
+    return common / union if common > 0.0 and union > 0.0 else 0.0

@@ -1,0 +1,170 @@
+"""The time stamps of a trajectory file: exact, in whatever unit, and whether they are whole."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..observations import BoolArray, IntArray
+
+TimeUnit = Literal["s", "ms", "us", "ns"]
+PER_SECOND: dict[TimeUnit, int] = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+NAMES: dict[TimeUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+EPOCH = (6e8, 4e9)
+"""s since 1970: 1989 to 2096"""
+FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
+"""s between two poses: of no recorder, of a recorder, of keyframes at most"""
+CERTAIN_BELOW = 5.0
+"""s between two poses: stamps that are nearer in seconds are taken to be seconds"""
+EPOCH_INTERVAL = 1e3
+"""s between two poses at most, where the size of stamps alone shows that they count from 1970"""
+REPEATED = 0.1
+"""of the stamps: with more repeats than that, between poses that differ, the stamps have lost digits"""
+EXACT_INTEGER = 2**53
+SYMBOL = 56
+"""bits of a GTSAM key below its letter"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stamps:
+    """n time stamps as the file has them."""
+
+    value: FloatArray
+    """(n,)"""
+    whole: tuple[int, ...] | None
+    """the same, exactly, where all of them are whole numbers"""
+    unit: TimeUnit | None
+    """where the header has it"""
+    longest: str
+    """the one with the most digits, as written"""
+
+    def at(self, index: IntArray) -> "Stamps":
+        """The stamps of these indices (m,)."""
+        whole = None if self.whole is None else tuple(self.whole[i] for i in index.tolist())
+        return Stamps(self.value[index], whole, self.unit, self.longest)
+
+    def seconds(self, unit: TimeUnit) -> FloatArray:
+        """(n,) s; whole numbers are divided exactly, as doubles cannot hold nanoseconds since 1970."""
+        per_second = PER_SECOND[unit]
+        if per_second == 1:
+            return self.value.copy()
+        if self.whole is not None:
+            return np.array([stamp / per_second for stamp in self.whole])
+        return self.value / per_second
+
+    @property
+    def interval(self) -> float | None:
+        """The median from one stamp to the next, in their unit; None with less than two."""
+        steps = np.diff(self.value)
+        steps = steps[steps > 0]
+        return float(np.median(steps)) if len(steps) else None
+
+    def rising(self) -> BoolArray:
+        """(n - 1,) whether each stamp is after the one before."""
+        if self.whole is None:
+            return np.asarray(np.diff(self.value) > 0)
+        return np.array([b > a for a, b in zip(self.whole[:-1], self.whole[1:], strict=True)], dtype=np.bool_)
+
+    def equal(self) -> BoolArray:
+        """(n - 1,) whether each stamp is that of the one before."""
+        if self.whole is None:
+            return np.asarray(np.diff(self.value) == 0)
+        return np.array([b == a for a, b in zip(self.whole[:-1], self.whole[1:], strict=True)], dtype=np.bool_)
+
+
+def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: Sequence[str] | None = None) -> Stamps:
+    """The stamps written as `words` (n,), which are the numbers `value` (n,); `rest`: whole nanoseconds behind."""
+    whole: tuple[int, ...] | None = None
+    if rest is not None:
+        try:
+            whole = tuple(int(a) * 10**9 + int(b) for a, b in zip(words, rest, strict=True))
+            value = np.array([float(stamp) for stamp in whole])
+        except (ValueError, OverflowError) as error:
+            raise InputError("the seconds and nanoseconds of its stamps are no whole numbers; write those") from error
+    elif (value == np.floor(value)).all():
+        whole = tuple(_exactly(word, number) for word, number in zip(words, value.tolist(), strict=True))
+    known = next((u for u in get_args(TimeUnit) if u == unit), None)
+    return Stamps(value, whole, known, max(words, key=_digits, default=""))
+
+
+def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
+    """The units that stamps may have, the likeliest first, and whether header or size settle it.
+
+    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. None where
+    no unit makes their rate a recorder's; both where header and size contradict each other.
+    """
+    interval = stamps.interval
+    since_1970 = _since_1970(stamps.value, interval)
+    if stamps.unit is not None:
+        if since_1970 not in (None, stamps.unit):
+            return (stamps.unit, since_1970), False
+        return (stamps.unit,), True
+    if since_1970 is not None:
+        return (since_1970,), True
+    if interval is None or (FASTEST <= interval < CERTAIN_BELOW):
+        return ("s",), False
+    units: list[TimeUnit] = ["s"] if interval <= SLOWEST and interval >= FASTEST else []
+    units += [u for u in ("ms", "us", "ns") if FASTEST <= interval / PER_SECOND[u] <= USUAL]
+    return tuple(units), False
+
+
+def _since_1970(value: FloatArray, interval: float | None) -> TimeUnit | None:
+    size = float(np.median(np.abs(value)))
+    for unit, per_second in PER_SECOND.items():
+        if EPOCH[0] <= size / per_second < EPOCH[1] and (interval or 0.0) / per_second <= EPOCH_INTERVAL:
+            return unit
+    return None
+
+
+def lost_digits(stamps: Stamps, moved: BoolArray) -> str | None:
+    """Why so many of the stamps are equal between poses that `moved` (n - 1,): they have lost digits. None otherwise.
+
+    GTSAM's keys in place of stamps are recognized too.
+    """
+    n = len(stamps.value)
+    letter = _letter(stamps)
+    if letter:
+        return (
+            f"its first column has GTSAM keys ({letter}0 is {ord(letter) << SYMBOL}), integers beyond 2^53, and no "
+            "time stamps; write the time of each pose"
+        )
+    repeats = int((stamps.equal() & moved).sum())
+    if repeats == 0 or repeats <= REPEATED * (n - 1):
+        return None
+    share = f"{n} poses share {n - repeats} time stamps"
+    digits = _digits(stamps.longest)
+    if digits <= 7:
+        return (
+            f"its time stamps have lost digits: {stamps.longest} has {digits} significant figures, and {share}; write "
+            "them in full (C++: std::fixed and std::setprecision(9))"
+        )
+    if (stamps.value == stamps.value.astype(np.float32)).all() and np.abs(stamps.value).max() >= 2**24:
+        return f"its time stamps have lost digits: they are float32, and {share}; write them as float64"
+    if stamps.whole is not None and max(map(abs, stamps.whole)) > EXACT_INTEGER:
+        return f"its time stamps have lost digits: integers beyond 2^53 became doubles, and {share}; write them whole"
+    return f"its time stamps have lost digits: {share}; write them in full"
+
+
+def _letter(stamps: Stamps) -> str:
+    """The letter of GTSAM's keys, if all the stamps are such."""
+    if stamps.whole is None or not stamps.whole or min(stamps.whole) < ord("A") << SYMBOL:
+        return ""
+    letters = {stamp >> SYMBOL for stamp in stamps.whole}
+    index = stamps.whole[-1] & ((1 << SYMBOL) - 1)
+    letter = chr(min(letters)) if len(letters) == 1 and max(letters) < 128 else ""
+    return letter if letter.isalpha() and index < 2**40 else ""
+
+
+def _digits(word: str) -> int:
+    """The significant figures of a number as written."""
+    mantissa = word.lower().partition("e")[0].lstrip("+-").replace(".", "")
+    return len(mantissa.lstrip("0"))
+
+
+def _exactly(word: str, number: float) -> int:
+    head, _, tail = word.partition(".")
+    plain = head.lstrip("+-").isdecimal() and len(head) < 400 and not tail.strip("0")
+    return int(head) if plain else int(number)
