@@ -114,18 +114,13 @@ def test_landmarks_that_come_back_bring_the_tree_back(
         return restored(self, groups)
 
     monkeypatch.setattr(MovingTree, "restored", counted)
-    drive = Simulation(
-        path="handheld",
-        duration=6.0,
-        features_per_frame=15.0,
-        returning_share=0.5,
-        return_after=1.0,
-        track_length=6.0,
-        wrong_share=0.0,
-        seed=2,
-    )
-    problem = matched(simulate(drive))
-    short = smoother.isam2(problem, settings=ISAM2Settings(tree_frames=12, kept_frames=4))
+    settings = Simulation(path="handheld", duration=6.0, features_per_frame=40.0, track_length=30.0, wrong_share=0.0)
+    problem = matched(simulate(settings))
+    o = problem.sequence.observations
+    dark = (o.frame >= 20) & (o.frame < 25)
+    assert len(np.intersect1d(o.landmark[o.frame < 20], o.landmark[o.frame >= 25])) > 3
+    problem = replace(problem, excluded=np.where(dark, np.uint8(1), problem.excluded))
+    short = smoother.isam2(problem, settings=ISAM2Settings(tree_frames=10, kept_frames=2))
     assert exchanged
     assert 0 < back[0] < 4
     assert_alike(short, smoother.isam2(problem, settings=LONG), online=1e-2)
