@@ -72,7 +72,7 @@ def steps(problem: Problem) -> Iterator[Step]:
         yield Step("kernel", "isam2-online without kernel", known_plain, known, final)
         yield Step("kernel", "joint-ekf without kernel", joint(plain), known, final)
         yield Step("kernel", "the same, from isam2 without kernel", joint(plain), known_plain, final_plain)
-    yield Step("gating", "joint-ekf-gated", ekf.joint_ekf_gated(problem), known, final)
+    yield Step("gating", "joint-ekf-ungated", ekf.joint_ekf_ungated(problem), known, final)
     yield Step("gating", "joint-ekf, every frame believed", joint(problem, disagreeing_share=None), known, final)
     for factor in FACTORS:
         pixels = replace(problem, pixel_variance=problem.pixel_variance * factor**2)

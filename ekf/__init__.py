@@ -4,7 +4,7 @@ from .dead_reckoning import dead_reckoning
 from .gyro_bias import GyroBiasPrior
 from .joint import joint_ekf
 from .joint_settings import JointSettings, Linearisation
-from .joint_variants import joint_ekf_bias, joint_ekf_first_estimate, joint_ekf_gated, joint_ekf_textbook
+from .joint_variants import joint_ekf_bias, joint_ekf_first_estimate, joint_ekf_textbook, joint_ekf_ungated
 from .landmark_chart import Coordinates
 from .mapping import landmark_mapping
 from .slam import ekf
@@ -19,7 +19,7 @@ __all__ = [
     "joint_ekf",
     "joint_ekf_bias",
     "joint_ekf_first_estimate",
-    "joint_ekf_gated",
     "joint_ekf_textbook",
+    "joint_ekf_ungated",
     "landmark_mapping",
 ]

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Landmarks, Progress, Status
+from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
 from fgbaseline.data.problem import Problem
 
 from .joint_filter import JointFilter
@@ -19,9 +19,10 @@ def joint_ekf(problem: Problem, progress: Progress | None = None, settings: Join
     """One state: the pose, the gyroscope's bias where the settings ask for it, and every landmark, with all
     cross-covariances.
 
-    A landmark enters with its first observation (or at the problem's prior) and leaves with its last one in the
-    recording: poses and active landmarks are exactly those of the filter that keeps them all; those that left keep
-    the value and covariance of that moment.
+    A landmark is initialized at its first observation (or at the problem's prior) and marginalized once
+    `JointSettings.unseen_frames` frames in a row have not seen it. For tracks without longer gaps the poses are exactly
+    those of the filter that keeps every landmark. A landmark that comes back later is a new one. Marginalized landmarks
+    keep the value and covariance of that moment.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
@@ -53,13 +54,14 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
             progress(k + 1, T)
     if settings.gyro_bias is not None:
         joint.events += _told(bias)
+    if not failure:
+        joint.finish()
     status, reason = _verdict(failure, joint, T)
-    known = np.isfinite(joint.position).all(axis=1)
     return Estimate(
         name="joint-ekf",
         world_T_imu=poses,
         covariance=covariances,
-        landmarks=Landmarks(problem.features[known], joint.position[known], joint.covariance[known]),
+        landmarks=joint.map.landmarks(problem.features),
         used=problem.spread(joint.used),
         status=status,
         reason=reason,

@@ -1,4 +1,4 @@
-"""The joint filter, frame by frame: predict, update pose and landmarks at once, let landmarks in and out."""
+"""The joint filter, frame by frame: predict, update pose and landmarks at once, initialize and marginalize them."""
 
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import back_projected, measured_rows, predict
 
 from .admission import admitted
+from .joint_map import JointMap
 from .joint_settings import JointSettings, Linearisation
 from .joint_state import ABSENT, POSE, JointState
 from .joint_update import Factor, Innovation, NotPositiveDefiniteError, StackedJacobian, correct
@@ -48,8 +49,6 @@ class JointFilter:
         self.row_variance = self.measurement.row_variance
         self.row = problem.feature_row(o.landmark)
         self.measured = measured_rows(o.pixel)
-        self.last_frame = np.full(m, -1, dtype=np.int64)
-        self.last_frame[self.row] = o.frame  # sorted by frame: the last one stays
         self.dt = problem.sequence.dt
         self.step = se3.exp(problem.increment)
         self.transition = se3.adjoint(se3.inverse(self.step))
@@ -57,40 +56,43 @@ class JointFilter:
         bias_covariance = None if prior is None else prior.covariance()
         self.state = JointState(problem.initial_pose, problem.initial_covariance, m, bias_covariance)
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
-        self.position = np.full((m, 3), np.nan)
-        self.covariance = np.full((m, 3, 3), np.nan)
+        self.map = JointMap(m)
         self.waited = 0
         """how many observations were not used because the state was full"""
-        self.turned_away: BoolArray = np.zeros(m, dtype=np.bool_)
-        """(m,) which landmarks some of these are of"""
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
     def add_frame(self, k: int, seen: slice) -> None:
         """Frame k with its observations (a slice of the problem's)."""
-        if k > 0:
-            self._predict(k)
         index = np.arange(seen.start, seen.stop)
         row = self.row[index]
-        known = self.state.slot_of[row] != ABSENT
-        if self.problem.landmark_prior is not None:
-            enters = self._admitted(k, index, ~known)
-            self._enter_at_prior(row[enters])
-            self._update(k, index[known | enters])
-        else:
-            new = ~known
-            wanted = new & self._update(k, index[known])
-            if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
-                wanted &= self.measured[index, 0] > self.measured[index, 1]
-            if (wanted != new).any():
-                self._reject(k, EventKind.ENTRY_PUT_OFF, ~wanted[new])
-            enters = self._admitted(k, index, wanted)
-            if enters.any():
-                self._enter_at_first_sight(index[enters])
-        self._leave(k, row[self.last_frame[row] == k])
+        self.map.last_seen[row] = k
+        self._marginalize_unseen(k - self.settings.unseen_frames)
+        if k > 0:
+            self._predict(k)
+        absent = self.state.slot_of[row] == ABSENT
+        at_prior = absent & ~self.map.initialized[row] & (self.problem.landmark_prior is not None)
+        if at_prior.any():
+            self._enter_at_prior(row[self._admitted(k, index, at_prior)])
+        new = absent & ~at_prior
+        wanted = new & self._update(k, index[self.state.slot_of[row] != ABSENT])
+        if self.settings.coordinates is Coordinates.WORLD:  # where nothing is at infinity
+            wanted &= self.measured[index, 0] > self.measured[index, 1]
+        if (wanted != new).any():
+            self._reject(k, EventKind.ENTRY_PUT_OFF, ~wanted[new])
+        enters = self._admitted(k, index, wanted)
+        if enters.any():
+            self._enter_at_first_sight(index[enters])
+
+    def finish(self) -> None:
+        """After the last frame: what the state still has goes to the map."""
+        self._marginalize(self.state.row.copy())
+        self.events += self.map.never_determined(self.problem.features)
 
     def _admitted(self, k: int, index: IntArray, wanted: BoolArray) -> BoolArray:
         """Those of the observations `index` (n,) with `wanted` (n,) whose landmarks the state has places for."""
+        if np.count_nonzero(wanted) > self.settings.max_landmarks - self.state.count:
+            self._marginalize_unseen(k)
         places = self.settings.max_landmarks - self.state.count
         if np.count_nonzero(wanted) <= places:
             return wanted
@@ -99,7 +101,7 @@ class JointFilter:
         enters[wanted] = admitted(self.measured[index[wanted]], self.measured[index[active]], places)
         waiting = wanted & ~enters
         self.waited += int(np.count_nonzero(waiting))
-        self.turned_away[self.row[index[waiting]]] = True
+        self.map.turned_away[self.row[index[waiting]]] = True
         self._reject(k, EventKind.STATE_FULL, waiting)
         return enters
 
@@ -195,6 +197,7 @@ class JointFilter:
         assert prior is not None
         covariance = np.broadcast_to(prior.covariance, (n, 3, 3))
         self.state.enter(row, np.eye(4), prior.mean[row], np.zeros((n, 3, POSE)), covariance)
+        self.map.initialized[row] = True
 
     def _enter_at_first_sight(self, index: IntArray) -> None:
         """Landmarks start where one observation each puts them, seen from the pose as it is known now.
@@ -213,30 +216,18 @@ class JointFilter:
         inverse = np.linalg.inv((seen.by_point().reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
         covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
         state.enter(self.row[index], shared, xi, -inverse @ seen.by_pose(), covariance)
+        self.map.initialized[self.row[index]] = True
         self.used[index] = True
 
-    def _leave(self, k: int, row: IntArray) -> None:
-        """Landmarks (n,) that no later frame sees leave with what is known of them now."""
-        active = self.state.slot_of[row] != ABSENT
-        leaving = row[active]
-        if len(leaving) < len(row):
-            out = row[~active]
-            turned_away = self.turned_away[out]
-            self._undetermined(k, out[turned_away], "the state was full while it was seen")
-            self._undetermined(k, out[~turned_away], "no frame that was believed saw it")
-        if len(leaving) == 0:
-            return
-        points = self.state.world_points(leaving)
-        finite = points.in_sight & np.isfinite(points.position).all(axis=1)
-        if not finite.all():
-            self._undetermined(k, leaving[~finite], "its sights put it at infinity or beyond")
-        self.position[leaving[finite]] = points.position[finite]
-        self.covariance[leaving[finite]] = points.covariance[finite]
-        self.state.leave(leaving)
+    def _marginalize_unseen(self, since: int) -> None:
+        """The landmarks that no frame has seen from frame `since` on."""
+        active = self.state.row
+        self._marginalize(active[self.map.last_seen[active] < since])
 
-    def _undetermined(self, k: int, row: IntArray, why: str) -> None:
-        kind = EventKind.LANDMARK_NEVER_DETERMINED
-        self.events.extend(Event(k, kind, why, j) for j in self.problem.features[row].tolist())
+    def _marginalize(self, row: IntArray) -> None:
+        if len(row) > 0:
+            self.map.keep(row, self.state.world_points(row))
+            self.state.leave(row)
 
     def _reject(self, k: int, why: EventKind, rejected: BoolArray) -> None:
         n = int(np.count_nonzero(rejected))

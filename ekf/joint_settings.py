@@ -29,17 +29,21 @@ class Linearisation(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class JointSettings:
-    """The defaults gate no single observation. Raises FgbaselineError, naming setting and value, for what cannot be."""
+    """Raises FgbaselineError, naming setting and value, for what cannot be."""
 
     coordinates: Coordinates = Coordinates.INVERSE_DEPTH
     """of landmarks without a prior; those with one are in world coordinates, in which the prior is Gaussian"""
     linearisation: Linearisation = Linearisation.INVARIANT
-    gate: float | None = None
-    """chi-square probability: an observation whose innovation is beyond it takes no part; None: all do"""
+    gate: float | None = 0.9999
+    """chi-square probability: an observation whose innovation is beyond it is rejected, one good one in ten thousand;
+    None: none is"""
     disagreeing_share: float | None = 0.5
     """a frame takes no part where more than this share of its observations is beyond 5.5 sigma; None: it always does"""
     gyro_bias: GyroBiasPrior | None = None
     """estimate a gyroscope bias along with the pose; None: the angular velocities have none"""
+    unseen_frames: int = 2
+    """frames in a row that a landmark stays in the state without an observation, before it is marginalized; the mask
+    interrupts tracks for that long"""
     max_landmarks: int = 512
     """in the state at once; where a frame shows more, they wait outside (`admission`), and that is told"""
 
@@ -50,11 +54,12 @@ class JointSettings:
             raise FgbaselineError(
                 f"disagreeing_share: expected a share above 0 and at most 1, or None, got {self.disagreeing_share!r}"
             )
-
+        if self.unseen_frames < 0:
+            raise FgbaselineError(f"unseen_frames: expected at least 0, got {self.unseen_frames!r}")
         if self.max_landmarks < 1:
             raise FgbaselineError(f"max_landmarks: expected at least 1, got {self.max_landmarks!r}")
 
     @staticmethod
     def textbook() -> "JointSettings":
-        """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate."""
-        return JointSettings(Coordinates.WORLD, Linearisation.TEXTBOOK)
+        """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate, no gate."""
+        return JointSettings(Coordinates.WORLD, Linearisation.TEXTBOOK, gate=None)

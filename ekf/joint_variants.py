@@ -9,9 +9,6 @@ from .gyro_bias import GyroBiasPrior
 from .joint import joint_ekf
 from .joint_settings import JointSettings, Linearisation
 
-GATE = 0.9999
-"""chi-square probability: one good observation in ten thousand is lost"""
-
 
 def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
     """The joint filter with the gyroscope's bias in its state, `Estimate.gyro_bias`."""
@@ -20,7 +17,7 @@ def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estima
 
 
 def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate."""
+    """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate, no gate."""
     return replace(joint_ekf(problem, progress, JointSettings.textbook()), name="joint-ekf-textbook")
 
 
@@ -30,6 +27,6 @@ def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
 
 
-def joint_ekf_gated(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The joint filter that leaves out every observation beyond a chi-square gate of 0.9999; each is counted."""
-    return replace(joint_ekf(problem, progress, JointSettings(gate=GATE)), name="joint-ekf-gated")
+def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """The joint filter without a gate: a wrong observation counts with the weight that the kernel leaves it."""
+    return replace(joint_ekf(problem, progress, JointSettings(gate=None)), name="joint-ekf-ungated")

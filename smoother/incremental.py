@@ -19,7 +19,7 @@ from .elimination import Chronology
 from .journal import IndeterminateSystemError
 from .keys import distance_key, landmark_of, pose_key, thresholds
 from .moving_tree import NO_POSE, MovingTree
-from .reach import earliest_needed
+from .reach import earliest_tracked
 from .undone import UNDONE, undone
 from .values import landmarks_of, poses_of
 from .waiting import EntryRule
@@ -54,7 +54,7 @@ class ISAM2Settings:
     """QR in place of Cholesky: three times slower, and at ease with pivots of very unequal size"""
     tree_frames: int = 600
     """frames that the tree may be over before those behind the last `kept_frames` leave it for a prior; those before
-    them, as far back as a landmark reaches that will be seen again, stay"""
+    them, as far back as a track reaches that is alive, stay"""
     kept_frames: int = 200
 
     def params(self, baseline: float) -> gtsam.ISAM2Params:
@@ -92,12 +92,11 @@ class IncrementalSmoother:
         self._slots: dict[int, dict[int, int]] = {}
         """landmark -> {observation, or PRIOR: slot of its factor in the graph}"""
         self._dropped: set[int] = set()
-        self._n_frames = 0
+        self.n_frames = 0
         """in the graph"""
         self._unsettled = 0
         """frames for which every update relinearises"""
         self._chronology = Chronology()
-        self._needed = earliest_needed(self.arrivals.observations, problem.n_frames)
         self._first = 0
         """frame in the tree"""
         self._shorten_at = settings.tree_frames
@@ -125,32 +124,50 @@ class IncrementalSmoother:
                 return
 
     def _frame(self, k: int, observed: range) -> None:
-        arrival = self.arrivals.next(k, observed, self.key, self._dropped)
+        arrival = self._reached(self.arrivals.next(k, observed, self.key, self._dropped))
         landmarks, events = add_recovering(self, arrival)
         if not self._may_lose_frames and any(event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS for event in events):
             raise FrameLostError(k)
-        self._n_frames = k + 1
+        self.n_frames = k + 1
         self._dropped |= landmarks
         self.events += events
         tree = self.solver.tree
         self.arrivals.path[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
         self.online_covariance[k] = pose_covariances(self.problem, [tree.marginalCovariance(pose_key(k))], k)[0]
         for j in self.arrivals.landmarks_seen(observed).tolist():
-            if j in self.key:
+            if j in self.key and j not in self._dropped:
                 self.arrivals.position[j] = tree.calculateEstimatePoint3(self.key[j])
         if k >= self._shorten_at:
             self._shorten(k)
 
     def _shorten(self, k: int) -> None:
-        """After frame k: what is far behind leaves the tree, unless something that will come hangs on it."""
+        """After frame k: what is far behind leaves the tree, unless a track that is alive hangs on it."""
         kept = self._settings.kept_frames
-        first = min(k + 1 - kept, int(self._needed[k]))
+        first = min(k + 1 - kept, earliest_tracked(self.arrivals.observations, k))
         self._shorten_at = k + kept
         if first < self._first + kept:
             return
         if self.solver.shortened(first, self._chronology.anew(first, k)):
             self._first = first
             self._shorten_at = first + self._settings.tree_frames
+
+    def _reached(self, arrival: Arrival) -> Arrival:
+        """The arrival, after the tree has gone back to frame 0 where it names what left the tree: that could not be
+        known when the tree was exchanged. Where GTSAM fails, the arrival without the landmarks that reach back."""
+        frame, back = self.arrivals.frame, {j for j in arrival.seen if self.solver.has_left(self.key[j])}
+        back |= {e.landmark for e in arrival.entries if frame[e.observation[0]] < self._first}
+        if not back:
+            return arrival
+        k, new = arrival.frame, back - self._dropped
+        if new and self.solver.restored(self._chronology.anew(0, k - 1)):
+            self._first = 0
+            self._shorten_at = max(self._shorten_at, 2 * k)  # so that all of these together cost no more than one
+            return arrival
+        self.events += [
+            Event(k, "landmark dropped", "it came back, and the tree cannot go back", j) for j in sorted(new)
+        ]
+        self._dropped |= new
+        return arrival.without(back)
 
     def add(self, arrival: Arrival, given_up: Collection[int]) -> None:
         """See `arrival.Graph`."""
@@ -210,7 +227,7 @@ class IncrementalSmoother:
         if not self.key:
             return []
         o = self.arrivals.observations.select(self.used())
-        return undone(self.problem, o, poses_of(values, range(self._n_frames)), landmarks_of(values, self.key))
+        return undone(self.problem, o, poses_of(values, range(self.n_frames)), landmarks_of(values, self.key))
 
     def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         """After the last frame: the factors in their slots, and the solution. The tree is gone, as large as it is."""

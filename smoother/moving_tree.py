@@ -4,7 +4,8 @@ An update of GTSAM walks over its whole tree: which variables are above a thresh
 and all that hangs on the cliques that it replaces. So it becomes dear late in a drive, though it changes no more than
 before. From time to time the tree is exchanged for one over the last frames, and what came before becomes a linear
 prior on what remains, at the same linearisation points: the answer is the same, but these frames are not relinearised
-any more. The graph keeps every factor, for the last Gauss-Newton steps over all of it.
+any more. The graph keeps every factor, for the last Gauss-Newton steps over all of it, and for a landmark that comes
+back after it left: the tree is then built anew over all frames.
 """
 
 from collections.abc import Collection, Mapping
@@ -109,6 +110,36 @@ class MovingTree:
         self._prior = list(range(n, ahead.size()))
         assert self._tail is not None
         self._tail = place[self._tail]
+        return True
+
+    def has_left(self, key: int) -> bool:
+        """Whether a variable is in the prior only."""
+        return bool(self._left.exists(key))
+
+    def restored(self, groups: Mapping[int, int]) -> bool:
+        """Exchanges the tree for one over all frames, without a prior; False, nothing being changed, if GTSAM fails.
+
+        `groups` are of elimination, as in `update`.
+        """
+        assert self._tail is not None
+        factors, place = gtsam.NonlinearFactorGraph(), list[int]()
+        for slot in range(self._graph.size()):
+            factor = self._graph.at(slot)
+            place.append(IN_PRIOR if factor is None else factors.size())
+            if factor is not None:
+                factors.push_back(factor)
+        tail = factors.size()
+        factors.push_back(self.tree.getFactorsUnsafe().at(self._tail))
+        point = gtsam.Values(self._left)
+        point.insert(self.tree.getLinearizationPoint())
+        named = set(factors.keyVector())
+        without = [key for key in point.keys() if key not in named]  # noqa: SIM118
+        isam = RestorableISAM2(self._params)
+        try:
+            isam.update(factors, _without(point, without), groups=groups, relinearise=True)
+        except IndeterminateSystemError:
+            return False
+        self._isam, self._left, self._place, self._prior, self._tail = isam, gtsam.Values(), place, [], tail
         return True
 
     def _split(

@@ -1,21 +1,18 @@
-"""How far back the frames still to come reach."""
+"""How far back the tracks reach that are alive."""
 
 import numpy as np
 
-from fgbaseline.data.observations import IntArray, Observations
+from fgbaseline.data.observations import Observations
+
+UNSEEN_FRAMES = 2
+"""for which a track without an observation may still go on: the mask interrupts tracks for that long"""
 
 
-def earliest_needed(o: Observations, n_frames: int) -> IntArray:
-    """(T,) for each frame the earliest of those up to it that saw a landmark which a later one sees again.
+def earliest_tracked(o: Observations, k: int) -> int:
+    """The first frame of all tracks that the frames up to k have seen, the last time at k - UNSEEN_FRAMES or later.
 
-    The frame after it, where there is none: from then on nothing hangs on it but the motion.
+    The frame after k, where there is none.
     """
-    n = int(o.landmark.max(initial=-1)) + 1
-    first, last = np.full(n, n_frames), np.zeros(n, dtype=np.int64)
-    np.minimum.at(first, o.landmark, o.frame)
-    np.maximum.at(last, o.landmark, o.frame)
-    again = last > first
-    reached = np.arange(1, n_frames + 1)
-    np.minimum.at(reached, last[again] - 1, first[again])
-    needed: IntArray = np.minimum.accumulate(reached[::-1])[::-1]
-    return needed
+    recent, now = np.searchsorted(o.frame, [k - UNSEEN_FRAMES, k + 1])
+    alive = np.isin(o.landmark[:now], o.landmark[recent:now])
+    return int(o.frame[:now][alive].min(initial=k + 1))

@@ -94,16 +94,19 @@ def _run(
     problem: Problem, settings: ISAM2Settings, seconds: FloatArray, progress: Progress | None
 ) -> IncrementalSmoother:
     """After the last frame; by QR from the start where Cholesky fails in a way that would cost a frame."""
+    quick = IncrementalSmoother(problem, settings)
     try:
-        smoother = IncrementalSmoother(problem, settings)
-        smoother.run(seconds, progress)
-        return smoother
-    except (FrameLostError, GivenUpError) as error:
+        quick.run(seconds, progress)
+        return quick
+    except (FrameLostError, GivenUpError):
         if settings.careful or problem.landmark_prior is not None:
             raise
-        where = error.frame if isinstance(error, FrameLostError) else problem.n_frames - 1
+    where = quick.n_frames
     smoother = IncrementalSmoother(problem, replace(settings, careful=True))
     smoother.run(seconds, progress)
+    # Online, the frames before the failure were known by Cholesky.
+    smoother.arrivals.path[:where] = quick.arrivals.path[:where]
+    smoother.online_covariance[:where] = quick.online_covariance[:where]
     smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
     return smoother
 

@@ -227,7 +227,7 @@ def garbled(share: float, frames: range, seed: int = 0) -> tuple[Problem, np.nda
 
 def test_a_gate_rejects_wrong_matches_and_counts_them() -> None:
     problem, wrong = garbled(0.1, range(20, 80))
-    gated = ekf.joint_ekf(problem, settings=JointSettings(gate=0.9999))
+    gated = ekf.joint_ekf(problem)
     rejected = ~gated.used[problem.mask]
     first = np.zeros(len(wrong), dtype=np.bool_)
     first[np.unique(problem.observations().landmark, return_index=True)[1]] = True
@@ -244,7 +244,7 @@ def test_a_gate_rejects_wrong_matches_and_counts_them() -> None:
     assert told["outside the gate"] > 0.75 * told.total()
     assert told.total() == rejected.sum()
     # What is rejected does not pull; the kernel alone lets 60 px pull as hard as 2.5 sigma, frame after frame.
-    weighted = ekf.joint_ekf(problem)
+    weighted = ekf.joint_ekf_ungated(problem)
     errors = [np.sqrt(np.mean(position_errors(e, problem.sequence) ** 2)) for e in (gated, weighted)]
     assert errors[0] < 0.1
     assert errors[0] < 0.1 * errors[1]
@@ -255,16 +255,16 @@ def test_a_frame_of_garbage_costs_that_frame_and_not_the_filter(kernel: HuberKer
     clean = replace(matched(drive("town", seconds=10.0, features_per_frame=40.0)), kernel=kernel)
     problem, _ = garbled(0.9, range(50, 51))
     problem = replace(problem, kernel=kernel)
-    estimate = ekf.joint_ekf(problem)
+    estimate = ekf.joint_ekf_ungated(problem)
     np.testing.assert_array_equal(~estimate.used[problem.mask], problem.observations().frame == 50)
     assert estimate.status is Status.RECOVERED
     assert "1 of 100 frames, first at frame 50" in estimate.reason
     (event,) = (event for event in estimate.events if event.kind == "frame disagrees")
     assert event.frame == 50
-    ours, undisturbed = (position_errors(e, clean.sequence) for e in (estimate, ekf.joint_ekf(clean)))
+    ours, undisturbed = (position_errors(e, clean.sequence) for e in (estimate, ekf.joint_ekf_ungated(clean)))
     assert np.abs(ours - undisturbed).max() < 0.1
     # Believed, it does harm.
-    believing = ekf.joint_ekf(problem, settings=JointSettings(disagreeing_share=None))
+    believing = ekf.joint_ekf(problem, settings=JointSettings(gate=None, disagreeing_share=None))
     assert np.abs(position_errors(believing, clean.sequence) - undisturbed).max() > 0.1
 
 
@@ -293,7 +293,7 @@ def at_infinity(disparity: float) -> Sequence:
 
 @pytest.mark.parametrize("disparity", [0.0, -3.0])
 def test_landmarks_at_infinity_take_part_and_are_told(disparity: float) -> None:
-    estimate = ekf.joint_ekf(plain_problem(at_infinity(disparity)))
+    estimate = ekf.joint_ekf_ungated(plain_problem(at_infinity(disparity)))
     assert estimate.status is Status.OK
     assert np.isfinite(estimate.world_T_imu).all()
     assert estimate.used.mean() > 0.9
@@ -335,7 +335,15 @@ def test_what_is_not_finite_fails_with_its_frame() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"gate": 0.0}, {"gate": 1.0}, {"gate": 99.0}, {"disagreeing_share": 0.0}, {"max_landmarks": 0}]
+    "wrong",
+    [
+        {"gate": 0.0},
+        {"gate": 1.0},
+        {"gate": 99.0},
+        {"disagreeing_share": 0.0},
+        {"max_landmarks": 0},
+        {"unseen_frames": -1},
+    ],
 )
 def test_settings_that_cannot_be_are_named(wrong: dict[str, float]) -> None:
     (name,) = wrong
@@ -411,10 +419,12 @@ def measured(kernel: HuberKernel | None) -> StereoMeasurement:
 def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
     wild: int, tame: int, believed: bool
 ) -> None:
-    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings())
+    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None))
     assert verdict.taken.tolist() == [believed] * (wild + tame)
     assert verdict.rejection is (None if believed else EventKind.FRAME_DISAGREES)
-    always = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(disagreeing_share=None))
+    always = screened(
+        np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None, disagreeing_share=None)
+    )
     assert always.plain
 
 
@@ -428,7 +438,7 @@ def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
     assert gated.taken.tolist() == [True, True, False]
     assert gated.rejection is EventKind.OUTSIDE_GATE
     assert screened(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
-    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings())
+    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings(gate=None))
     assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
     assert not weighted.plain
     assert screened(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).plain

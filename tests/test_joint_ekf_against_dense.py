@@ -1,14 +1,15 @@
-"""The joint filter is EKF-SLAM: equal to a literal dense one in which nothing ever leaves, to 1e-8."""
+"""The joint filter is EKF-SLAM: equal to a literal dense one that marginalizes nothing and rejects nothing, to 1e-8."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
 from fgbaseline import ekf
-from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Problem, Sequence
+from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Observations, Problem, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.ekf import Coordinates, GyroBiasPrior, JointSettings, Linearisation
 from fgbaseline.geometry import FloatArray
@@ -17,6 +18,8 @@ from .dense_joint_filter import DenseJointFilter, Moment
 from .synthetic import drive, matched
 
 TOLERANCE = 1e-8
+LONGER_THAN_ANY_GAP = 20
+"""frames without an observation; landmarks whose tracks have ended are marginalized after them"""
 
 
 @pytest.fixture(autouse=True)
@@ -72,6 +75,10 @@ def turning(problem: Problem) -> Problem:
     return replace(problem, increment=problem.increment + np.hstack([np.zeros_like(bias), bias]))
 
 
+def keeping(**settings: Any) -> JointSettings:
+    return JointSettings(gate=None, unseen_frames=LONGER_THAN_ANY_GAP, **settings)
+
+
 PROBLEMS = {
     "town, kernel": matched(drive("town", 2.5, 10.0)),
     "town, tight kernel": replace(matched(drive("town", 2.5, 10.0)), kernel=HuberKernel(1.0)),
@@ -102,7 +109,8 @@ def same_as_dense(problem: Problem, estimate: Estimate, moments: list[Moment]) -
     o = problem.observations()
     landmarks = estimate.landmarks
     for j, position, covariance in zip(landmarks.index, landmarks.position, estimate.landmarks.covariance, strict=True):
-        point, spread = moments[o.frame[o.landmark == j].max()].landmarks[int(j)]
+        marginalized = min(o.frame[o.landmark == j].max() + LONGER_THAN_ANY_GAP, len(moments) - 1)
+        point, spread = moments[marginalized].landmarks[int(j)]
         np.testing.assert_allclose(position, point, rtol=TOLERANCE, atol=TOLERANCE)
         same_covariance(covariance, spread)
 
@@ -111,7 +119,7 @@ def same_as_dense(problem: Problem, estimate: Estimate, moments: list[Moment]) -
 @pytest.mark.parametrize("name", ["town, kernel", "loop, uncertain start", "returning", "town, prior"])
 def test_with_a_gyroscope_bias_in_the_state_it_is_still_that_filter(name: str, linearisation: Linearisation) -> None:
     problem, prior = turning(PROBLEMS[name]), GyroBiasPrior(0.05, 0.003)
-    estimate = ekf.joint_ekf(problem, settings=JointSettings(linearisation=linearisation, gyro_bias=prior))
+    estimate = ekf.joint_ekf(problem, settings=keeping(linearisation=linearisation, gyro_bias=prior))
     moments = DenseJointFilter(problem, linearisation=linearisation, gyro_bias=prior).run()
     same_as_dense(problem, estimate, moments)
     assert estimate.gyro_bias is not None
@@ -128,8 +136,52 @@ def test_poses_and_landmarks_are_those_of_the_filter_that_keeps_everything(
     name: str, coordinates: Coordinates, linearisation: Linearisation
 ) -> None:
     problem = PROBLEMS[name]
-    estimate = ekf.joint_ekf(problem, settings=JointSettings(coordinates, linearisation))
+    estimate = ekf.joint_ekf(problem, settings=keeping(coordinates=coordinates, linearisation=linearisation))
     assert estimate.status == "ok"
     assert estimate.events == ()
     np.testing.assert_array_equal(estimate.used, problem.mask)
     same_as_dense(problem, estimate, DenseJointFilter(problem, coordinates, linearisation).run())
+
+
+def test_a_landmark_that_comes_back_after_it_was_marginalized_is_a_new_one() -> None:
+    problem = PROBLEMS["returning"]
+    o = problem.observations()
+    order = np.lexsort((o.frame, o.landmark))
+    begins = (np.diff(o.landmark[order], prepend=-1) != 0) | (np.diff(o.frame[order], prepend=-1) > 1)
+    stretch = np.empty(len(o), dtype=np.int64)
+    stretch[order] = np.cumsum(begins) - 1
+    n = int(stretch.max()) + 1
+    assert n > len(problem.features)
+    apart = replace(problem.sequence, observations=Observations(o.frame, stretch, o.pixel), n_landmarks=n, truth=None)
+    several = replace(
+        problem,
+        sequence=apart,
+        features=np.arange(n),
+        excluded=np.zeros(len(o), dtype=np.uint8),
+    )
+    settings = JointSettings(gate=None, unseen_frames=0)
+    ours, expected = ekf.joint_ekf(problem, settings=settings), ekf.joint_ekf(several, settings=settings)
+    np.testing.assert_allclose(ours.world_T_imu, expected.world_T_imu, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(ours.covariance, expected.covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_a_landmark_that_comes_back_does_not_use_its_prior_twice() -> None:
+    """One observation of a landmark, a frame without it, and one more: its estimate is the second observation's."""
+    problem = PROBLEMS["returning, prior"]
+    o = problem.observations()
+    j = int(o.landmark[o.frame == 0][0])
+    at = np.flatnonzero(o.landmark == j)
+    later = at[o.frame[at] >= 2][0]
+    assert problem.landmark_prior is not None
+    sharp = replace(problem.landmark_prior, covariance=1e-12 * np.eye(3))
+    excluded = np.where(np.isin(np.arange(len(o)), [at[0], later]), 0, 1).astype(np.uint8)
+    two = replace(
+        problem,
+        landmark_prior=LandmarkPrior(sharp.mean[problem.feature_row(np.array([j]))], sharp.covariance),
+        features=np.array([j]),
+        excluded=excluded,
+    )
+    ends = [replace(two, excluded=np.where(np.arange(len(o)) == at[0], 0, 1).astype(np.uint8)), two]
+    settings = JointSettings(gate=None, unseen_frames=0)
+    one, both = (ekf.joint_ekf(problem, settings=settings) for problem in ends)
+    np.testing.assert_array_equal(one.covariance, both.covariance)

@@ -141,7 +141,7 @@ def test_a_prior_that_cannot_be_is_named(wrong: dict[str, float]) -> None:
 
 VARIANTS = {
     "joint-ekf-bias": JointSettings(gyro_bias=GyroBiasPrior()),
-    "joint-ekf-gated": JointSettings(gate=0.9999),
+    "joint-ekf-ungated": JointSettings(gate=None),
     "joint-ekf-textbook": JointSettings.textbook(),
     "joint-ekf-first-estimate": JointSettings(linearisation=Linearisation.FIRST_ESTIMATE),
 }

@@ -34,11 +34,13 @@ def sigmas(estimate: Estimate, sequence: Sequence) -> float:
 
 
 def most_at_once(problem: Problem) -> int:
-    """The largest number of landmarks between their first and last sight at a frame."""
+    """The largest number of landmarks at a frame between their first observation and the last of the frames without
+    one for which the filter keeps them."""
     o = problem.observations()
     first = np.unique(o.landmark, return_index=True)[1]
     last = len(o) - 1 - np.unique(o.landmark[::-1], return_index=True)[1]
     begun, ended = (np.bincount(o.frame[at], minlength=problem.n_frames) for at in (first, last))
+    ended = np.append(np.zeros(JointSettings().unseen_frames, dtype=np.int64), ended)[: problem.n_frames]
     return int((np.cumsum(begun) - np.cumsum(ended) + ended).max())
 
 
@@ -79,7 +81,15 @@ def test_a_recording_below_the_cap_is_what_it_was_to_the_bit() -> None:
     np.testing.assert_array_equal(just_enough.used, at_default.used)
     assert just_enough.events == at_default.events
     assert not turned_away(just_enough)
-    assert turned_away(ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=most - 1)))
+    observed = int(np.bincount(problem.observations().frame).max())
+    assert turned_away(ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=observed - 1)))
+
+
+def test_landmarks_without_an_observation_give_their_places_to_those_with_one() -> None:
+    problem = matched(drive("town", seconds=6.0, features_per_frame=40.0, wrong=0.05))
+    observed = int(np.bincount(problem.observations().frame).max())
+    assert observed < most_at_once(problem)
+    assert not turned_away(ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=observed)))
 
 
 def test_who_waits_outside_comes_in_when_others_have_left() -> None:

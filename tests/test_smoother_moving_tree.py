@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from fgbaseline import smoother
 from fgbaseline.data import Estimate, LandmarkPrior, Observations, Problem, Status
+from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.smoother import ISAM2Settings
 from fgbaseline.smoother.incremental import IncrementalSmoother
 from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
 from fgbaseline.smoother.keys import landmark_of
 from fgbaseline.smoother.moving_tree import MovingTree
-from fgbaseline.smoother.reach import earliest_needed
+from fgbaseline.smoother.reach import UNSEEN_FRAMES, earliest_tracked
 from fgbaseline.smoother.starts import triangulated
 
 from .synthetic import drive, matched
@@ -73,7 +74,7 @@ def test_short_trees_find_what_one_tree_finds(
     problem: Problem, whole: Estimate, exchanged: list[tuple[int, int]]
 ) -> None:
     short = smoother.isam2(problem, settings=SHORT)
-    assert len(exchanged) >= 3
+    assert len(exchanged) >= 2
     assert max(poses for _, poses in exchanged) < problem.n_frames / 2
     assert_alike(short, whole, online=1e-2)
 
@@ -84,7 +85,7 @@ def test_a_tree_is_exchanged_for_an_equal_one(problem: Problem) -> None:
     last, tree = problem.n_frames - 1, increments.solver.tree
     poses = [gtsam.symbol("x", k) for k in range(last - 30, last + 1)]
     before = [tree.calculateEstimatePose3(key).matrix() for key in poses], tree.marginalCovariance(poses[-1])
-    first = min(last - 30, int(earliest_needed(problem.observations(), problem.n_frames)[last]))
+    first = min(last - 30, earliest_tracked(problem.observations(), last))
     assert increments.solver.shortened(first, increments._chronology.anew(first, last))
     assert increments.solver.tree is not tree
     tree = increments.solver.tree
@@ -103,17 +104,39 @@ def test_under_landmark_priors_too(problem: Problem, exchanged: list[tuple[int, 
     assert_alike(short, one, online=1e-2)
 
 
-def test_nothing_leaves_that_a_returning_landmark_hangs_on(exchanged: list[tuple[int, int]]) -> None:
+def test_landmarks_that_come_back_bring_the_tree_back(
+    exchanged: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    back, restored = [0], MovingTree.restored
+
+    def counted(self: MovingTree, groups: dict[int, int]) -> bool:
+        back[0] += 1
+        return restored(self, groups)
+
+    monkeypatch.setattr(MovingTree, "restored", counted)
+    settings = Simulation(path="handheld", duration=6.0, features_per_frame=40.0, track_length=30.0, wrong_share=0.0)
+    problem = matched(simulate(settings))
+    o = problem.sequence.observations
+    dark = (o.frame >= 20) & (o.frame < 25)
+    assert len(np.intersect1d(o.landmark[o.frame < 20], o.landmark[o.frame >= 25])) > 3
+    problem = replace(problem, excluded=np.where(dark, np.uint8(1), problem.excluded))
+    short = smoother.isam2(problem, settings=ISAM2Settings(tree_frames=10, kept_frames=2))
+    assert exchanged
+    assert 0 < back[0] < 4
+    assert_alike(short, smoother.isam2(problem, settings=LONG), online=1e-2)
+
+
+def test_without_a_way_back_a_landmark_that_comes_back_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = matched(drive(seconds=15.0, features_per_frame=15.0))
     o = problem.sequence.observations
-    first, last = o.frame.min(), o.frame.max()
-    old = o.landmark[o.frame == first][0]
-    again = replace(problem.sequence, observations=with_sight(o, int(last), int(old)))
+    old = int(o.landmark[o.frame == 0][0])
+    again = replace(problem.sequence, observations=with_sight(o, int(o.frame.max()), old))
     returning = replace(problem, sequence=again, excluded=np.append(problem.excluded, np.uint8(0)))
-    needed = earliest_needed(returning.observations(), problem.n_frames)
-    assert needed[last - 1] == first
-    smoother.isam2(returning, settings=SHORT)
-    assert exchanged == []
+    monkeypatch.setattr(MovingTree, "restored", lambda *_: False)
+    estimate = smoother.isam2(returning, settings=SHORT)
+    (event,) = (event for event in estimate.events if event.kind == "landmark dropped")
+    assert (event.frame, event.landmark) == (o.frame.max(), old)
+    assert estimate.status is Status.RECOVERED
 
 
 def with_sight(o: Observations, frame: int, landmark: int) -> Observations:
@@ -129,12 +152,12 @@ sights = st.lists(st.tuples(st.integers(0, 11), st.integers(0, 5)), unique=True,
 
 
 @given(sights)
-def test_what_is_needed_is_what_a_later_frame_sees_again(seen: list[tuple[int, int]]) -> None:
+def test_the_earliest_frame_is_that_of_the_tracks_that_are_alive(seen: list[tuple[int, int]]) -> None:
     frame, landmark = np.array(sorted(seen), dtype=np.int64).reshape(-1, 2).T
-    needed = earliest_needed(Observations(frame, landmark, np.zeros((len(frame), 4))), 12)
+    o = Observations(frame, landmark, np.zeros((len(frame), 4)))
     for k in range(12):
-        back = [a for a, j in seen if a <= k and any(b > k and i == j for b, i in seen)]
-        assert needed[k] == min(back, default=k + 1)
+        alive = {j for a, j in seen if k - UNSEEN_FRAMES <= a <= k}
+        assert earliest_tracked(o, k) == min((a for a, j in seen if a <= k and j in alive), default=k + 1)
 
 
 def test_a_failed_exchange_changes_nothing(
