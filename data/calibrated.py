@@ -35,8 +35,8 @@ class Calibration:
     """Settings in place of a diagnosis: the recording is taken as it is."""
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
-    shift: float = Shift.MIDDLE
-    """intervals: see `motion.held_twist`"""
+    shift: float = Shift.AFTER
+    """intervals: see `motion.held_twist`; as recorded, the velocity of frame k moves frame k to k + 1"""
     mask: MaskSettings = field(default_factory=MaskSettings)
     kernel: HuberKernel | None = field(default_factory=HuberKernel)
 
@@ -128,10 +128,17 @@ def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration
     remarks = (
         f"not diagnosed: {noise.pixel:g} px, {noise.linear_velocity:g} m/s and {noise.angular_velocity:g} rad/s are "
         "assumed, not estimated from the recording",
-        f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
-        + ("" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"),
+        _shift_remark(shift),
     )
     return _posed(sequence, excluded, features, noise, shift, settings.kernel, remarks)
+
+
+def _shift_remark(shift: float) -> str:
+    if shift == Shift.AFTER:
+        return "velocities taken as recorded: the velocity of frame k moves frame k to k + 1"
+    remark = f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
+    correlated = "" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"
+    return remark + correlated
 
 
 def _posed(
