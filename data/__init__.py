@@ -1,7 +1,7 @@
 """Recordings, the problem they pose, the answers to it, and the estimators that give them."""
 
 from .calibrated import Calibration, NoiseSettings, calibrated
-from .diagnose import Diagnosis, diagnose
+from .diagnose import Diagnosis, Finding, diagnose
 from .documented import documented
 from .estimate import Estimate, Event, Innovations, Landmarks, Progress, Status
 from .exchange import read_problem, write_problem
@@ -25,6 +25,7 @@ from .registry import estimator_names, find_estimator
 from .repairs import Repairs, read_repairs
 from .repairs_text import repairs_text
 from .sequence import Sequence, Truth
+from .time_unit import TimeUnit
 from .trajectory import Trajectory
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Estimate",
     "Event",
     "Excluded",
+    "Finding",
     "HeldOut",
     "HuberKernel",
     "Innovations",
@@ -46,6 +48,7 @@ __all__ = [
     "Repairs",
     "Sequence",
     "Status",
+    "TimeUnit",
     "Trajectory",
     "Truth",
     "attach_truth",

@@ -9,6 +9,7 @@ from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..observations import IntArray
 from ..sequence import Sequence, Truth
+from ..time_unit import TimeUnit
 from . import kitti, tum
 from .named_file import FilePath, reading, regular_file, shown
 from .number_table import read_numbers
@@ -48,23 +49,41 @@ def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, li
     poses = np.full((sequence.n_frames, 4, 4), np.nan)
     if table.values.shape[1] == kitti.NUMBERS:
         lines = kitti.kitti_poses(table)
-        if len(lines) > sequence.n_frames:
+        n_frames = sequence.n_frames + len(sequence.left_out)
+        if len(lines) > n_frames:
             raise InputError(
-                f"it has {len(lines)} lines, but line k is frame k and the recording has only {sequence.n_frames} "
+                f"it has {len(lines)} lines, but line k is frame k and the recording has only {n_frames} "
                 "frames; give the truth of this recording, or cut off what lies beyond its end"
             )
+        lines = np.delete(lines, [k for k in sequence.left_out if k < len(lines)], axis=0)
         poses[: len(lines)] = lines
         return poses, []
     t, recorded = tum.tum_poses(table)
     frames, nearest = match_stamps(sequence.t, t)
+    other = _other_unit(sequence.t, t, len(frames))
     if not len(frames):
         raise InputError(
             f"none of its time stamps ({float(t[0])!r} to {float(t[-1])!r} s) is near one of the recording's "
-            f"({float(sequence.t[0])!r} to {float(sequence.t[-1])!r} s); give the truth of this recording, on its clock"
+            f"({float(sequence.t[0])!r} to {float(sequence.t[-1])!r} s); "
+            + (other or "give the truth of this recording, on its clock")
         )
     poses[frames] = recorded[nearest]
     apart = float(np.abs(sequence.t[frames] - t[nearest]).max())
-    return poses, [f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart."] if apart else []
+    remarks = [f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart."] if apart else []
+    return poses, [
+        *remarks,
+        *([f"The ground truth has poses for {len(frames)} of {len(poses)} frames: {other}."] if other else []),
+    ]
+
+
+def _other_unit(t: FloatArray, recorded: FloatArray, matched: int) -> str:
+    """Advice where stamps `recorded` fit the frames t (T,) in another unit than seconds, and far better."""
+    for unit in (TimeUnit.MS, TimeUnit.US, TimeUnit.NS):
+        fitting = len(match_stamps(t, recorded * unit.seconds)[0])
+        if fitting > max(10 * matched, 0.5 * min(len(t), len(recorded))):
+            fit = f"in which they fit {fitting} of the {len(t)} frames"
+            return f"its stamps are in {unit.noun}, {fit}; write them in seconds"
+    return ""
 
 
 def match_stamps(t: FloatArray, recorded: FloatArray) -> tuple[IntArray, IntArray]:
