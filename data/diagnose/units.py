@@ -123,8 +123,8 @@ def _unfollowed(sequence: Sequence, units: Units, seen: Gain, given: Mapping[str
         return ""
     return (
         f"the recorded angular velocities scatter by {scatter:.2g} rad/s, {excess:.3g} times more than the cameras "
-        "see, and do not follow it: they are in another unit (57.3 times for °/s), or not of this recording; settle it with "
-        " angular_velocity in a table [units] in --repairs"
+        "see, and do not follow it: they are in another unit (57.3 times for °/s) or not of this recording; settle "
+        "it with angular_velocity in a table [units] in --repairs"
     )
 
 

@@ -70,10 +70,9 @@ def _poses_of_frames(sequence: Sequence, path: FilePath) -> tuple[FloatArray, li
     poses[frames] = recorded[nearest]
     apart = float(np.abs(sequence.t[frames] - t[nearest]).max())
     remarks = [f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart."] if apart else []
-    return poses, [
-        *remarks,
-        *([f"The ground truth has poses for {len(frames)} of {len(poses)} frames: {other}."] if other else []),
-    ]
+    if other:
+        remarks.append(f"The ground truth has poses for {len(frames)} of {len(poses)} frames: {other}.")
+    return poses, remarks
 
 
 def _other_unit(t: FloatArray, recorded: FloatArray, matched: int) -> str:

@@ -106,7 +106,7 @@ def lost_digits(t: FloatArray) -> str:
     largest = float(np.abs(t).max())
     if (t == t.astype(np.float32)).all():
         step = float(np.spacing(np.float32(largest)))
-        if step > np.median(np.abs(np.diff(t))):
+        if step > COARSE * abs(float(t[-1] - t[0])) / (len(t) - 1):
             return (
                 f"they went through a float32, which has steps of {step:g} at {largest:g}: their digits are lost; "
                 "write them as float64 from the source"
