@@ -3,7 +3,7 @@
 from fgbaseline.geometry import HuberKernel
 
 from .calibrated import Calibration, NoiseSettings, calibrated
-from .diagnose import Diagnosis, diagnose
+from .diagnose import Diagnosis, Finding, diagnose
 from .documented import documented
 from .estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from .exchange import read_problem, write_problem
@@ -27,6 +27,7 @@ from .registry import estimator_names, find_estimator
 from .repairs import Repairs, read_repairs
 from .repairs_text import repairs_text
 from .sequence import Sequence, Truth
+from .time_unit import TimeUnit
 from .trajectory import Trajectory
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Event",
     "EventKind",
     "Excluded",
+    "Finding",
     "HeldOut",
     "HuberKernel",
     "Innovations",
@@ -49,6 +51,7 @@ __all__ = [
     "Repairs",
     "Sequence",
     "Status",
+    "TimeUnit",
     "Trajectory",
     "Truth",
     "attach_truth",

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.geometry import InputError
 
 from .axes import axes_matrix
-from .diagnose import Diagnosis
+from .diagnose import Diagnosis, diagnose
 from .diagnose.axes import Axes
 from .diagnose.diagnosis import explained
 from .diagnose.fit import Fit
@@ -29,7 +29,8 @@ def overridden(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     Axes and shift are given before bias, misalignment and noise are found, which depend on them. Where nothing could be
     found, the rest is `ASSUMED` noise and no fault. Raises InputError for a shift beyond the recording.
     """
-    given = frozenset(name for name, value in repairs if name not in ("sigma", "mask") and value is not None)
+    apart = ("sigma", "mask", "units", "extrinsic_inverted")
+    given = frozenset(name for name, value in repairs if name not in apart and value is not None)
     if not given and repairs.sigma == type(repairs.sigma)():
         return diagnosis
     shift = _shift(diagnosis, repairs)
@@ -39,10 +40,20 @@ def overridden(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     changed |= shift is not None and abs(shift - diagnosis.shift) > SAME
     if changed and diagnosis.fit is not None and diagnosis.odometry is not None:
         found = explained(diagnosis.sequence, diagnosis.odometry, angular, linear, diagnosis.repeated, shift)
+        found = replace(found, units=diagnosis.units, recorded=diagnosis.recorded, inversion=diagnosis.inversion)
     else:
         shift = diagnosis.shift if shift is None else shift
         found = replace(diagnosis, angular=angular, linear=linear, shift=shift)
     return replace(found, fit=_fit(found, repairs), by_hand=given)
+
+
+def as_given(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
+    """The diagnosis of the recording in the units, and with the extrinsic, that are given."""
+    units, inverted = repairs.units.given(), repairs.extrinsic_inverted
+    same = not diagnosis.units.doubt and all(getattr(diagnosis.units, name) == units[name] for name in units)
+    if same and inverted in (None, diagnosis.inverted):
+        return diagnosis
+    return diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
 
 
 def _shift(diagnosis: Diagnosis, repairs: Repairs) -> float | None:
@@ -103,7 +114,7 @@ def told(repairs: Repairs) -> tuple[str, ...]:
     """What was set by hand, one sentence each."""
     values = repairs.model_dump(exclude_none=True)
     flat = {name: value for name, value in values.items() if not isinstance(value, dict)}
-    flat |= {f"{table}.{name}": value for table in ("sigma", "mask") for name, value in values[table].items()}
+    flat |= {f"{table}.{name}": value for table in ("units", "sigma", "mask") for name, value in values[table].items()}
     return tuple(f"set by hand: {name} = {_text(value)}" for name, value in flat.items())
 
 

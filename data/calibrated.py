@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import HuberKernel, InputError
 
-from .by_hand import ASSUMED, mask_settings, overridden, told
-from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair, track_state
+from .by_hand import ASSUMED, as_given, mask_settings, overridden, told
+from .diagnose import Diagnosis, blind_intervals, bridged, diagnose, findings_of, repair, rescalings, track_state
 from .documented import most_observed
 from .gaps import admit_gaps
 from .motion import Shift, dead_reckoned_path, increments
@@ -36,8 +36,8 @@ class Calibration:
     """Settings in place of a diagnosis: the recording is taken as it is."""
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
-    shift: float = Shift.MIDDLE
-    """intervals: see `motion.held_twist`"""
+    shift: float = Shift.AFTER
+    """intervals: see `motion.held_twist`; as recorded, the velocity of frame k moves frame k to k + 1"""
     mask: MaskSettings = field(default_factory=MaskSettings)
     kernel: HuberKernel | None = field(default_factory=HuberKernel)
 
@@ -59,18 +59,26 @@ def calibrated(
     velocity times dt. A fractional shift makes the errors of neighbouring increments correlated; that is not modelled.
     `features` keeps only that many landmarks, those seen most often after masking. `processes` share the diagnosis,
     which is the same however many. Raises InputError for repairs that cannot be, or that `settings` would leave without
-    effect.
+    effect, and where the units of the recording are in doubt.
     """
     if settings is not None and repairs is not None:
         raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
     if settings is None:
-        diagnosis = diagnosis or diagnose(sequence, processes)
+        diagnosis = as_given(diagnosis or diagnose(sequence, processes), repairs or Repairs())
+        if diagnosis.units.doubt:
+            raise InputError(f"{sequence.source or sequence.name}: {diagnosis.units.doubt}")
+        sequence = diagnosis.sequence
         if diagnosis.sigmas is not None or repairs is not None:
             return _diagnosed(diagnosis, features, repairs or Repairs())
     problem = admit_gaps(_as_recorded(sequence, features, settings or Calibration()))
     if diagnosis is None or not diagnosis.cannot_tell:
         return problem
-    return replace(problem, remarks=(f"not diagnosed: {diagnosis.cannot_tell}", *problem.remarks))
+    return replace(
+        problem,
+        remarks=(f"not diagnosed: {diagnosis.cannot_tell}", *problem.remarks),
+        findings=findings_of(diagnosis),
+        repairs=rescalings(diagnosis),
+    )
 
 
 def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Problem:
@@ -89,7 +97,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
         admit_gaps(_bridged(problem, diagnosis, noise)),
         diagnosed=not found.cannot_tell,
         findings=findings_of(found, track_state(found, repaired if repairs == Repairs() else None)),
-        repairs=(*told(repairs), *repaired.repairs),
+        repairs=(*told(repairs), *rescalings(found), *repaired.repairs),
     )
 
 
@@ -129,10 +137,17 @@ def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration
     remarks = (
         f"not diagnosed: {noise.pixel:g} px, {noise.linear_velocity:g} m/s and {noise.angular_velocity:g} rad/s are "
         "assumed, not estimated from the recording",
-        f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
-        + ("" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"),
+        _shift_remark(shift),
     )
     return _posed(sequence, excluded, features, noise, shift, settings.kernel, remarks)
+
+
+def _shift_remark(shift: float) -> str:
+    if shift == Shift.AFTER:
+        return "velocities taken as recorded: the velocity of frame k moves frame k to k + 1"
+    remark = f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
+    correlated = "" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"
+    return remark + correlated
 
 
 def _posed(
@@ -152,6 +167,7 @@ def _posed(
     variance = (sequence.dt[:, None] * sigma) ** 2
     return Problem(
         preset="calibrated",
+        findings=sequence.findings,
         sequence=sequence,
         increment=increments(sequence, shift),
         increment_covariance=variance[:, :, None] * np.eye(6),

@@ -46,6 +46,7 @@ def documented(
     mean = average_back_projections(sequence, dead_reckoned_path(step), chosen, excluded == Excluded.NO)
     return Problem(
         preset="documented",
+        findings=sequence.findings,
         sequence=sequence,
         increment=step,
         increment_covariance=np.broadcast_to(MOTION_NOISE, (len(step), 6, 6)),

@@ -2,18 +2,15 @@
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 
+from .finding import Finding
 from .observations import BoolArray, IntArray, Observations
 from .sequence import Sequence
-
-if TYPE_CHECKING:
-    from .diagnose.wording import Finding
 
 
 class Excluded(IntEnum):
@@ -89,8 +86,8 @@ class Problem:
     reading: Reading = Reading.IN_TURN
     diagnosed: bool = False
     """whether the noise and the repairs are those that the recording itself told"""
-    findings: "tuple[Finding, ...]" = ()
-    """what the diagnosis found to be wrong with the recording"""
+    findings: tuple[Finding, ...] = ()
+    """what the reader and the diagnosis found to be wrong with the recording"""
     repairs: tuple[str, ...] = ()
     """what was done about it for all estimators alike, and what was set by hand; one sentence each"""
     remarks: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, fiel
 from .axes import AXIS_CONVENTIONS, IDENTITY
 from .finite import is_finite_number
 from .formats.named_file import FilePath
+from .time_unit import TimeUnit
 from .toml_file import read_toml
 
 AS_RECORDED = "as-recorded"
@@ -54,6 +55,15 @@ def _between(low: float, high: float, neutral: float | None = None) -> Callable[
     return number
 
 
+def _time_unit(value: object) -> float:
+    if isinstance(value, str) and value in tuple(TimeUnit):
+        return TimeUnit(value).seconds
+    try:
+        return _between(1e-12, 1e12, 1.0)(value)
+    except ValueError as error:
+        raise ValueError(f"{error}, or a unit: {', '.join(TimeUnit)}") from error
+
+
 def _track(value: object) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not 2 <= value <= 10_000:
         raise ValueError("it should be a whole number from 2 to 10000")
@@ -92,6 +102,23 @@ class MaskByHand(_ByHand):
     """true: observations that repeat the frame before take part like any other"""
 
 
+class UnitsByHand(_ByHand):
+    """What one unit of the recorded values is in SI; 'as-recorded' for 1."""
+
+    time: Annotated[float, PlainValidator(_time_unit)] | None = None
+    """s, or the name of the unit: s, ms, us, ns"""
+    angular_velocity: Annotated[float, PlainValidator(_between(1e-12, 1e12, 1.0))] | None = None
+    """rad/s"""
+    linear_velocity: Annotated[float, PlainValidator(_between(1e-12, 1e12, 1.0))] | None = None
+    """m/s"""
+    baseline: Annotated[float, PlainValidator(_between(1e-12, 1e12, 1.0))] | None = None
+    """m"""
+
+    def given(self) -> dict[str, float]:
+        """Those that are set, by the names of `diagnose.units.Units`."""
+        return {name.partition("_")[0]: value for name, value in self if value is not None}
+
+
 class Repairs(_ByHand):
     """Each replaces what the diagnosis finds; None leaves it to the diagnosis, 'as-recorded' turns it off."""
 
@@ -109,8 +136,11 @@ class Repairs(_ByHand):
     """the same in intervals between frames"""
     misalignment_deg: Annotated[Vector, PlainValidator(_vector(180.0, "degrees"))] | None = None
     """rotation vector by which imu_T_cam is turned against the velocities, in its own axes; undone"""
+    extrinsic_inverted: bool | None = None
+    """whether imu_T_cam was recorded as its inverse; inverted before anything else is found"""
     disparity_offset_px: Annotated[float, PlainValidator(_between(-100.0, 100.0, 0.0))] | None = None
     """px by which every recorded uR is too large, and every disparity too small; taken off"""
+    units: UnitsByHand = UnitsByHand()
     sigma: SigmaByHand = SigmaByHand()
     mask: MaskByHand = MaskByHand()
 

@@ -25,6 +25,7 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.cannot_tell:
         yield f"# Nothing could be found out: {' '.join(diagnosis.cannot_tell.split())}."
     yield ""
+    yield f"extrinsic_inverted = {str(diagnosis.inverted).lower()}  # of imu_T_cam, before anything else"
     yield f'angular_axes = "{diagnosis.angular.name}"  # {_seen(diagnosis.angular)}'
     yield f'linear_axes = "{diagnosis.linear.name}"  # {_seen(diagnosis.linear)}'
     bias, deviation = sure_bias(diagnosis), diagnosis.gyro_bias_deviation
@@ -38,6 +39,17 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield f"misalignment_deg = {_vector(np.rad2deg(angle))}  # rotation vector of imu_T_cam{known}"
     offset, uncertain = diagnosis.disparity_offset
     yield f"disparity_offset_px = {sure_offset(diagnosis):.6g}  # of every uR; found {offset:.3f} +- {uncertain:.3f}"
+    yield ""
+    yield "[units]"
+    units = diagnosis.units
+    yield (
+        "# time is given by --time-unit"
+        if diagnosis.sequence.time_unit_given
+        else f"time = {units.time:.15g}  # s, or s, ms, us, ns in quotes"
+    )
+    yield f"angular_velocity = {units.angular:.15g}  # rad/s"
+    yield f"linear_velocity = {units.linear:.15g}  # m/s"
+    yield f"baseline = {units.baseline:.15g}  # m"
     yield ""
     yield "[sigma]"
     yield f"linear_velocity = {sigmas.linear:.6g}  # m/s"

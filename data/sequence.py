@@ -6,6 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
 
+from .finding import Finding
 from .observations import BoolArray, Observations
 
 ROTATION_TOLERANCE = 1e-6
@@ -68,6 +69,12 @@ class Sequence:
     """the file it came from, or how it was simulated"""
     remarks: tuple[str, ...] = ()
     """what the reader has to say of it, one sentence each"""
+    findings: tuple[Finding, ...] = ()
+    """faults of the file that the reader put right"""
+    time_unit_given: bool = False
+    """whether the user said in which unit the stamps were: the diagnosis then does not judge it"""
+    left_out: tuple[int, ...] = ()
+    """frames of the file, increasing, that the recording does not have: those whose stamp repeats the one before"""
 
     def __post_init__(self) -> None:
         if self.up_imu is None:

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import numpy as np
 
-from fgbaseline.data import Diagnosis, diagnose, read, repairs_text
+from fgbaseline.data import Diagnosis, TimeUnit, diagnose, read, repairs_text
 from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
 from fgbaseline.data.formats.beside import written_beside
 from fgbaseline.data.plural import plural
@@ -22,7 +22,15 @@ UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def tell(path: Path, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool) -> int:
+def tell(
+    path: Path,
+    out: Path | None,
+    *,
+    as_json: bool,
+    repairs: Path | None,
+    force: bool,
+    time_unit: TimeUnit | None = None,
+) -> int:
     """Diagnoses a recording and says what was found; gives the exit code."""
     if force and out is None and repairs is None:
         raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
@@ -30,7 +38,7 @@ def tell(path: Path, out: Path | None, *, as_json: bool, repairs: Path | None, f
         require_free(out, force=force, mark=MARK)
     if repairs is not None:
         _require_writable(repairs, force=force)
-    diagnosis = diagnose(read(path))
+    diagnosis = diagnose(read(path, time_unit=time_unit))
     tracks = track_state(diagnosis)
     findings = findings_of(diagnosis, tracks)
     report = to_json(diagnosis, tracks, findings)
@@ -83,7 +91,7 @@ def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
         f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
     )
     if diagnosis.cannot_tell:
-        click.echo(f"Cannot tell what is wrong with its velocities: {diagnosis.cannot_tell}.")
+        click.echo(f"Nothing can be found out about its velocities: {diagnosis.cannot_tell}.")
     if findings:
         _table(findings)
     elif not diagnosis.cannot_tell:

@@ -11,6 +11,7 @@ from fgbaseline.data import (
     Problem,
     Reading,
     Sequence,
+    TimeUnit,
     calibrated,
     documented,
     estimator_names,
@@ -19,7 +20,10 @@ from fgbaseline.data import (
     read,
     read_repairs,
 )
+from fgbaseline.data.diagnose import known_units, unit_findings, unusable
+from fgbaseline.data.diagnose.units import evidence
 from fgbaseline.data.documented import DEFAULT_FEATURES
+from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.geometry import InputError
 
@@ -28,6 +32,8 @@ from .solving import Watch, solve_all, unwatched
 if TYPE_CHECKING:
     from .comparison import Run
 
+FEW_TRUE = 0.5
+"""share of frames with truth, below which a run says so first"""
 MARK = "summary.json"
 """the file by which a run's folder is known"""
 
@@ -48,6 +54,8 @@ class RunSettings:
     seed: int = 0
     as_recorded: bool = False
     """take the recording as it is: no diagnosis, no repairs, assumed noise"""
+    time_unit: TimeUnit | None = None
+    """of the recording's stamps; None to find it out"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
     repairs: Path | None = None
@@ -65,6 +73,7 @@ class RunSettings:
             "truth_frame": self.truth_frame,
             "seed": self.seed,
             "as_recorded": self.as_recorded,
+            "time_unit": None if self.time_unit is None else str(self.time_unit),
             "held_out": self.held_out,
             "repairs": None if self.repairs is None else str(self.repairs),
         }
@@ -94,6 +103,10 @@ def load_estimators(names: tuple[str, ...]) -> None:
 def read_sequence(settings: RunSettings) -> Sequence:
     """The recording, with its truth; raises InputError."""
     if settings.sequence is None:
+        if settings.time_unit is not None:
+            raise InputError(
+                "time-unit: the simulated drive has its stamps in seconds; give a SEQUENCE with --time-unit"
+            )
         if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
         from fgbaseline.data.simulate import Simulation, simulate
@@ -105,7 +118,7 @@ def read_sequence(settings: RunSettings) -> Sequence:
         )
     if settings.truth is None and settings.truth_frame is not None:
         raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
-    return read(settings.sequence, settings.truth, settings.truth_frame)
+    return read(settings.sequence, settings.truth, settings.truth_frame, settings.time_unit)
 
 
 def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
@@ -118,6 +131,10 @@ def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) 
     if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
         why = "--as-recorded" if settings.as_recorded else "the documented preset"
         raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
+    if len(sequence.observations) and (reason := unusable(sequence)):
+        raise InputError(f"{sequence.source}: features: {reason}")
+    if settings.as_recorded or settings.preset == "documented":
+        _require_units(sequence)
     repairs = None if settings.repairs is None else read_repairs(settings.repairs)
     features = None if settings.features == "all" else settings.features
     if settings.preset == "documented":
@@ -126,6 +143,28 @@ def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) 
         return documented(sequence, features, settings.landmarks)
     taken = Calibration() if settings.as_recorded else None
     return calibrated(sequence, features, settings=taken, repairs=repairs, processes=processes)
+
+
+def to_print_first(problem: Problem) -> list[str]:
+    """What a run says before anything else: faults of the file itself, and a truth of few frames."""
+    said = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
+    truth = problem.sequence.truth
+    if truth is not None and truth.known.mean() < FEW_TRUE:
+        said += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]
+    return said
+
+
+def _require_units(sequence: Sequence) -> None:
+    """Raises InputError for a recording in other units than SI where nothing is to be repaired."""
+    units = known_units(sequence)
+    if units.doubt:
+        raise InputError(f"{sequence.source}: {units.doubt}")
+    wrong = [finding.sentence.rstrip(".").split("; multiplied")[0] for finding in unit_findings(units, sequence)]
+    if wrong:
+        raise InputError(
+            f"{sequence.source}: {'. '.join(wrong)} ({evidence(units)}). Taken as recorded, this is another motion; "
+            "convert the file, or run it with --preset calibrated and without --as-recorded, which repairs it"
+        )
 
 
 def solve(

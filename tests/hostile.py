@@ -263,10 +263,10 @@ def nan_velocity() -> dict[str, Any]:
     return arrays
 
 
-def duplicated_stamps() -> dict[str, Any]:
-    """The arrays of a file in which two frames have one stamp."""
+def falling_stamps() -> dict[str, Any]:
+    """The arrays of a file in which a frame has a stamp before that of the frame before it."""
     arrays = recorded(base())
-    arrays["time_stamps"][0, 41] = arrays["time_stamps"][0, 40]
+    arrays["time_stamps"][0, 41] = arrays["time_stamps"][0, 39]
     return arrays
 
 
@@ -280,5 +280,5 @@ def recorded(sequence: Sequence) -> dict[str, Any]:
 
 REFUSED = {
     "NaN in one velocity sample": (nan_velocity, "linear_velocity: frame 33 has"),
-    "duplicated stamps": (duplicated_stamps, "time_stamps: stamps must rise, but frame 41"),
+    "falling stamps": (falling_stamps, "time_stamps: stamps must rise, but frame 41"),
 }

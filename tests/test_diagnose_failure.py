@@ -11,7 +11,7 @@ from fgbaseline.data.simulate import Simulation, simulate
 def test_a_diagnosis_that_breaks_says_so_and_the_recording_is_taken_as_it_is(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    module = importlib.import_module("fgbaseline.data.diagnose.diagnosis")
+    module = importlib.import_module("fgbaseline.data.diagnose.stages")
 
     def breaks(_: data.Sequence) -> None:
         raise error

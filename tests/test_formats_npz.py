@@ -232,9 +232,9 @@ BAD = {
         lambda a: a.update(time_stamps=changed(a["time_stamps"], (0, 2), np.inf)),
         "time_stamps: the stamp of frame 2 is inf",
     ),
-    "repeated stamp": (
-        lambda a: a.update(time_stamps=changed(a["time_stamps"], (0, 3), a["time_stamps"][0, 2])),
-        r"time_stamps: stamps must rise, but frame 3 \(1300000000.2 s\) is not after frame 2",
+    "falling stamp": (
+        lambda a: a.update(time_stamps=changed(a["time_stamps"], (0, 3), a["time_stamps"][0, 1])),
+        r"time_stamps: stamps must rise, but frame 3 \(1300000000.1 s\) is not after frame 2",
     ),
     "column of stamps": (
         lambda a: a.update(time_stamps=a["time_stamps"].T),

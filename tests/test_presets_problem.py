@@ -119,6 +119,17 @@ def test_the_calibrated_noise_is_a_velocity_noise_times_the_interval(shift: Shif
     assert problem.remarks[0].startswith("not diagnosed")
 
 
+def test_as_recorded_means_that_each_velocity_holds_over_the_interval_after_its_stamp() -> None:
+    s = drive()
+    u = np.concatenate([s.linear_velocity, s.angular_velocity], axis=1)
+    blind = replace(s, observations=data.Observations.none())
+    as_recorded, not_diagnosed = data.calibrated(s, settings=data.Calibration()), data.calibrated(blind)
+    assert not not_diagnosed.diagnosed
+    for problem in (as_recorded, not_diagnosed, data.documented(s)):
+        np.testing.assert_array_equal(problem.increment, u[:-1] * s.dt[:, None])
+    assert any("the velocity of frame k moves frame k to k + 1" in remark for remark in as_recorded.remarks)
+
+
 def test_intervals_take_the_sample_after_before_or_the_mean() -> None:
     s = drive()
     after, mean, before = (increments(s, i) / s.dt[:, None] for i in (Shift.AFTER, Shift.MIDDLE, Shift.BEFORE))

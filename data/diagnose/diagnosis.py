@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from fgbaseline.geometry import FloatArray
 
@@ -14,8 +13,9 @@ from ..sequence import Sequence
 from .axes import Axes, angular_axes, linear_axes
 from .fit import Fit, fit_windows, half_cost
 from .links import repeated
-from .odometry import Odometry, odometry
+from .odometry import Odometry
 from .timing import Timing, timing
+from .units import Units
 from .whole_shift import whole_shift
 from .window_terms import OFFSET, TURN, Sigmas
 
@@ -43,6 +43,17 @@ class Diagnosis:
     """(T-1,) intervals whose tracks are copies"""
     by_hand: frozenset[str] = frozenset()
     """names of `Repairs` that somebody set: taken as they are, however small or uncertain"""
+    units: Units = field(default_factory=Units)
+    """by which the recorded values were multiplied"""
+    recorded: Sequence | None = None
+    """as it was recorded; `sequence` is in SI units and has the extrinsic that fits"""
+    inversion: tuple[float, float] | None = None
+    """rad/s, median error of the rates before and after inverting imu_T_cam; None where it is the right way round"""
+
+    @property
+    def inverted(self) -> bool:
+        """Whether imu_T_cam was recorded as its inverse."""
+        return self.inversion is not None
 
     @property
     def gyro_bias(self) -> FloatArray:
@@ -81,32 +92,28 @@ class Diagnosis:
         return None if self.fit is None else self.fit.sigmas
 
 
-def diagnose(sequence: Sequence, processes: int = 1) -> Diagnosis:
-    """Finds axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth.
-
-    `processes`, forks of this one, share what takes longest.
-    """
-    if len(sequence.observations) == 0:
-        return Diagnosis(sequence, "the recording has no observations")
-    try:
-        with threadpool_limits(limits=1, user_api="blas"):
-            return _diagnose(sequence, processes)
-    except (np.linalg.LinAlgError, ValueError, FloatingPointError) as error:
-        return Diagnosis(sequence, f"its computation failed ({type(error).__name__}: {error})")
-
-
-def _diagnose(sequence: Sequence, processes: int) -> Diagnosis:
+def velocities_explained(sequence: Sequence, seen_by_cameras: Odometry, processes: int) -> Diagnosis:
+    """What the cameras say of the velocities of a recording in SI units."""
     copies = repeated(sequence)
-    seen_by_cameras = odometry(sequence)
     known = seen_by_cameras.known
     if known.sum() < MIN_INTERVALS:
         reason = f"the cameras tell the motion of only {int(known.sum())} of {len(known)} intervals"
         return Diagnosis(sequence, reason, seen_by_cameras, repeated=copies)
-    seen = seen_by_cameras.twist(sequence.dt)
-    recorded = held_twist(sequence, Shift.MIDDLE)
-    angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
-    linear = linear_axes(seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.camera.baseline)
+    angular, linear = _axes_of(sequence, seen_by_cameras)
     return explained(sequence, seen_by_cameras, angular, linear, copies, processes=processes)
+
+
+def _axes_of(sequence: Sequence, seen_by_cameras: Odometry) -> tuple[Axes, Axes]:
+    """The conventions of angular and linear velocity."""
+    seen, recorded, known = (
+        seen_by_cameras.twist(sequence.dt),
+        held_twist(sequence, Shift.MIDDLE),
+        seen_by_cameras.known,
+    )
+    angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
+    return angular, linear_axes(
+        seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.camera.baseline
+    )
 
 
 def explained(

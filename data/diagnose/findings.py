@@ -13,6 +13,7 @@ from .diagnosis import Diagnosis, turned
 from .repair import SURE, sure_bias, sure_misalignment, sure_offset
 from .track_findings import track_findings
 from .tracks import Tracks, track_state
+from .units import LABELS, NAMES, unit_findings
 from .wording import Finding, listed, vector
 
 MIN_SCALE = 0.02
@@ -27,7 +28,11 @@ KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
 
 def findings_of(diagnosis: Diagnosis, tracks: Tracks | None = None) -> tuple[Finding, ...]:
     """What is surely wrong, velocities first; none for a clean recording. `tracks` is `track_state(diagnosis)`."""
-    told: list[Finding] = []
+    told: list[Finding] = [*diagnosis.sequence.findings]
+    if diagnosis.recorded is not None:
+        told += unit_findings(diagnosis.units, diagnosis.recorded)
+    if diagnosis.inversion is not None:
+        told.append(_extrinsic_inverse(*diagnosis.inversion))
     if diagnosis.fit is not None:
         parts: tuple[Callable[[Diagnosis], Finding | None], ...] = (
             _angular_axes,
@@ -38,8 +43,26 @@ def findings_of(diagnosis: Diagnosis, tracks: Tracks | None = None) -> tuple[Fin
             _extrinsic,
             _disparity_offset,
         )
-        told = [finding for part in parts if (finding := part(diagnosis)) is not None]
+        told += [finding for part in parts if (finding := part(diagnosis)) is not None]
     return (*told, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_state(diagnosis)))
+
+
+def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """What was done to a recording before anything else: units, and an extrinsic inverted; one sentence each."""
+    done = [f"{LABELS[name]} multiplied by {f:.6g}" for name in NAMES if (f := getattr(diagnosis.units, name)) != 1.0]
+    return (*done, *(["extrinsic imu_T_cam inverted"] if diagnosis.inverted else []))
+
+
+def _extrinsic_inverse(before: float, after: float) -> Finding:
+    return Finding(
+        "extrinsic_inverse",
+        "imu_T_cam is recorded as its inverse, cam_T_imu: inverted, it fits the turns and distances that the cameras "
+        "see in the axes of both velocities, and as recorded in neither. It is inverted.",
+        before,
+        after,
+        "rad/s",
+        "compared by the odometry of the cameras",
+    )
 
 
 def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -139,6 +162,8 @@ def _time_offset(diagnosis: Diagnosis) -> Finding | None:
 
 def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
     scale, deviation = diagnosis.velocity_scale
+    if diagnosis.units.gains is not None and not diagnosis.units.gains[1].known:
+        return None  # a standing rig: the ratio of two noises
     if abs(scale - 1.0) <= max(MIN_SCALE, SURE * deviation):
         return None
     more = "larger" if scale > 1.0 else "smaller"

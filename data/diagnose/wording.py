@@ -1,29 +1,14 @@
 """Findings, and how figures stand in sentences."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 
 from fgbaseline.geometry import FloatArray
 
+from ..finding import Finding
 from ..observations import IntArray
 
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that is wrong with a recording."""
-
-    code: str
-    """by which programs know it, such as `gyro_bias`"""
-    sentence: str
-    """for people, with figures"""
-    before: float
-    """a figure of the recording as it is, in `unit`"""
-    after: float
-    """the same once it is repaired and masked; equal to `before` where nothing can be put right"""
-    unit: str
-    certainty: str
-    """how sure it is: a standard error, a lead in likelihood, or 'counted'"""
+__all__ = ["Finding", "listed", "spans", "vector"]
 
 
 def listed(words: Iterable[str]) -> str:

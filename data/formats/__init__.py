@@ -7,7 +7,6 @@ from .kitti import read_times, write_kitti
 from .landmark_file import read_landmarks
 from .npz_writer import write_npz
 from .recording import read
-from .stamps import TimeUnit
 from .trajectory_file import (
     TrajectoryFile,
     TrajectoryFormat,
@@ -24,7 +23,6 @@ from .tum import write_tum
 __all__ = [
     "BodyFrame",
     "Order",
-    "TimeUnit",
     "TrajectoryFile",
     "TrajectoryFormat",
     "attach_truth",

@@ -22,7 +22,8 @@ from fgbaseline.geometry import FloatArray, InputError, StereoCamera
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from .feature_block import read_features
-from .fields import extrinsic, positive, time_stamps, vectors
+from .fields import extrinsic, positive, vectors
+from .frame_stamps import read_stamps
 from .npz_archive import NpzArchive
 
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu"})
@@ -41,14 +42,15 @@ _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can
 def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
     form = course_form(archive.keys)
-    t = time_stamps("time_stamps", archive.array("time_stamps"))
-    T = len(t)
+    stamps = read_stamps("time_stamps", archive.array("time_stamps"))
+    T = len(stamps.kept)
     rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
     observations, n_landmarks = Observations.none(), 0
-    remarks = []
+    remarks, findings = [], stamps.findings
     if "features" in archive.keys:
         with archive.stream("features") as stream:
-            observations, n_landmarks = read_features(stream, T)
+            observations, n_landmarks, zeros = read_features(stream, T)
+        findings += zeros
     else:
         remarks.append(_NO_FEATURES)
     if form == "course-2020":
@@ -58,18 +60,20 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
         remarks.append(moved)
     return Sequence(
         name=name,
-        t=t,
-        linear_velocity=vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T))),
-        angular_velocity=vectors(rate, _shaped(archive, rate, (3, T))),
+        t=stamps.t,
+        linear_velocity=vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))[stamps.kept],
+        angular_velocity=vectors(rate, _shaped(archive, rate, (3, T)))[stamps.kept],
         camera=_camera(archive),
         imu_T_cam=_extrinsic(archive, form),
-        observations=observations,
+        observations=stamps.observations(observations),
         n_landmarks=n_landmarks,
-        truth=truth,
+        truth=stamps.truth(truth),
         up_imu=_up(archive),
         form=form,
         source=source,
         remarks=tuple(remarks),
+        findings=findings,
+        left_out=stamps.left_out,
     )
 
 

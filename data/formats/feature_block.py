@@ -6,21 +6,26 @@ An entry is unobserved when all four of its rows are exactly -1. Anything else m
 coordinates none of which is exactly -1: where some rows are -1 and others are not, a tracker has lost one camera,
 and a coordinate that truly is -1.0 (which lies outside every image, and which a sub-pixel tracker hits with
 probability zero) could not be told from that. So both are refused, by the reader and by the writer.
+
+An entry whose four rows are all exactly 0 is unobserved as well: no pair of cameras measures the outermost corner of
+both images, with a disparity of exactly zero. Such entries are counted and reported.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..finding import Finding
 from ..observations import IntArray, Observations
 from .array_stream import ArrayStream
 
 UNOBSERVED = -1.0
 CHUNK = 2**19
-"""values read at a time: 4 MB of doubles"""
+"""values read at a time, a multiple of 8: 4 MB of doubles"""
 ROWS = ("uL", "vL", "uR", "vR")
 
 
@@ -40,18 +45,23 @@ class _Layout:
         return index // self.n_landmarks, index % self.n_landmarks
 
 
-def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int]:
-    """The observations in a streamed block (4, N, T), and N. Raises InputError naming frame and landmark."""
+def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int, tuple[Finding, ...]]:
+    """The observations in a streamed block (4, N, T), N, and what was wrong with the block.
+
+    Raises InputError naming frame and landmark.
+    """
     shape = stream.shape
     if len(shape) != 3 or shape[0] != 4 or shape[2] != n_frames:
         raise InputError(
             f"{stream.key}: expected shape (4, N, {n_frames}) for the {n_frames} time stamps, got {shape}; "
             "write uL, vL, uR, vR along the first axis and the frames along the last"
         )
-    return _read(stream, _Layout(stream.key, n_frames, shape[1], frames_first=not stream.fortran_order)), shape[1]
+    layout = _Layout(stream.key, n_frames, shape[1], frames_first=not stream.fortran_order)
+    observations, findings = _read(stream, layout)
+    return observations, shape[1], findings
 
 
-def read_features_by_frame(stream: ArrayStream, n_frames: int) -> tuple[Observations, int]:
+def read_features_by_frame(stream: ArrayStream, n_frames: int) -> tuple[Observations, int, tuple[Finding, ...]]:
     """The same of a block (4, T, N), as `.mat` files have it."""
     shape = stream.shape if len(stream.shape) != 2 else (*stream.shape, 1)  # MATLAB drops a last axis of length 1
     if len(shape) != 3 or shape[:2] != (4, n_frames):
@@ -59,50 +69,68 @@ def read_features_by_frame(stream: ArrayStream, n_frames: int) -> tuple[Observat
             f"{stream.key}: expected shape (4, {n_frames}, N) for the {n_frames} time stamps, got {stream.shape}; "
             "save uL, vL, uR, vR along the first axis and the frames along the second"
         )
-    return _read(stream, _Layout(stream.key, n_frames, shape[2], frames_first=stream.fortran_order)), shape[2]
+    observations, findings = _read(stream, _Layout(stream.key, n_frames, shape[2], frames_first=stream.fortran_order))
+    return observations, shape[2], findings
 
 
-def _read(stream: ArrayStream, layout: _Layout) -> Observations:
+def _read(stream: ArrayStream, layout: _Layout) -> tuple[Observations, tuple[Finding, ...]]:
     if layout.n_landmarks == 0:
-        return Observations.none()
-    index, pixel = (_entries_together if stream.fortran_order else _entries_by_row)(stream, layout)
-    return _observations(index, pixel, layout)
+        return Observations.none(), ()
+    index, pixel, zeros = (_entries_together if stream.fortran_order else _entries_by_row)(stream, layout)
+    return _observations(index, pixel, layout), _zeros_found(layout.key, zeros, len(index))
 
 
-def _entries_together(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray]:
-    """Fortran order: the four rows of an entry lie side by side."""
-    indices, pixels = [np.empty(0, np.int64)], [np.empty((0, 4))]
+def _zeros_found(key: str, zeros: int, observed: int) -> tuple[Finding, ...]:
+    if zeros == 0:
+        return ()
+    text = (
+        f"{key}: {zeros:,} of {zeros + observed:,} entries that are not -1 are 0 in all four rows: 0 stands for "
+        "unobserved there, and they are read as that."
+    )
+    return (Finding("zero_for_unobserved", text, zeros, 0, "entries", "counted"),)
+
+
+def _entries_together(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray, int]:
+    """Fortran order: the four rows of an entry lie side by side. Also how many entries are all zero."""
+    indices, pixels, zeros = [np.empty(0, np.int64)], [np.empty((0, 4))], 0
     for start, n in _pieces(layout.n_frames * layout.n_landmarks, CHUNK // 4):
         values = stream.take(4 * n).reshape(n, 4)
-        index = np.flatnonzero((values != UNOBSERVED).any(axis=1))
+        observed, zero = (values != UNOBSERVED).any(axis=1), (values == 0.0).all(axis=1)
+        zeros += int(zero.sum())
+        index = np.flatnonzero(observed & ~zero)
         _require_finite(start + index, values[index], layout)
         indices.append(start + index)
         pixels.append(values[index])
-    return np.concatenate(indices), np.concatenate(pixels)
+    return np.concatenate(indices), np.concatenate(pixels), zeros
 
 
-def _entries_by_row(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray]:
+def _entries_by_row(stream: ArrayStream, layout: _Layout) -> tuple[IntArray, FloatArray, int]:
     """C order: all entries of uL, then all of vL, and so on; the rows are brought together in the end."""
     rows = [_row(stream, row, layout) for row in range(4)]
-    first = rows[0][0]
-    if all(np.array_equal(first, index) for index, _ in rows[1:]):
-        return first, np.stack([values for _, values in rows], axis=1)
-    union = np.unique(np.concatenate([index for index, _ in rows]))
-    pixel = np.full((len(union), 4), UNOBSERVED)
-    for row, (index, values) in enumerate(rows):
-        pixel[np.searchsorted(union, index), row] = values
-    return union, pixel
+    zero = np.stack([zero for _, _, zero in rows])
+    everywhere = np.bitwise_and.reduce(zero)
+    some = np.flatnonzero(np.unpackbits(np.bitwise_or.reduce(zero) & ~everywhere))
+    index = rows[0][0]
+    if len(some) or not all(np.array_equal(index, own) for own, _, _ in rows[1:]):
+        index = np.unique(np.concatenate([some, *(own for own, _, _ in rows)]))
+    pixel = np.full((len(index), 4), UNOBSERVED)
+    for row, (own, values, is_zero) in enumerate(rows):
+        pixel[(is_zero[index // 8] << (index % 8)) & 0x80 != 0, row] = 0.0
+        pixel[np.searchsorted(index, own), row] = values
+    return index, pixel, int(np.bitwise_count(everywhere).sum())
 
 
-def _row(stream: ArrayStream, row: int, layout: _Layout) -> tuple[IntArray, FloatArray]:
-    indices, kept = [np.empty(0, np.int64)], [np.empty(0)]
+def _row(stream: ArrayStream, row: int, layout: _Layout) -> tuple[IntArray, FloatArray, NDArray[np.uint8]]:
+    """Entries (n,) that are neither -1 nor 0, their values (n,), and a bit for each entry of the block that is 0."""
+    indices, kept, zero = [np.empty(0, np.int64)], [np.empty(0)], [np.empty(0, np.uint8)]
     for start, n in _pieces(layout.n_frames * layout.n_landmarks, CHUNK):
         values = stream.take(n)
-        index = np.flatnonzero(values != UNOBSERVED)
+        index = np.flatnonzero((values != UNOBSERVED) & (values != 0.0))
         _require_finite(start + index, values[index, None], layout, row)
         indices.append(start + index)
         kept.append(values[index])
-    return np.concatenate(indices), np.concatenate(kept)
+        zero.append(np.packbits(values == 0.0))
+    return np.concatenate(indices), np.concatenate(kept), np.concatenate(zero)
 
 
 def _pieces(total: int, size: int) -> Iterator[tuple[int, int]]:

@@ -7,8 +7,8 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from ..sequence import ROTATION_TOLERANCE
 
 
-def time_stamps(key: str, array: FloatArray) -> FloatArray:
-    """Stamps (T,), s, of an array (1, T) or (T,). Raises InputError unless they are finite, rising and two or more."""
+def finite_stamps(key: str, array: FloatArray) -> FloatArray:
+    """Stamps (T,) of an array (1, T) or (T,). Raises InputError unless they are finite and two or more."""
     if not (array.ndim == 1 or (array.ndim == 2 and array.shape[0] == 1)):
         raise InputError(f"{key}: expected shape (1, T), got {array.shape}; write one row of seconds")
     t = array.reshape(-1)
@@ -17,6 +17,12 @@ def time_stamps(key: str, array: FloatArray) -> FloatArray:
     broken = np.flatnonzero(~np.isfinite(t))
     if len(broken):
         raise InputError(f"{key}: the stamp of frame {broken[0]} is {t[broken[0]]}; write seconds")
+    return t
+
+
+def time_stamps(key: str, array: FloatArray) -> FloatArray:
+    """Stamps (T,), s, of an array (1, T) or (T,). Raises InputError unless they are finite, rising and two or more."""
+    t = finite_stamps(key, array)
     late = np.flatnonzero(~(np.diff(t) > 0))
     if len(late):
         k = int(late[0])

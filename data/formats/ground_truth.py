@@ -9,10 +9,10 @@ from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import IntArray
 from ..sequence import Sequence, Truth
+from ..time_unit import TimeUnit
 from .columns import Order
 from .named_file import FilePath, reading, shown
 from .shared_clock import units_in_common
-from .stamps import NAMES, PER_SECOND, TimeUnit
 from .trajectory_file import TrajectoryFile, read_trajectory_file, settled
 
 BodyFrame = Literal["camera", "imu"]
@@ -61,11 +61,12 @@ def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None
     remarks = [f"{shown(path)}: {remark}." for remark in file.remarks]
     poses = np.full((sequence.n_frames, 4, 4), np.nan)
     if file.stamps is None:
-        poses[_frames(sequence, file)] = file.trajectory().world_T_body
+        frames, lines = _frames(sequence, file)
+        poses[frames] = file.trajectory().world_T_body[lines]
         return poses, remarks
     unit = _unit(sequence, file)
-    if unit != "s":
-        remarks.append(f"The time stamps of {shown(path)} are in {NAMES[unit]}: divided by {PER_SECOND[unit]:,}.")
+    if unit is not TimeUnit.S:
+        remarks.append(f"The time stamps of {shown(path)} are in {unit.noun}: divided by {unit.per_second:,}.")
     read = file.trajectory(unit)
     frames, nearest = match_stamps(sequence.t, read.t)
     order = _order(sequence, file, frame, frames, nearest)
@@ -111,23 +112,29 @@ def _order(
     return file.orders[1 if misfits[0] > LEAST_MISFIT and CLEARLY * misfits[1] <= misfits[0] else 0]
 
 
-def _frames(sequence: Sequence, file: TrajectoryFile) -> IntArray:
-    """The frames (n,) of poses without stamps: by their numbers, else line by line."""
-    n = len(file.position)
+def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArray]:
+    """The frames (n,) of poses without stamps, by their numbers, else line by line, and which poses (n,) they are.
+
+    Frames of the recording's file that it leaves out count, and their poses are left out.
+    """
+    n, recorded = len(file.position), sequence.n_frames + len(sequence.left_out)
     if file.frame is not None:
-        if file.frame[0] < 0 or file.frame[-1] >= sequence.n_frames:
+        if file.frame[0] < 0 or file.frame[-1] >= recorded:
             raise InputError(
                 f"its frames are numbered {file.frame[0]} to {file.frame[-1]}, but the recording has only "
-                f"{sequence.n_frames}; give the truth of this recording"
+                f"{recorded}; give the truth of this recording"
             )
-        return file.frame
-    if n > sequence.n_frames:
+    elif n > recorded:
         raise InputError(
-            f"it has {n} lines, but line k is frame k and the recording has only {sequence.n_frames} "
+            f"it has {n} lines, but line k is frame k and the recording has only {recorded} "
             "frames; give the truth of this recording, or cut off what lies beyond its end"
         )
-    _require_same_speed(sequence, file)
-    return np.arange(n)
+    else:
+        _require_same_speed(sequence, file)
+    number = np.full(recorded, -1)
+    number[np.delete(np.arange(recorded), list(sequence.left_out))] = np.arange(sequence.n_frames)
+    frame = number[np.arange(n) if file.frame is None else file.frame]
+    return frame[frame >= 0], np.flatnonzero(frame >= 0)
 
 
 def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
@@ -149,7 +156,7 @@ def _unit(sequence: Sequence, file: TrajectoryFile) -> TimeUnit:
     """The unit of the stamps, by the time that they share with the recording where they leave it open."""
     assert file.stamps is not None
     spans = {unit: (float(t[0]), float(t[-1])) for unit in file.units for t in (file.stamps.seconds(unit),)}
-    found = units_in_common({"s": (float(sequence.t[0]), float(sequence.t[-1]))}, spans)
+    found = units_in_common({TimeUnit.S: (float(sequence.t[0]), float(sequence.t[-1]))}, spans)
     if found is None:
         unit, _ = settled(file, None, None)
         return unit

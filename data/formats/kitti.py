@@ -5,11 +5,12 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import IntArray
+from ..time_unit import TimeUnit
 from .beside import written_beside
 from .named_file import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
 from .stamped_poses import require_rising, writable
-from .stamps import TimeUnit, possible_units, stamps_of
+from .stamps import possible_units, stamps_of
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
@@ -52,7 +53,7 @@ def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
         units, settled = possible_units(stamps)
         if unit is not None and not settled:
             return stamps.seconds(unit)
-        if "s" not in units and len(units) != 1:
+        if TimeUnit.S not in units and len(units) != 1:
             raise InputError("its time stamps may be in several units; give --time-unit")
         return stamps.seconds(units[0])
 

@@ -8,6 +8,7 @@ import numpy as np
 from fgbaseline.geometry import InputError
 
 from ..sequence import Sequence
+from ..time_unit import TimeUnit, in_seconds
 from .course import read_course
 from .ground_truth import BodyFrame, attach_truth
 from .mat_file import MatFile
@@ -21,14 +22,21 @@ MATLAB_HEADER = 128
 """bytes: the text of a MATLAB 5 file, its version and the two letters that tell its byte order"""
 
 
-def read(path: FilePath, truth: FilePath | None = None, truth_frame: BodyFrame | None = None) -> Sequence:
+def read(
+    path: FilePath,
+    truth: FilePath | None = None,
+    truth_frame: BodyFrame | None = None,
+    time_unit: TimeUnit | None = None,
+) -> Sequence:
     """The recording in the file `path`: a course file, one of our own, or a UTIAS `.mat`.
+
+    `time_unit` is that of its stamps; without it they are in seconds, unless they show another unit (`time_unit.py`).
 
     `truth` is a KITTI or TUM file with the poses of `truth_frame`, "camera" or "imu" (see `attach_truth`); without it
     the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
     """
     with reading(path), np.errstate(all="ignore"):  # absurd numbers are judged, not computed with
-        sequence = _read(regular_file(path), os.fspath(path))
+        sequence = in_seconds(_read(regular_file(path), os.fspath(path)), time_unit)
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from itertools import product
 
-from .stamps import TimeUnit
+from ..time_unit import TimeUnit
 
 Spans = Mapping[TimeUnit, tuple[float, float]]
 """first and last stamp, s, by the unit that they would be in"""

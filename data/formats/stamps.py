@@ -2,17 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
+from ..time_unit import TimeUnit
 
-TimeUnit = Literal["s", "ms", "us", "ns"]
-PER_SECOND: dict[TimeUnit, int] = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-NAMES: dict[TimeUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 EPOCH = (6e8, 4e9)
 """s since 1970: 1989 to 2096"""
 FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
@@ -48,7 +45,7 @@ class Stamps:
 
     def seconds(self, unit: TimeUnit) -> FloatArray:
         """(n,) s; whole numbers are divided exactly, as doubles cannot hold nanoseconds since 1970."""
-        per_second = PER_SECOND[unit]
+        per_second = unit.per_second
         if per_second == 1:
             return self.value.copy()
         if self.whole is not None:
@@ -86,7 +83,7 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
             raise InputError("the seconds and nanoseconds of its stamps are no whole numbers; write those") from error
     elif (value == np.floor(value)).all():
         whole = tuple(_exactly(word, number) for word, number in zip(words, value.tolist(), strict=True))
-    known = next((u for u in get_args(TimeUnit) if u == unit), None)
+    known = next((u for u in TimeUnit if u == unit), None)
     return Stamps(value, whole, known, max(words, key=_digits, default=""))
 
 
@@ -105,16 +102,16 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
     if since_1970 is not None:
         return (since_1970,), True
     if interval is None or (FASTEST <= interval < CERTAIN_BELOW):
-        return ("s",), False
-    units: list[TimeUnit] = ["s"] if interval <= SLOWEST and interval >= FASTEST else []
-    units += [u for u in ("ms", "us", "ns") if FASTEST <= interval / PER_SECOND[u] <= USUAL]
+        return (TimeUnit.S,), False
+    units = [TimeUnit.S] if interval <= SLOWEST and interval >= FASTEST else []
+    units += [u for u in TimeUnit if u is not TimeUnit.S and FASTEST <= interval / u.per_second <= USUAL]
     return tuple(units), False
 
 
 def _since_1970(value: FloatArray, interval: float | None) -> TimeUnit | None:
     size = float(np.median(np.abs(value)))
-    for unit, per_second in PER_SECOND.items():
-        if EPOCH[0] <= size / per_second < EPOCH[1] and (interval or 0.0) / per_second <= EPOCH_INTERVAL:
+    for unit in TimeUnit:
+        if EPOCH[0] <= size / unit.per_second < EPOCH[1] and (interval or 0.0) / unit.per_second <= EPOCH_INTERVAL:
             return unit
     return None
 

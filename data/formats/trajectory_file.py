@@ -10,6 +10,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import BoolArray, IntArray
+from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
 from .columns import Columns, Order, counted_columns, named_columns
 from .kitti import kitti_poses
@@ -17,7 +18,7 @@ from .named_file import FilePath, reading, regular_file, shown
 from .number_table import Lines, NumberTable, numbers_of, read_lines
 from .pose_covariances import pose_covariances
 from .stamped_poses import require_rising, rotations_of_quaternions
-from .stamps import NAMES, Stamps, TimeUnit, lost_digits, possible_units, stamps_of
+from .stamps import Stamps, lost_digits, possible_units, stamps_of
 from .trajectory_npz import read_trajectory_npz
 
 TrajectoryFormat = Literal["tum", "kitti", "euroc", "npz"]
@@ -48,7 +49,7 @@ class TrajectoryFile:
     """the orders that they may have, the usual one first; one where the file states it"""
     stamps: Stamps | None = None
     """None where the file has none"""
-    units: tuple[TimeUnit, ...] = ("s",)
+    units: tuple[TimeUnit, ...] = (TimeUnit.S,)
     """that the stamps may have, the likeliest first; none where no unit makes their rate a recorder's"""
     unit_settled: bool = True
     """whether header or size of the stamps show their unit"""
@@ -74,7 +75,7 @@ class TrajectoryFile:
         Poses without stamps take those of `times` that have one for each frame; without such, t is the number of the
         frame. `oriented` False leaves the orientations out. Raises InputError where no times fit.
         """
-        t, stamped = self._seconds(unit or (self.units[0] if self.units else "s"), times)
+        t, stamped = self._seconds(unit or (self.units[0] if self.units else TimeUnit.S), times)
         rotation = self.rotation_in(order or self.orders[0]) if oriented else None
         poses = np.tile(np.eye(4), (len(t), 1, 1))
         poses[:, :3, 3] = self.position
@@ -162,7 +163,7 @@ def settled(file: TrajectoryFile, unit: TimeUnit | None, order: Order | None) ->
 
     Raises InputError where the stamps may have several units, and seconds are not among them.
     """
-    if unit is None and "s" not in file.units and len(file.units) != 1:
+    if unit is None and TimeUnit.S not in file.units and len(file.units) != 1:
         raise InputError(in_doubt(file))
     chosen = file.units[0] if unit is None or file.unit_settled else unit
     return chosen, (file.orders[0] if order is None or len(file.orders) == 1 else order)
@@ -177,7 +178,7 @@ def in_doubt(file: TrajectoryFile, units: Sequence[TimeUnit] | None = None) -> s
             f"{file.source}: its poses are {file.stamps.interval:.3g} apart in time, which is none of a recorder in "
             "seconds, milliseconds, microseconds or nanoseconds; give --time-unit"
         )
-    names = " or ".join(NAMES[unit] for unit in possible)
+    names = " or ".join(unit.noun for unit in possible)
     return (
         f"{file.source}: its time stamps, {file.stamps.interval:.3g} apart, may be in {names}; give --time-unit "
         f"{' or '.join(possible)}"
@@ -197,7 +198,7 @@ def read_tum(path: FilePath) -> tuple[FloatArray, FloatArray]:
 
     Raises as `read_trajectory`.
     """
-    read = read_trajectory_file(path, "tum").trajectory("s", "xyzw")
+    read = read_trajectory_file(path, "tum").trajectory(TimeUnit.S, "xyzw")
     return read.t, read.world_T_body
 
 

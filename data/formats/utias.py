@@ -17,10 +17,12 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, so3
 
+from ..finding import Finding
 from ..observations import Observations
 from ..sequence import Sequence, Truth
 from .feature_block import read_features_by_frame
-from .fields import extrinsic, positive, time_stamps, vectors
+from .fields import extrinsic, positive, vectors
+from .frame_stamps import read_stamps
 from .mat_file import MatFile
 
 VELOCITIES = ("v_vk_vk_i", "w_vk_vk_i")
@@ -36,31 +38,33 @@ def read_utias(mat: MatFile, name: str, source: str) -> Sequence:
         raise InputError(
             f"this MATLAB file is no UTIAS recording; expected v_vk_vk_i, w_vk_vk_i and y_k_j, found {found}"
         )
-    t = time_stamps("t", mat.array("t"))
-    T = len(t)
-    observations, n_landmarks = _observations(mat, T)
-    v, w = (vectors(key, _first_columns(mat, key, T)) for key in VELOCITIES)
+    stamps = read_stamps("t", mat.array("t"))
+    T = len(stamps.kept)
+    observations, n_landmarks, zeros = _observations(mat, T)
+    v, w = (vectors(key, _first_columns(mat, key, T))[stamps.kept] for key in VELOCITIES)
     fu, fv, b = (positive(key, mat.array(key), what) for key, what in POSITIVE.items())
     cu, cv = (_finite(mat, key) for key in ("cu", "cv"))
     return Sequence(
         name=name,
-        t=t,
+        t=stamps.t,
         linear_velocity=v,
         angular_velocity=w,
         camera=StereoCamera(fu, fv, cu, cv, b),
         imu_T_cam=_extrinsic(mat),
-        observations=observations,
+        observations=stamps.observations(observations),
         n_landmarks=n_landmarks,
-        truth=_truth(mat, T, n_landmarks),
+        truth=stamps.truth(_truth(mat, T, n_landmarks)),
         form="utias",
         source=source,
         remarks=tuple(_remarks(mat, T)),
+        findings=(*stamps.findings, *zeros),
+        left_out=stamps.left_out,
     )
 
 
-def _observations(mat: MatFile, T: int) -> tuple[Observations, int]:
+def _observations(mat: MatFile, T: int) -> tuple[Observations, int, tuple[Finding, ...]]:
     if "y_k_j" not in mat.keys:
-        return Observations.none(), 0
+        return Observations.none(), 0, ()
     with mat.stream("y_k_j") as stream:
         return read_features_by_frame(stream, T)
 

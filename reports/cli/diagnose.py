@@ -14,14 +14,24 @@ import click
     type=click.Path(path_type=Path),
     help="TOML file to write what was found to, for run --repairs, to be edited by hand.",
 )
+@click.option(
+    "--time-unit",
+    type=click.Choice(["s", "ms", "us", "ns"]),
+    help="What the time stamps of SEQUENCE count.  [default: seconds, unless the recording shows another unit]",
+)
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
-def command(sequence: Path, out: Path | None, as_json: bool, write_repairs: Path | None, force: bool) -> int:
-    """Find what is wrong with SEQUENCE: axes, bias, delay, scale, extrinsic, tracks; and how large its noise is.
+def command(
+    sequence: Path, out: Path | None, as_json: bool, write_repairs: Path | None, time_unit: str | None, force: bool
+) -> int:
+    """Find what is wrong with SEQUENCE: units, axes, bias, delay, scale, extrinsic, tracks; and how large its noise is.
 
     From the recording alone: ground truth in it is not looked at. `fgbaseline run` repairs what is found here.
 
     Exits 0 when the recording is clean, 1 with findings, 2 when it cannot tell, and on bad input.
     """
+    from fgbaseline.data import TimeUnit
+
     from ..diagnosing import tell
 
-    return tell(sequence, out, as_json=as_json, repairs=write_repairs, force=force)
+    unit = None if time_unit is None else TimeUnit(time_unit)
+    return tell(sequence, out, as_json=as_json, repairs=write_repairs, force=force, time_unit=unit)

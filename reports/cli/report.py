@@ -50,6 +50,8 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
 
         job.load_estimators(settings.estimators)
         (problem,) = posed()
+    for sentence in job.to_print_first(problem):
+        click.echo(sentence)
     run = job.solve(problem, settings, told.estimator, held, cores())
     for name, result in run.results.items():
         if not result.answered:

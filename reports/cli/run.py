@@ -57,7 +57,14 @@ class FeatureCount(click.ParamType[int | str]):
     "--truth-frame", type=click.Choice(["camera", "imu"]), help="The body whose poses the ground truth gives."
 )
 @click.option(
-    "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
+    "--as-recorded",
+    is_flag=True,
+    help="No diagnosis: the recording as it is, velocity k moving frame k to k + 1, with assumed noise (calibrated).",
+)
+@click.option(
+    "--time-unit",
+    type=click.Choice(["s", "ms", "us", "ns"]),
+    help="What the time stamps of SEQUENCE count.  [default: seconds, unless the recording shows another unit]",
 )
 @click.option(
     "--repairs",
@@ -96,6 +103,7 @@ def command(
     truth: Path | None,
     truth_frame: Literal["camera", "imu"] | None,
     as_recorded: bool,
+    time_unit: str | None,
     held_out: float,
     repairs: Path | None,
     seed: int,
@@ -108,7 +116,7 @@ def command(
     Exits 0 when every estimator gave an answer, 1 when one failed (the report is written all the same), 2 on bad
     input.
     """
-    from fgbaseline.data import Reading
+    from fgbaseline.data import Reading, TimeUnit
 
     from ..job import RunSettings
     from .report import report
@@ -123,6 +131,7 @@ def command(
         truth_frame=truth_frame,
         seed=seed,
         as_recorded=as_recorded,
+        time_unit=None if time_unit is None else TimeUnit(time_unit),
         held_out=held_out,
         repairs=repairs,
     )

@@ -123,7 +123,7 @@ def _split(given: str) -> tuple[str | None, str]:
 def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
     """Stamps for files without: those given, else those of the recording, of which the last few may be missing."""
     if settings.times:
-        return [read_times(file, settings.time_unit) for file in settings.times]
+        return [read_times(file, settings.unit) for file in settings.times]
     if problem is None:
         return []
     t = problem.sequence.t

@@ -7,10 +7,9 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import Matched
-from fgbaseline.data import Trajectory
-from fgbaseline.data.formats import Order, TimeUnit, TrajectoryFile
+from fgbaseline.data import TimeUnit, Trajectory
+from fgbaseline.data.formats import Order, TrajectoryFile
 from fgbaseline.data.formats.shared_clock import Spans, units_in_common
-from fgbaseline.data.formats.stamps import NAMES, PER_SECOND
 from fgbaseline.data.formats.trajectory_file import bends, in_doubt
 from fgbaseline.geometry import FloatArray, InputError, so3
 
@@ -30,7 +29,7 @@ class Resolved:
     """A trajectory file, or a trajectory at hand, with what is decided about it so far."""
 
     source: Source
-    unit: TimeUnit = "s"
+    unit: TimeUnit = TimeUnit.S
     order: Order = "xyzw"
     oriented: bool = True
     remarks: tuple[str, ...] = ()
@@ -86,7 +85,7 @@ def _require_same_frames(sources: Sequence[Source], times: Times) -> None:
 
 
 def _with_units(sources: Sequence[Source], settings: Settings) -> list[Resolved]:
-    spans = [_spans(source, settings.time_unit) for source in sources]
+    spans = [_spans(source, settings.unit) for source in sources]
     first, *others = spans
     shifted = [{u: (a + settings.offset, b + settings.offset) for u, (a, b) in each.items()} for each in others]
     if len(first) > 1:
@@ -102,7 +101,7 @@ def _with_units(sources: Sequence[Source], settings: Settings) -> list[Resolved]
 def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
     """First and last stamp by the units that they may have; nothing without stamps."""
     if isinstance(source, Trajectory):
-        return {"s": (float(source.t[0]), float(source.t[-1]))} if source.stamped else {}
+        return {TimeUnit.S: (float(source.t[0]), float(source.t[-1]))} if source.stamped else {}
     if source.stamps is None:
         return {}
     units = (wanted,) if wanted is not None and not source.unit_settled else source.units
@@ -112,16 +111,16 @@ def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
 def _only(source: Source, spans: Spans) -> TimeUnit:
     """The unit, where there is one. Raises InputError where there are several, or none although there are stamps."""
     if isinstance(source, Trajectory) or source.stamps is None or len(spans) == 1:
-        return next(iter(spans), "s")
+        return next(iter(spans), TimeUnit.S)
     raise InputError(in_doubt(source, list(spans)))
 
 
 def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
     remarks = source.remarks if isinstance(source, TrajectoryFile) else ()
     found = Resolved(source, unit, remarks=remarks)
-    if unit == "s" or isinstance(source, Trajectory) or source.stamps is None or source.stamps.unit is not None:
+    if unit is TimeUnit.S or isinstance(source, Trajectory) or source.stamps is None or source.stamps.unit is not None:
         return found
-    return found.remarked(f"its time stamps are in {NAMES[unit]} and are divided by {PER_SECOND[unit]:,}")
+    return found.remarked(f"its time stamps are in {unit.noun} and are divided by {unit.per_second:,}")
 
 
 def _with_orders(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from fgbaseline.data import TimeUnit
 from fgbaseline.geometry import InputError
 
 MARK = "comparison.json"
@@ -88,6 +89,11 @@ class Settings:
     """which estimators of a run that is the reference are compared too: names with commas, `all` or `none`"""
     seed: int = 0
     """of the bootstrap, and of what is held out"""
+
+    @property
+    def unit(self) -> TimeUnit | None:
+        """The unit of stamps, if it is given."""
+        return None if self.time_unit is None else TimeUnit(self.time_unit)
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `comparison.json` has them."""
