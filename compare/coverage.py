@@ -9,7 +9,9 @@ from fgbaseline.geometry import FloatArray
 LONG_GAP = 3.0
 """median intervals of a trajectory: two poses that are further apart have a gap between them"""
 
-SMALLEST_SAMPLE, SMALLEST_COVERAGE = 30, 0.5
+SMALLEST_SAMPLE = 30
+"""poses or other items that a figure must be over to be judged"""
+SMALLEST_COVERAGE = 0.5
 """poses, or whatever a figure is taken over, and the share of the time that they have to cover, before it is judged"""
 FEWEST_STRETCHES = 3
 """of errors of motions over a stretch of the path: of fewer, no statistic says more than a single one"""

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 from scipy.special import gammainc
 
 from fgbaseline.data import Estimate, Problem
@@ -49,7 +48,10 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     low, high = np.log(RANGE)
     if not excess(low) < 0.0 < excess(high):
         return 0.0 if observed == 0.0 else float("inf")
-    return float(np.exp(brentq(excess, low, high, xtol=1e-9)))
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if excess(middle) > 0.0 else (middle, high)
+    return float(np.exp(middle))
 
 
 def motion_scale(problem: Problem, estimate: Estimate) -> float:

@@ -92,7 +92,7 @@ def excluded_counts(problem: Problem) -> dict[str, int]:
 
 
 def metrics_table(summary: Summary) -> pd.DataFrame:
-    """`metrics.csv`: estimator, metric (its path in the summary) and value, one row for each number."""
+    """`metrics.csv`: estimator, metric (its path in the summary) and value, one row for each number but the samples."""
     rows = [
         (name, metric, value) for name, estimator in summary.estimators.items() for metric, value in _numbers(estimator)
     ]
@@ -107,7 +107,7 @@ def _numbers(estimator: EstimatorSummary) -> Iterator[tuple[str, float | int | N
         elif value is None or isinstance(value, int | float):
             yield prefix, value
 
-    yield from walk("", estimator.model_dump(exclude={"notes", "status", "reason"}))
+    yield from walk("", estimator.model_dump(exclude={"notes", "status", "reason", "samples"}))
 
 
 def _estimator(run: Run, result: Result) -> dict[str, Any]:

@@ -164,7 +164,7 @@ class IncrementalSmoother:
             self._shorten_at = max(self._shorten_at, 2 * k)  # so that all of these together cost no more than one
             return arrival
         self.events += [
-            Event(k, "landmark dropped", "it came back, and the tree cannot go back", j) for j in sorted(new)
+            Event(k, EventKind.LANDMARK_DROPPED, "it came back, and the tree cannot go back", j) for j in sorted(new)
         ]
         self._dropped |= new
         return arrival.without(back)

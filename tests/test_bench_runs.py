@@ -139,7 +139,8 @@ def alive(process: int) -> bool:
 
 def test_check_holds_every_run_to_limits(place: Path, undisturbed: Path) -> None:
     (place / "limits.toml").write_text(
-        '[[limit]]\nmetric = "ate.rmse"\nestimators = ["isam2", "joint-ekf"]\nruns = "town *"\nat_most = 1.0\n'
+        'smallest_sample = 20\n[[limit]]\nmetric = "ate.rmse"\nestimators = ["isam2", "joint-ekf"]\nruns = "town *"\n'
+        "at_most = 1.0\n"
     )
     result = fgbaseline("check", undisturbed, "--limits", "limits.toml", cwd=place)
     assert result.returncode == 0, result.stdout + result.stderr

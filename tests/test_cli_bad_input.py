@@ -126,7 +126,7 @@ def a_null(arrays: dict[str, np.ndarray]) -> None:
 
 
 def falling_stamps(arrays: dict[str, np.ndarray]) -> None:
-    arrays["time_stamps"][0, 5] = arrays["time_stamps"][0, 4]
+    arrays["time_stamps"][0, 5] = arrays["time_stamps"][0, 3]
 
 
 def no_rotation(arrays: dict[str, np.ndarray]) -> None:

@@ -171,7 +171,7 @@ def test_a_point_in_the_camera_plane_counts_as_behind_and_three_pixels_as_far() 
     assert by_frame.index.name == "frame"
     assert by_frame.columns.tolist() == ["median", "mean", "rmse", "under_3px", "behind_camera", "n", "missing"]
     assert by_frame.loc[4].tolist() == pytest.approx([2.0, 2.0, 5**0.5, 0.5, 1, 2, 0])
-    assert by_frame.loc[7].tolist() == pytest.approx([5.0, 5.0, 5.0, 0.0, 1, 1])
+    assert by_frame.loc[7].tolist() == pytest.approx([5.0, 5.0, 5.0, 0.0, 1, 1, 0])
 
 
 def test_the_columns_of_the_table_are_named() -> None:

@@ -53,6 +53,6 @@ def test_paths_without_stamps_are_paired_by_their_number(tmp_path: Path) -> None
     for name in ("a", "b"):
         data.write_kitti(tmp_path / f"{name}.txt", reference.world_T_body)
     result = compared(tmp_path / "a.txt", tmp_path / "b.txt")
-    assert "30 poses paired (by their number" in result.caption
+    assert "30 poses paired (by frame" in result.caption
     assert "0.01 s" not in result.caption
     assert "within 0.01 s" in compare.associate(reference, reference).caption

@@ -261,7 +261,8 @@ def test_moments_that_one_of_the_two_lacks_are_left_out() -> None:
     ("low", "high", "settled"), [(0.1, 2.0, True), (-2.0, -0.1, True), (0.0, 2.0, False), (-2.0, 0.0, False)]
 )
 def test_an_interval_that_touches_zero_has_no_sign(low: float, high: float, settled: bool) -> None:
-    assert compare.RmseDifference(1.0, low, high, 1, True).settled == settled
+    value = 1.0 if low + high > 0.0 else -1.0
+    assert compare.RmseDifference(value, low, high, 1, True).settled == settled
 
 
 def test_looking_at_a_few_draws_at_a_time_changes_nothing() -> None:

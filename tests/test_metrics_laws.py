@@ -12,6 +12,7 @@ from fgbaseline import compare
 from fgbaseline.compare import Align, Matched
 from fgbaseline.compare.best_rotation import best_rotation
 from fgbaseline.data import Trajectory
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, se3, so3
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -189,7 +190,7 @@ def test_the_first_n_pairs_alone_decide(seed: int, n: int) -> None:
     whole = compare.align(estimate, reference, Align.SE3, first=n)
     part = compare.align(estimate[:n], reference[:n], Align.SE3)
     np.testing.assert_array_equal(whole.matrix, part.matrix)
-    assert f"over the first {n} poses" in whole.caption
+    assert f"over the first {plural(n, 'pose')}" in whole.caption
     if n == 1:
         first = compare.align(estimate, reference, Align.FIRST_POSE)
         np.testing.assert_allclose(whole.matrix, first.matrix, atol=1e-9)
@@ -273,7 +274,7 @@ def test_the_scale_of_one_camera_is_found_and_said() -> None:
         ("first-pose", None, 1, "the first pose put on the reference's"),
         ("yaw", None, 15, "yaw and position aligned over all 15 poses"),
         ("se3", 15, 15, "SE(3)-aligned over all 15 poses"),
-        ("se3", 1, 1, "SE(3)-aligned over the first 1 poses; their positions leave every rotation open"),
+        ("se3", 1, 1, "SE(3)-aligned over the first 1 pose; their positions leave every rotation open"),
         ("sim3", 4, 4, "Sim(3)-aligned over the first 4 poses (scale 1)"),
     ],
 )

@@ -19,7 +19,7 @@ from fgbaseline.data.diagnose import findings_of, known_units
 from fgbaseline.data.repairs import UnitsByHand
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.time_unit import unit_of_stamps
-from fgbaseline.geometry import InputError, se3
+from fgbaseline.geometry import InputError, se3, so3
 from fgbaseline.reports.job import RunSettings, pose_problem
 
 from .commands import fgbaseline
@@ -255,23 +255,17 @@ def test_a_frame_whose_stamp_repeats_is_left_out_and_counted(tmp_path: Path) -> 
     np.testing.assert_allclose(with_lines.world_T_imu, s.truth.world_T_imu, atol=1e-6)
 
 
-def test_a_truth_in_another_unit_is_named(tmp_path: Path) -> None:
-    truth = tmp_path / "truth.tum"
-    assert drive().truth is not None
-    for start in (0.0, 1.0):
-        stamps = np.round((drive().t + start) * 1e9).astype(np.int64)
-        lines = [
-            f"{t} {' '.join(map(str, p[:3, 3]))} 0 0 0 1"
-            for t, p in zip(stamps, drive().truth.world_T_imu, strict=True)
-        ]
-        truth.write_text("\n".join(lines))
-        if start:
-            shifted = written(tmp_path, time_stamps=drive().t[None, :] + start)
-            with pytest.raises(InputError, match="its stamps are in nanoseconds, in which they fit 120"):
-                data.read(shifted, truth, "imu")
-        else:
-            remarks = data.read(written(tmp_path), truth, "imu").remarks
-            assert any("1 of 120 frames: its stamps are in nanoseconds, in which" in remark for remark in remarks)
+@pytest.mark.parametrize("start", [0.0, 1.0])
+def test_a_truth_in_another_unit_is_named_and_read(tmp_path: Path, start: float) -> None:
+    true, truth = drive().truth, tmp_path / "truth.tum"
+    assert true is not None
+    stamps = np.round((drive().t + start) * 1e9).astype(np.int64)
+    rows = np.concatenate([true.world_T_imu[:, :3, 3], so3.quaternion_xyzw(true.world_T_imu[:, :3, :3])], axis=1)
+    truth.write_text("\n".join(f"{t} {' '.join(map(repr, row.tolist()))}" for t, row in zip(stamps, rows, strict=True)))
+    sequence = data.read(written(tmp_path, time_stamps=drive().t[None, :] + start), truth, "imu")
+    assert any("are in nanoseconds: divided by 1,000,000,000" in remark for remark in sequence.remarks)
+    assert sequence.truth is not None
+    assert sequence.truth.known.all()
 
 
 @pytest.mark.parametrize(
@@ -313,7 +307,7 @@ def test_the_stationary_case_has_no_scale(recordings: Recordings) -> None:
     assert not codes(diagnose(data.read(recordings("cases/40-stationary/v08_stationary.npz"))))
 
 
-def test_the_truth_of_one_frame_is_named(recordings: Recordings) -> None:
+def test_case_49_a_truth_of_one_orientation_throughout_is_refused(recordings: Recordings) -> None:
     truth = recordings("cases/49-truth-one-frame/truth_ns.tum")
-    sequence = data.read(recordings("cases/49-truth-one-frame/drive.npz"), truth, "imu")
-    assert any("1 of 120 frames: its stamps are in nanoseconds" in remark for remark in sequence.remarks)
+    with pytest.raises(InputError, match="positions without orientations"):
+        data.read(recordings("cases/49-truth-one-frame/drive.npz"), truth, "imu")

@@ -140,9 +140,8 @@ def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArra
 def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
     """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
     n = len(file.position)
-    recorded = (
-        np.median(np.linalg.norm(sequence.linear_velocity[: n - 1], axis=1) * sequence.dt[: n - 1]) if n > 1 else 0
-    )
+    steps = np.linalg.norm(sequence.linear_velocity[:-1], axis=1) * sequence.dt
+    recorded = np.median(steps[: n - 1]) if n > 1 else 0
     true = np.median(np.linalg.norm(np.diff(file.position, axis=0), axis=1)) if n > 1 else 0
     if n < sequence.n_frames and true > FASTER * recorded > 0:
         raise InputError(

@@ -5,8 +5,6 @@ from typing import Any
 
 import click
 
-from fgbaseline.data.plural import plural
-
 PATHS = ("town", "loop", "highway", "handheld", "along")
 INTERVALS = ("after", "before", "mean")
 
@@ -71,6 +69,7 @@ def command(output: Path, along: Path | None, force: bool, **given: Any) -> None
     The file is the later course form plus `ground_truth` and `landmarks`, and `fgbaseline run` reads it.
     """
     from fgbaseline.data import read, write_npz
+    from fgbaseline.data.plural import plural
     from fgbaseline.data.simulate import Simulation, simulate
     from fgbaseline.geometry import InputError
 

@@ -3,10 +3,12 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from fgbaseline.data import TimeUnit
 from fgbaseline.geometry import InputError
+
+if TYPE_CHECKING:
+    from fgbaseline.data import TimeUnit
 
 MARK = "comparison.json"
 """the file by which a comparison's folder is known"""
@@ -91,8 +93,10 @@ class Settings:
     """of the bootstrap, and of what is held out"""
 
     @property
-    def unit(self) -> TimeUnit | None:
+    def unit(self) -> "TimeUnit | None":
         """The unit of stamps, if it is given."""
+        from fgbaseline.data import TimeUnit
+
         return None if self.time_unit is None else TimeUnit(self.time_unit)
 
     def record(self) -> dict[str, str | int | float | bool | None]:
