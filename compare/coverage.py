@@ -12,7 +12,7 @@ LONG_GAP = 3.0
 SMALLEST_SAMPLE = 30
 """poses or other items that a figure must be over to be judged"""
 SMALLEST_COVERAGE = 0.5
-"""poses, or whatever a figure is taken over, and the share of the time that they have to cover, before it is judged"""
+"""share of the time that they must cover"""
 FEWEST_STRETCHES = 3
 """of errors of motions over a stretch of the path: of fewer, no statistic says more than a single one"""
 

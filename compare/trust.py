@@ -53,8 +53,8 @@ class TrustLimits:
     """share of frames whose observations had to be given up"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
     """share by which its cost is above that of the batch solution"""
-    batch_position: tuple[float, float] = (0.05, 1.0)
-    """m, RMSE of its positions from those of the batch solution"""
+    batch_position: tuple[float, float] = (0.1, 2.0)
+    """baselines of the rig, RMSE of its positions from those of the batch solution"""
     impossible_share: tuple[float, float] = (0.2, 0.5)
     """of the `offered` observations: those without a positive disparity"""
 
@@ -139,7 +139,8 @@ def _beside_batch(
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
-    verdict = max(_above(excess, limit.batch_cost), _above(rmse, limit.batch_position))
+    baselines = rmse / problem.sequence.camera.baseline
+    verdict = max(_above(excess, limit.batch_cost), _above(baselines, limit.batch_position))
     said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"
     return verdict, f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
 

@@ -286,7 +286,7 @@ def test_the_first_landmarks_that_all_come_at_once_do_not_throw_the_path(seed: i
 
 
 def test_no_landmark_enters_behind_a_camera_that_saw_it() -> None:
-    # Two views of a point ahead and a third whose pose is past it: the least cost in front of two is behind the third.
+    # Two views of a point, and a first one from a pose 3 m past it.
     problem = plain_problem(Scene(frames=3, n_points=1, sigma_pixel=0.0).sequence())
     truth = problem.sequence.truth
     assert truth is not None
@@ -295,8 +295,9 @@ def test_no_landmark_enters_behind_a_camera_that_saw_it() -> None:
     for i in range(3):
         waiting.add(0, i)
     path = truth.world_T_imu.copy()
-    depth = float((path[0] @ problem.sequence.imu_T_cam)[:3, 2] @ truth.landmarks[0])
-    path[2] = path[0]
-    path[2, :3, 3] += (depth + 20.0) * (path[0] @ problem.sequence.imu_T_cam)[:3, 2]
+    camera = path[2] @ problem.sequence.imu_T_cam
+    depth = float(camera[:3, 2] @ (truth.landmarks[0] - camera[:3, 3]))
+    path[0] = path[2]
+    path[0, :3, 3] += (depth + 3.0) * camera[:3, 2]
     assert waiting.enter([0], path) == []
     assert len(waiting.enter([0], truth.world_T_imu)) == 1
