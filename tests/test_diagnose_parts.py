@@ -162,7 +162,8 @@ def test_a_regression_ignores_a_fifth_of_outliers(seed: int) -> None:
     y[:80] += random.choice([-5.0, 5.0], size=(80, 3))
     fit = regress(y, X, np.array([10.0, 10.0]))
     assert np.abs(fit.theta - theta).max() < 6.0 * np.sqrt(np.diag(fit.covariance)).max()
-    assert (np.abs(fit.sigma / 0.1 - 1.0) < 0.6).all()
+    # The median of all is the 62.5 % quantile of the bulk: 1.4826 * 0.887 of its deviation.
+    assert (np.abs(fit.sigma / 0.1 - 1.315) < 0.35).all()
 
 
 def test_a_regression_pays_no_price_for_a_calibration_error_that_is_none() -> None:
