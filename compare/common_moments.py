@@ -1,4 +1,4 @@
-"""The moments that several estimates have in common: who is nearer can only be asked of these."""
+"""The moments that several estimates have in common: estimates are ranked over these."""
 
 from collections.abc import Mapping
 

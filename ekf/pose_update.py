@@ -89,11 +89,8 @@ def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weigh
     Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
     """
     H = innovation.jacobian.reshape(-1, 6)
-    gain = (
-        covariance
-        @ H.T
-        @ np.linalg.inv(H @ covariance @ H.T + np.diag((innovation.variance / weight[:, None]).reshape(-1)))
-    )
+    noise = np.diag((innovation.variance / weight[:, None]).reshape(-1))
+    gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + noise)
     return np.asarray((np.eye(6) - gain @ H) @ covariance, dtype=np.float64)
 
 
