@@ -44,7 +44,7 @@ mutants: install
 	$(call installed,--group mutants)
 	nice -n 10 $(BIN)/python -m benchmarks.mutants --per-module $(MUTANTS) --seed $(MUTANTS_SEED)
 
-# Are our own estimators as good as they were? `make test` asks it of fewer seeds (tests/test_check_ourselves.py), without
+# Are our own estimators as good as they were? `make test` asks it of fewer seeds (tests/reports/test_check_ourselves.py), without
 # the report. QUICK_CHECK=--update-baseline says that they are meant to differ.
 quick: install
 	$(BIN)/fgbaseline bench suites/quick.toml --out out/bench/quick

@@ -1,10 +1,10 @@
 """How fast the filters are, as ratios: `python -m benchmarks.filters 03.npz --runs 5`.
 
 The seconds are CPU time of this process with BLAS held to one thread, and every ratio is of two measurements that
-follow each other: other work on the machine slows both. The literal filter of tests/dense_filter.py, which inverts what
-the equations print inverted and multiplies matrices of 3M x 3M, would take an hour for a recording of a hundred
-seconds: each run times it on frames at random, on all that a frame asks for, and scales by the number of frames. What
-a frame costs it depends on how many observations there are, not on what they say.
+follow each other: other work on the machine slows both. The literal filter of tests/builders/dense_filter.py, which
+inverts what the equations print inverted and multiplies matrices of 3M x 3M, would take an hour for a recording of a
+hundred seconds: each run times it on frames at random, on all that a frame asks for, and scales by the number of
+frames. What a frame costs it depends on how many observations there are, not on what they say.
 """
 
 # ruff: noqa: E402
@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.measured import Row, row, table
 from fgbaseline import data, ekf
 from fgbaseline.data import Problem, Sequence
-from tests.dense_filter import DenseFilter
+from tests.builders.dense_filter import DenseFilter
 
 FEATURES = 1000
 """of the documented filter where it is held against the literal one"""

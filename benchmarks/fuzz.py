@@ -29,7 +29,7 @@ def fuzz(name: str, arguments: list[str]) -> None:
 
     with atheris.instrument_imports(include=["fgbaseline", "json", "tomllib", "zipfile"]):
         from fgbaseline.geometry import InputError
-        from tests.readers import readers
+        from tests.builders.readers import readers
 
     reader = readers()[name]
     scratch = Path(mkdtemp(prefix="fgbaseline-fuzz-", dir=MEMORY if MEMORY.is_dir() else None))
@@ -62,7 +62,7 @@ def _only_in(scratch: Path) -> Any:
 
 def run(name: str, seconds: int) -> dict[str, Any]:
     """One reader in a process of its own; gives the counts."""
-    from tests.readers import readers
+    from tests.builders.readers import readers
 
     corpus = OUT / name.replace(" ", "-")
     corpus.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ def main(seconds: int, chosen: str | None, only: str | None, libfuzzer: tuple[st
     if only is not None:
         fuzz(only, list(libfuzzer))
         return
-    from tests.readers import readers
+    from tests.builders.readers import readers
 
     names = list(readers()) if chosen is None else chosen.split(",")
     table = Table("reader", *(["inputs", "coverage", "peak MB", "slowest, s", "crash"]), box=None)

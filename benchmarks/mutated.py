@@ -2,7 +2,8 @@
 
     python -m benchmarks.mutated --cases 10000 --workers 2
 
-Case i is the same in every run: base, mutation (tests/mutations.py, in turn) and the mutation's chance come from i.
+Case i is the same in every run: base, mutation (tests/builders/mutations.py, in turn) and the mutation's chance come
+from i.
 Each command runs in a fork of a worker, may take a minute of a processor, and ends with 0, 1 or 2 and no traceback.
 A recording in wrong units may not pass `diagnose`. It may pass `check` only with the error of the good recording (it
 was repaired; `--strict` forbids that too). A mutated trajectory is refused or compared with the good one's errors.
@@ -19,7 +20,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from tests.mutated_files import Ended, case
+from tests.builders.mutated_files import Ended, case
 
 
 def cases(first: int, n: int, workers: int, drawing: bool) -> Iterator[tuple[int, Ended]]:

@@ -1,6 +1,6 @@
 """Every estimator on recordings that none was made for, `python -m benchmarks.reliability`: writes docs/reliability.md.
 
-The recordings, and what is promised of each cell, are those of tests/test_hostile.py.
+The recordings, and what is promised of each cell, are those of tests/estimators/test_hostile_recordings.py.
 """
 
 # ruff: noqa: E402
@@ -16,7 +16,7 @@ from pathlib import Path
 import click
 
 from fgbaseline.reports.comparison import Result, Run
-from tests.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
+from tests.builders.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
 
 from . import page
 

@@ -29,7 +29,7 @@ LONGEST = (
     "test_docs_site",
     "test_reproduce",
     "test_check_ourselves",
-    "test_hostile",
+    "test_hostile_recordings",
     "test_joint_ekf_consistency",
 )
 """files that take half a minute and more: where they are shared out whole, none of them may be the last that runs"""

@@ -1,6 +1,6 @@
 """Recordings with known truth: cars and hand-held rigs, what they see and what their sensors make of it.
 
-A simulated town lies among the real recordings; `pytest -s tests/test_simulate_likeness.py` prints:
+A simulated town lies among the real recordings; `pytest -s tests/data/test_simulate_likeness.py` prints:
 
                             observations a frame      frames a track            depth, m
                              mean    5 %   95 %   mean  25 %  50 %  75 %  95 %   5 %  25 %  50 %  75 %  95 %

@@ -1,0 +1,40 @@
+"""Figures that are written in no time: nine tenths of a run on a short recording are drawing them."""
+
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from fgbaseline.reports.comparing import figures as comparing
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures import drawing, layout, saving, sharing
+from fgbaseline.reports.figures.drawing import drawings
+
+
+def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
+    """For tests of something else: tests/reports/test_figures.py looks at figures."""
+    written, empty = Figure.savefig, {}
+    for form in ("png", "svg", "pdf"):
+        stream = BytesIO()
+        Figure(figsize=(0.1, 0.1)).savefig(stream, format=form)
+        empty[form] = stream.getvalue()
+
+    def savefig(figure: Figure, target: object, **options: Any) -> None:
+        if isinstance(target, BytesIO):
+            target.write(empty[options["format"]])
+        else:
+            written(figure, target, **options)  # type: ignore[arg-type]
+
+    def blank(run: Run) -> dict[str, Callable[[], Figure]]:
+        return dict.fromkeys(drawings(run), Figure)
+
+    patch.setattr(Figure, "savefig", savefig)
+    patch.setattr(saving, "_png", lambda _: empty["png"])
+    patch.setattr(layout, "fill_grid", lambda _: None)
+    patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+    patch.setattr(sharing, "drawings", blank)
+    for module in (sharing, drawing, comparing):
+        patch.setattr(module, "lay_out", lambda _: None)

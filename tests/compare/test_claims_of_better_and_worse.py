@@ -1,0 +1,182 @@
+"""Better and worse are claimed only where the paired bootstrap supports it: words, sign and significance together."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fgbaseline import compare
+from fgbaseline.geometry import FloatArray
+from fgbaseline.reports.bench.results import METRICS
+from fgbaseline.reports.bench.wording import _winner
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.page.accuracy_verdict import claimed, nearest_sentences, truth_sentences
+from fgbaseline.reports.page.numbers import number
+from fgbaseline.reports.page.table import main_table
+
+from ..builders.reported import FRAMES, answer, as_dict, run_of, scene
+from ..builders.synthetic import plain_problem
+
+NAMES = ("isam2", "ekf", "joint-ekf", "batch")
+
+
+@cache
+def plain_run() -> Run:
+    problem = plain_problem(scene())
+    return run_of(problem, *(answer(problem, name) for name in NAMES))
+
+
+def run_with(truth: dict[str, FloatArray], divergence: dict[str, FloatArray]) -> Run:
+    """A run whose position errors are these."""
+    run, results = plain_run(), {}
+    for name, result in run.results.items():
+        if name in truth:
+            travelled = np.linspace(0.0, 100.0, FRAMES)
+            tables = [
+                pd.DataFrame({"position": e, "rotation_deg": 0.0, "travelled": travelled})
+                for e in (truth[name], divergence[name])
+            ]
+            results[name] = replace(result, truth_aligned=tables[0], divergence=tables[1])
+    return replace(run, results=results)
+
+
+def rmse(errors: FloatArray) -> float:
+    return float(np.sqrt(np.nanmean(errors**2)))
+
+
+SERIES = st.builds(
+    lambda seed, level, spread, slope: np.abs(
+        level + slope * np.linspace(0.0, 1.0, FRAMES) + spread * np.random.default_rng(seed).normal(size=FRAMES)
+    ),
+    st.integers(0, 1000),
+    st.sampled_from([0.01, 1.0, 1.0 + 1e-6, 1.05, 1.5]),
+    st.sampled_from([0.0, 1e-5, 0.1, 0.5]),
+    st.sampled_from([0.0, 0.5]),
+)
+
+
+def names_after(sentence: str, start: str, end: str) -> list[str]:
+    part = sentence.partition(start)[2].partition(end)[0]
+    return [name for name in NAMES if f" {name} " in f" {part.replace(',', ' ').replace('.', ' ')} "]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(SERIES, min_size=2, max_size=3), st.lists(st.booleans(), min_size=3, max_size=3))
+def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list[bool]) -> None:
+    errors = {}
+    for name, values, hole in zip(NAMES, series, holes, strict=False):
+        errors[name] = values.copy()
+        if hole:
+            errors[name][40:] = np.nan
+    everywhere = ~np.any([np.isnan(e) for e in errors.values()], axis=0)
+    common = {name: e[everywhere] for name, e in errors.items()}
+    run = run_with(errors, errors)
+
+    worse = next((s for s in truth_sentences(run) if s.startswith("The reference is worse than")), "")
+    said = names_after(worse, "worse than", "here")
+    for name in errors.keys() - {"isam2"}:
+        larger, smaller = rmse(common["isam2"]), rmse(common[name])
+        d = compare.rmse_difference(common["isam2"], common[name])
+        assert (name in said) == (d.low > 0.0 and larger > smaller and number(larger) != number(smaller))
+
+    rivals = {name: e for name, e in errors.items() if name != "isam2"}
+    both = ~np.any([np.isnan(e) for e in rivals.values()], axis=0)
+    first = min(rivals, key=lambda name: rmse(rivals[name][both]))
+    (sentence,) = [s for s in nearest_sentences(run) if "minimum" not in s]
+    farther = names_after(sentence, "farther than", "$")
+    for name in rivals.keys() - {first}:
+        d = compare.rmse_difference(rivals[name][both], rivals[first][both])
+        figures = [number(rmse(rivals[who][both])) for who in (name, first)]
+        assert (name in farther) == (d.low > 0.0 and figures[0] != figures[1])
+    alone = set(farther) - {first} == rivals.keys() - {first} and len(rivals) > 1
+    assert sentence.startswith(f"Nearest to isam2 is {first}") == alone
+
+
+def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None:
+    d = compare.rmse_difference(np.full(100, 0.003984), np.full(100, 0.003976))
+    assert d.settled
+    assert not claimed(d, 0.003984, 0.003976)
+    errors = {"isam2": np.full(FRAMES, 0.003984), "ekf": np.full(FRAMES, 0.003976)}
+    said = truth_sentences(run_with(errors, errors))
+    assert said[1:] == ["The errors of ekf and isam2 agree to the digits printed: not ranked."]
+
+
+def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> None:
+    errors = {"isam2": np.full(FRAMES, 2.0), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 1.0)}
+    run = run_with(errors, {"isam2": np.zeros(FRAMES), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 0.01)})
+    assert not [s for s in truth_sentences(run) if "worse" in s or "settle" in s]
+    sentences = nearest_sentences(run)
+    assert sentences[0].startswith("ekf is 3.00 m")
+    assert "batch, another minimum of the same graph, is 0.0100 m from isam2 (RMSE)." in sentences
+
+
+def test_figures_that_read_the_same_are_best_together_and_the_same_graph_is_not_nearest() -> None:
+    problem = plain_problem(scene())
+    drifts = {"isam2": 1.0, "ekf": 3.0, "joint-ekf": 3.0 + 1e-6, "batch": 1.01}
+    run = run_of(problem, *(answer(problem, name, (0.0, drift, 0.0)) for name, drift in drifts.items()))
+    document = as_dict(run)["estimators"]
+    table = main_table(run, document)
+    at = [i for i, cell in enumerate(table.headings) if cell.text == "RMSE, m"][1]
+    assert {row.name: row.cells[at].best for row in table.rows if row.name != "isam2"} == {
+        "ekf": True,
+        "joint-ekf": True,
+        "batch": False,
+    }
+
+
+ATE = next(metric for metric in METRICS if metric.name == "ate")
+
+
+def ranked(**columns: list[float]) -> pd.DataFrame:
+    return compare.ranking(pd.DataFrame(columns)).reset_index()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 6), st.sampled_from([0.0, 1e-6, 0.05, 1.0]))
+def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, runs: int, apart: float) -> None:
+    random = np.random.default_rng(seed)
+    table = pd.DataFrame(1.0 + 0.1 * random.random((runs, 3)), columns=["a", "b", "c"])
+    table["b"] += apart
+    table["c"] = table["c"].where(random.random(runs) < 0.8)
+    sentence = _winner("drive", compare.ranking(table).reset_index(), ATE, frozenset())
+    whole = [name for name in table if table[name].notna().all()]
+    means = table[whole].mean()
+    first = str(means.idxmin())
+    claims = "the least" in sentence
+    separated = []
+    for name in whole:
+        interval = compare.mean_of((table[name] - table[first]).to_numpy())
+        if name != first and interval.low > 0.0 and number(float(means[name])) != number(float(means[first])):
+            separated.append(name)
+    assert claims == (len(whole) > 1 and len(separated) == len(whole) - 1 and runs > 1)
+    if claims:
+        assert f"{first} has the least" in sentence
+    larger = sentence.partition("larger, by the paired interval: ")[2].partition(";")[0]
+    assert [name for name in whole if f"{name} " in larger] == (separated if runs > 1 else [])
+
+
+def test_one_run_ranks_nobody_and_missing_answers_are_named() -> None:
+    assert "one run does not rank them" in _winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
+    said = _winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
+    assert "a has the least" in said
+    assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a there)" in said
+    same = _winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
+    assert "batch" not in same
+
+
+@pytest.mark.parametrize("names", [("a", "b"), ("a", "b", "c")])
+def test_a_paired_ranking_is_in_the_order_of_the_common_moments(names: tuple[str, ...]) -> None:
+    random = np.random.default_rng(3)
+    errors = {name: random.random(50) for name in names}
+    errors["a"][:10] = np.nan
+    found = compare.paired_ranking(errors)
+    assert found.moments == 40
+    assert list(found.rmse.values()) == sorted(found.rmse.values())
+    assert all(d.value >= 0.0 for d in found.behind.values())
+    assert found.rmse["b"] == pytest.approx(rmse(errors["b"][10:]))
+    nothing = compare.paired_ranking({"a": [np.nan, 1.0], "b": [1.0, np.nan]})
+    assert (nothing.rmse, nothing.moments) == ({}, 0)

@@ -1,0 +1,277 @@
+"""A trajectory gives the same metrics whatever program wrote it, or a refusal that names the cause."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fgbaseline.data.formats import write_kitti, write_trajectory_npz
+from fgbaseline.geometry import InputError, se3
+from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparing.comparison import Comparison
+
+from ..builders.trajectory_writers import VARIANTS, Path3D, frames, kitti, rows, tum
+
+EVERY = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+RATES = (5, 10, 20, 200)
+"""Hz"""
+STARTS = (0, 17 * 10**9, 55_631 * 10**9, 1_403_636_579 * 10**9)
+"""ns: the clock of a recorder, of a computer that runs since then, and since 1970"""
+
+
+def flight(seed: int, n: int = 60, rate: int = 10, start: int = 0) -> Path3D:
+    """A body that turns about all axes as it flies."""
+    random = np.random.default_rng(seed)
+    steps = np.concatenate([[1.0, 0.0, 0.0], np.zeros(3)]) * 2.0 / rate + random.normal(size=(n - 1, 6)) * 0.05
+    steps[:, 3:] += 0.3 * np.sin(np.arange(n - 1)[:, None] / 7.0 + random.uniform(0.0, 6.0, 3))
+    poses = se3.compose(se3.exp(steps), se3.exp(random.normal(size=6)))
+    return Path3D(tuple(start + k * 10**9 // rate for k in range(n)), poses)
+
+
+def astray(path: Path3D, seed: int) -> Path3D:
+    """The path in another world, with errors that grow."""
+    random = np.random.default_rng(seed + 1)
+    drift = np.cumsum(random.normal(size=(len(path.ns), 6)) * np.repeat([0.01, 0.002], 3), axis=0)
+    return Path3D(path.ns, se3.exp(random.normal(size=6)) @ path.poses @ se3.exp(drift))
+
+
+def figures(comparison: Comparison, *, oriented: bool = True) -> dict[str, float]:
+    """The metrics, those of positions only where the file has no more."""
+    table = comparison.metrics.set_index("metric")["value"]
+    kept = ("translation.rmse", "translation.max", "pairing.pairs", "shares.heading")
+    more = ("rotation_deg.rmse", "relative.1 s.translation.rmse", "drift.translation", "drift.rotation per second")
+    chosen = {
+        name: float(table[name]) for name in table.index if name.startswith(kept if not oriented else kept + more)
+    }
+    assert len(chosen) >= 3
+    return chosen
+
+
+def compared(*files: Path | str, **options: Any) -> Comparison | str:
+    """The comparison, or why there is none."""
+    try:
+        return compare(*files, **options)
+    except InputError as error:
+        return str(error)
+
+
+@EVERY
+@given(
+    variant=st.sampled_from(sorted(VARIANTS)),
+    seed=st.integers(0, 2**20),
+    rate=st.sampled_from(RATES),
+    start=st.sampled_from(STARTS),
+    of_reference=st.booleans(),
+)
+def test_every_variant_gives_the_same_metrics_or_names_what_is_in_doubt(
+    tmp_path: Path, variant: str, seed: int, rate: int, start: int, of_reference: bool
+) -> None:
+    made = VARIANTS[variant]
+    truth = flight(seed, rate=rate, start=start)
+    estimate = astray(truth, seed)
+    plain = [tmp_path / "a.tum", tmp_path / "b.tum"]
+    for file, path in zip(plain, (truth, estimate), strict=True):
+        file.write_text("# timestamp [s] tx ty tz qx qy qz qw\n" + tum(path))
+    other = tmp_path / f"other{made.suffix}"
+    other.write_bytes(made.write(truth if of_reference else estimate))
+    given_files = (other, plain[1]) if of_reference else (plain[0], other)
+    expected = figures(compare(plain[0], f"it={plain[1]}"), oriented=made.oriented)
+    result = compare(given_files[0], f"it={given_files[1]}", **made.options)
+    assert figures(result, oriented=made.oriented) == pytest.approx(expected, rel=1e-5, abs=1e-7)
+    if not made.oriented:
+        assert "rotation_deg" in result.results["it"].notes
+        assert not result.results["it"].relative
+        assert any("need orientations and are left out" in sentence for sentence in result.verdict)
+
+
+@EVERY
+@given(
+    unit=st.sampled_from(["ms", "us", "ns"]),
+    seed=st.integers(0, 2**20),
+    rate=st.sampled_from(RATES),
+    start=st.sampled_from(STARTS),
+    asked=st.booleans(),
+)
+def test_two_files_in_one_unit_give_the_same_metrics_or_the_unit_is_asked_for(
+    tmp_path: Path, unit: str, seed: int, rate: int, start: int, asked: bool
+) -> None:
+    truth = flight(seed, rate=rate, start=start)
+    estimate = astray(truth, seed)
+    for name, path in (("a", truth), ("b", estimate)):
+        (tmp_path / f"{name}.s.tum").write_text("# timestamp [s] tx ty tz qx qy qz qw\n" + tum(path))
+        (tmp_path / f"{name}.tum").write_text(tum(path, unit))
+    expected = figures(compare(tmp_path / "a.s.tum", f"it={tmp_path / 'b.s.tum'}"))
+    files = (tmp_path / "a.tum", f"it={tmp_path / 'b.tum'}")
+    result = compared(*files, time_unit=unit if asked else None)
+    if isinstance(result, str):
+        assert not asked
+        assert "give --time-unit" in result
+        return
+    assert figures(result) == pytest.approx(expected, rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("seconds", [7, 10, 60])
+def test_slow_keyframes_beside_a_fast_truth_are_in_seconds(tmp_path: Path, seconds: int) -> None:
+    truth = flight(1, n=1201, rate=1)
+    (tmp_path / "truth.tum").write_text(tum(truth))
+    keyframes = Path3D(truth.ns[::seconds], truth.poses[::seconds])
+    (tmp_path / "keys.tum").write_text(tum(keyframes).replace(".000000000", ""))
+    result = compare(tmp_path / "truth.tum", tmp_path / "keys.tum", align="none")
+    assert len(result.results["keys"].matched) == len(keyframes.ns)
+    assert float(result.table["absolute error: largest, m"]["keys"]) < 1e-9
+
+
+def test_frames_pair_by_their_numbers_and_files_of_other_lengths_are_refused(tmp_path: Path) -> None:
+    truth = flight(3, n=100)
+    estimate = astray(truth, 3)
+    write_kitti(tmp_path / "truth.txt", truth.poses)
+    write_kitti(tmp_path / "whole.txt", estimate.poses)
+    part = Path3D(estimate.ns[::5], estimate.poses[::5])
+    write_kitti(tmp_path / "part.txt", part.poses)
+    (tmp_path / "numbered.txt").write_text(rows([str(5 * k) for k in range(20)], kitti(part)))
+    (tmp_path / "all.txt").write_text(frames(estimate))
+    for name, t in (("times", truth.t), ("part_times", part.t)):
+        (tmp_path / f"{name}.txt").write_text("\n".join(map(repr, t.tolist())))
+    with pytest.raises(InputError, match=r"part\.txt: it has 20 poses and .*truth\.txt has 100; .*13 columns"):
+        compare(tmp_path / "truth.txt", tmp_path / "part.txt")
+    with pytest.raises(InputError, match=r"part\.txt: it has 20 poses but there are 100 time stamps"):
+        compare(tmp_path / "truth.txt", tmp_path / "part.txt", times=tmp_path / "times.txt")
+    by_number = compare(tmp_path / "truth.txt", f"it={tmp_path / 'numbered.txt'}")
+    times = [tmp_path / "times.txt", tmp_path / "part_times.txt"]
+    by_time = compare(tmp_path / "truth.txt", f"it={tmp_path / 'part.txt'}", times=times)
+    rmse = "absolute error: RMSE, m"
+    assert by_number.table[rmse]["it"] == pytest.approx(by_time.table[rmse]["it"], rel=1e-12)
+    whole = compare(tmp_path / "truth.txt", f"it={tmp_path / 'whole.txt'}")
+    numbered = compare(tmp_path / "truth.txt", f"it={tmp_path / 'all.txt'}")
+    assert numbered.table[rmse]["it"] == pytest.approx(whole.table[rmse]["it"], rel=1e-12)
+    assert "paired (by frame;" in whole.caption
+
+
+def test_up_of_a_camera_is_that_of_its_format_and_the_caption_names_it(tmp_path: Path) -> None:
+    """A drive in a camera's frame, y down and z forward, whose heading drifts; and the same with z up."""
+    n = 200
+    turn = np.tile(se3.exp([0.0, 0.0, 1.0, 0.0, 0.02, 0.0]), (n - 1, 1, 1))
+    truth = se3.compose(turn)
+    drifting = se3.compose(turn @ se3.exp([0.0, 0.0, 0.0, 0.0, 1e-3, 0.0]))
+    level_T_camera = np.eye(4)
+    level_T_camera[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    for name, poses in (("truth", truth), ("drifting", drifting)):
+        write_kitti(tmp_path / f"{name}.txt", poses)
+        write_kitti(tmp_path / f"{name}_level.txt", level_T_camera @ poses @ se3.inverse(level_T_camera))
+    camera = compare(tmp_path / "truth.txt", f"it={tmp_path / 'drifting.txt'}", align="yaw")
+    level = compare(tmp_path / "truth_level.txt", f"it={tmp_path / 'drifting_level.txt'}", align="yaw")
+    assert figures(camera)["translation.rmse"] == pytest.approx(figures(level)["translation.rmse"])
+    assert "Up is (0, -1, 0) in the world of truth (KITTI's camera frame)" in camera.caption
+    assert "Up is (0, 0, 1) in the world of truth_level (by default)" in level.caption
+    asked = compare(tmp_path / "truth.txt", f"it={tmp_path / 'drifting.txt'}", align="yaw", up=(0.0, 0.0, 1.0))
+    assert "Up is (0, 0, 1) in the world of truth (--up)" in asked.caption
+    assert figures(asked)["translation.rmse"] > 2.0 * figures(camera)["translation.rmse"]
+
+
+def test_a_prism_is_compared_by_a_lever_arm_that_the_orientations_of_the_estimate_carry(tmp_path: Path) -> None:
+    truth = flight(4)
+    arm = np.array([0.3, -0.2, 1.1])
+    prism = truth.poses[:, :3, :3] @ arm + truth.poses[:, :3, 3]
+    lines = [f"{stamp} {x!r} {y!r} {z!r}" for stamp, (x, y, z) in zip(truth.stamps("s"), prism.tolist(), strict=True)]
+    (tmp_path / "prism.txt").write_text("\n".join(lines))
+    (tmp_path / "imu.tum").write_text(tum(truth))
+    imu_T_prism = np.eye(4)
+    imu_T_prism[:3, 3] = arm
+    write_kitti(tmp_path / "imu_T_prism.txt", imu_T_prism[None])
+    largest = "absolute error: largest, m"
+    assert compare(tmp_path / "prism.txt", tmp_path / "imu.tum").table[largest]["imu"] > 0.1
+    given_arm = compare(tmp_path / "prism.txt", tmp_path / "imu.tum", lever_arm=tuple(arm.tolist()))
+    as_body = compare(
+        tmp_path / "prism.txt", tmp_path / "imu.tum", reference_body="camera", extrinsic=tmp_path / "imu_T_prism.txt"
+    )
+    for result in (given_arm, as_body):
+        assert result.table[largest]["imu"] < 1e-9
+        assert any("moved by the lever arm (0.3, -0.2, 1.1) m" in sentence for sentence in result.verdict)
+    with pytest.raises(InputError, match=r"prism\.txt: it has no orientations"):
+        compare(tmp_path / "imu.tum", tmp_path / "prism.txt", lever_arm=(0.0, 0.0, 1.0))
+
+
+def test_a_constant_rotation_between_the_bodies_is_reported_and_removed(tmp_path: Path) -> None:
+    truth = flight(5)
+    estimate = astray(truth, 5)
+    turned = Path3D(estimate.ns, estimate.poses @ se3.exp([0.0, 0.0, 0.0, *(np.deg2rad(120.0) / 3**0.5 * np.ones(3))]))
+    for name, path in (("truth", truth), ("same", estimate), ("turned", turned)):
+        (tmp_path / f"{name}.tum").write_text(tum(path))
+    reported = compare(tmp_path / "truth.tum", tmp_path / "turned.tum")
+    assert any("turned: its body is turned by a constant 1" in s and "--align-body" in s for s in reported.verdict)
+    removed = figures(compare(tmp_path / "truth.tum", f"it={tmp_path / 'turned.tum'}", align_body=True))
+    expected = figures(compare(tmp_path / "truth.tum", f"it={tmp_path / 'same.tum'}", align_body=True))
+    assert removed == pytest.approx(expected, rel=1e-3, abs=1e-4)
+    alone = compare(tmp_path / "truth.tum", tmp_path / "same.tum")
+    assert not any("turned by a constant" in sentence for sentence in alone.verdict)
+
+
+def test_inverse_poses_and_conjugated_quaternions_are_recognized(tmp_path: Path) -> None:
+    truth = flight(6, n=120)
+    estimate = astray(truth, 6)
+    inverse = Path3D(estimate.ns, se3.inverse(estimate.poses))
+    conjugated = estimate.poses.copy()
+    conjugated[:, :3, :3] = np.swapaxes(estimate.poses[:, :3, :3], 1, 2)
+    for name, path in (("truth", truth), ("inverse", inverse), ("jpl", Path3D(estimate.ns, conjugated))):
+        (tmp_path / f"{name}.tum").write_text("# timestamp tx ty tz qx qy qz qw\n" + tum(path))
+    said = " ".join(compare(tmp_path / "truth.tum", tmp_path / "inverse.tum").verdict)
+    assert "inverse: the inverses of its poses fit truth to" in said
+    said = " ".join(compare(tmp_path / "truth.tum", tmp_path / "jpl.tum").verdict)
+    assert "jpl: its orientations fit once transposed" in said
+
+
+def test_a_straight_path_may_have_one_orientation_throughout(tmp_path: Path) -> None:
+    straight = Path3D(tuple(k * 10**8 for k in range(60)), np.tile(np.eye(4), (60, 1, 1)))
+    straight.poses[:, 0, 3] = np.arange(60.0)
+    (tmp_path / "truth.tum").write_text(tum(straight))
+    (tmp_path / "mine.tum").write_text(tum(astray(straight, 1)))
+    result = compare(tmp_path / "truth.tum", tmp_path / "mine.tum")
+    assert result.reference.trajectory.oriented
+    assert "rotation_deg" not in result.results["mine"].notes
+
+
+DAMAGED = {
+    "six figures": (lambda p: rows([f"{s / 1e9:.6g}" for s in p.ns], p.numbers()), "lost digits: .* significant"),
+    "float32": (
+        lambda p: rows([repr(float(np.float32(s / 1e9))) for s in p.ns], p.numbers()), "lost digits: they are float32"
+    ),
+    "whole seconds": (lambda p: rows([str(s // 10**9) for s in p.ns], p.numbers()), "lost digits: 60 poses share 6 "),
+    "beyond 2^53": (
+        lambda p: rows([str(int(float(2**60 + 100 * k))) for k in range(60)], p.numbers()), "integers beyond 2.53"
+    ),
+    "keys of GTSAM": (
+        lambda p: rows([str((ord("x") << 56) + k) for k in range(len(p.ns))], p.numbers()), r"GTSAM keys \(x0 is"
+    ),
+    "decimal commas": (lambda p: tum(p).replace(".", ","), "line 1: .* is written with a decimal comma"),
+    "decimal commas between semicolons": (lambda p: tum(p, separator=";").replace(".", ","), "with a decimal comma"),
+    "a word": (lambda p: tum(p).replace(p.numbers()[7][0], "1.2x4"), "line 8: '1.2x4' is no finite number"),
+    "a line cut short": (lambda p: tum(p)[: tum(p).rindex(" ")], "line 60: expected 8 numbers, got 7"),
+    "time that runs backward": (
+        lambda p: "\n".join(reversed(tum(p).splitlines())), r"line 2: the time stamp .* is not after .* \(line 1\)"
+    ),
+    "a stray zero": (lambda p: tum(p).replace(p.stamps("s")[9], "0.0"), "line 10: the time stamp 0.0 is not after"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_damage_is_refused_by_its_cause(tmp_path: Path, case: str) -> None:
+    write, sentence = DAMAGED[case]
+    truth = flight(7, start=1_403_636_579 * 10**9)
+    (tmp_path / "truth.tum").write_text(tum(truth))
+    (tmp_path / "other.txt").write_text(write(truth))
+    with pytest.raises(InputError, match=sentence) as raised:
+        compare(tmp_path / "truth.tum", tmp_path / "other.txt")
+    assert str(raised.value).startswith(f"{tmp_path / 'other.txt'}: ")
+    assert "\n" not in str(raised.value)
+
+
+def test_an_npz_in_nanoseconds_is_the_same_trajectory(tmp_path: Path) -> None:
+    truth = flight(8, start=1_403_636_579 * 10**9)
+    write_trajectory_npz(tmp_path / "truth.npz", truth.t, truth.poses)
+    np.savez(tmp_path / "ns.npz", t=np.array(truth.ns), world_T_body=truth.poses)
+    result = compare(tmp_path / "truth.npz", tmp_path / "ns.npz", align="none")
+    assert result.table["absolute error: largest, m"]["ns"] < 1e-9
+    assert any("divided by 1,000,000,000" in sentence for sentence in result.verdict)

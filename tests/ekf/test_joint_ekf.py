@@ -1,0 +1,483 @@
+"""What the joint filter promises: covariances, what it rejects and says, and what it leaves alone."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from fgbaseline import data, ekf
+from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
+from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
+from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
+from fgbaseline.ekf.screening import screened
+from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
+
+from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
+
+SCENE = Scene().sequence()
+EVERY_WAY = [JointSettings(c, way) for c in Coordinates for way in Linearisation]
+
+
+def random_pose(seed: int) -> FloatArray:
+    return se3.exp(np.random.default_rng(seed).normal(size=6))
+
+
+def assert_covariances(covariances: FloatArray) -> None:
+    """Symmetric to the last digit; scaled to unit variances, positive to rounding."""
+    np.testing.assert_array_equal(covariances, np.swapaxes(covariances, 1, 2))
+    unit = 1.0 / np.sqrt(np.einsum("nii->ni", covariances))
+    assert np.linalg.eigvalsh(covariances * unit[:, :, None] * unit[:, None, :]).min() > -1e-9
+
+
+# The pieces
+
+
+@given(st.integers(0, 10_000), st.sampled_from(Coordinates))
+def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: Coordinates) -> None:
+    random = np.random.default_rng(seed)
+    camera, T = SCENE.camera, random_pose(seed)
+    rows = np.column_stack([random.uniform(100, 900, 4), random.uniform(50, 90, 4), random.uniform(50, 300, 4)])
+    rows[:, 1] = rows[:, 0] - random.uniform(2, 60, 4)
+    world_T_cam = T @ SCENE.imu_T_cam
+    charts = np.tile(chart(coordinates, world_T_cam), (4, 1, 1))
+    xi = coordinates_of(charts, back_projected(camera, rows) @ world_T_cam.T)
+    cam_T_imu = se3.inverse(SCENE.imu_T_cam)
+
+    def predicted(delta: FloatArray, step: FloatArray) -> FloatArray:
+        return predict(camera, cam_T_imu, T @ se3.exp(delta), homogeneous(charts, xi + step)).pixel
+
+    np.testing.assert_allclose(predicted(np.zeros(6), np.zeros(3)), rows, rtol=1e-9)
+    seen = predict(camera, cam_T_imu, T, homogeneous(charts, xi))
+    h = 1e-6
+    by_pose = [(predicted(h * e, np.zeros(3)) - predicted(-h * e, np.zeros(3))) / (2 * h) for e in np.eye(6)]
+    np.testing.assert_allclose(seen.by_pose(), np.stack(by_pose, axis=2), rtol=1e-5, atol=1e-3)
+    unit = np.abs(xi).min() * h
+    by_xi = [(predicted(np.zeros(6), unit * e) - predicted(np.zeros(6), -unit * e)) / (2 * unit) for e in np.eye(3)]
+    analytic = seen.by_point() @ charts[:, :, :3]
+    np.testing.assert_allclose(analytic, np.stack(by_xi, axis=2), rtol=1e-4, atol=1e-4 * np.abs(analytic).max())
+
+
+@given(st.integers(0, 10_000))
+def test_three_rows_say_what_four_say(seed: int) -> None:
+    # The gain on (uL, uR, (vL + vR) / 2) against that on (uL, vL, uR, vR), the textbook's way.
+    random = np.random.default_rng(seed)
+    n, size = 4, 6 + 3 * 5
+    half = random.normal(size=(size, size))
+    P, V = half @ half.T, 0.7
+    slot = random.permutation(5)[:n]
+    three = StackedJacobian(slot, random.normal(size=(n, 3, 6)), random.normal(size=(n, 3, 3)))
+    residual = random.normal(size=(n, 4))
+    H = np.zeros((n, 4, size))
+    for i, j in enumerate(slot):
+        uL, uR, v = 0, 1, 2
+        for row, source in enumerate((uL, v, uR, v)):
+            H[i, row, :6] = three.by_pose[i, source]
+            H[i, row, 6 + 3 * j : 9 + 3 * j] = three.by_landmark[i, source]
+    H = H.reshape(4 * n, size)
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V * np.eye(4 * n))
+    updated = P.copy()
+    innovation = Innovation.of(three, measured_rows(residual), updated)
+    delta = correct(innovation, innovation.factorised(V * ROW_VARIANCE), updated)
+    np.testing.assert_allclose(delta, K @ residual.reshape(-1), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(updated, (np.eye(size) - K @ H) @ P, rtol=1e-6, atol=1e-9 * np.abs(P).max())
+    np.testing.assert_array_equal(updated, updated.T)
+
+
+def test_an_update_with_what_is_no_covariance_is_refused_and_changes_nothing() -> None:
+    P = -np.eye(9)
+    before = P.copy()
+    H = StackedJacobian(np.array([0]), np.ones((1, 3, 6)), np.eye(3)[None])
+    innovation = Innovation.of(H, np.ones((1, 3)), P)
+    with pytest.raises(NotPositiveDefiniteError):
+        correct(innovation, innovation.factorised(np.ones((1, 3))), P)
+    np.testing.assert_array_equal(P, before)
+
+
+@given(st.integers(0, 10_000), st.sampled_from(Coordinates))
+def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: Coordinates) -> None:
+    random = np.random.default_rng(seed)
+    T = random_pose(seed)
+    points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)])
+    world_T_cam = T @ SCENE.imu_T_cam
+    charts = np.tile(chart(coordinates, world_T_cam @ se3.exp(0.1 * random.normal(size=6))), (6, 1, 1))
+    xi = coordinates_of(charts, points @ world_T_cam.T)
+    seen = predict(SCENE.camera, se3.inverse(SCENE.imu_T_cam), T, homogeneous(charts, xi))
+    nu = moved_by(generators(charts), xi)
+    moved = seen.by_pose() @ se3.adjoint(se3.inverse(T)) + seen.by_point() @ charts[:, :, :3] @ nu
+    assert np.abs(moved).max() < 1e-9 * np.abs(seen.by_pose()).max()
+    # and nu is what the name says
+    g = 1e-6 * random.normal(size=6)
+    there = coordinates_of(charts, homogeneous(charts, xi) @ se3.exp(g).T)
+    np.testing.assert_allclose(there - xi, nu @ g, atol=1e-9 * max(1.0, np.abs(nu).max()))
+
+
+@given(st.integers(0, 10_000))
+def test_world_points_come_out_of_their_charts_with_the_right_spread(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    C = random_pose(seed)
+    points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)]) @ C.T
+    charts = np.tile(chart(Coordinates.INVERSE_DEPTH, C), (6, 1, 1))
+    xi = coordinates_of(charts, points)
+    found = world_points(charts, xi, np.tile(1e-12 * np.eye(3), (6, 1, 1)))
+    np.testing.assert_allclose(found.position, points[:, :3], rtol=1e-9, atol=1e-9)
+    assert found.in_sight.all()
+    steps = 1e-6 * np.eye(3)
+    J = np.stack([(homogeneous(charts, xi + e) - homogeneous(charts, xi - e)) / 2e-6 for e in steps], axis=2)
+    X = homogeneous(charts, xi)
+    by_xi = (J[:, :3] - X[:, :3, None] / X[:, 3:, None] * J[:, 3:]) / X[:, 3, None, None]
+    expected = 1e-12 * by_xi @ np.swapaxes(by_xi, 1, 2)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-5, atol=1e-9 * expected.max())
+
+
+# The filter
+
+
+@pytest.mark.parametrize("coordinates", Coordinates)
+def test_a_landmark_without_prior_enters_as_with_a_prior_that_says_nothing(coordinates: Coordinates) -> None:
+    o = SCENE.observations
+    two = plain_problem(replace(SCENE, observations=o.select((o.frame < 2) & (o.landmark < 4))))
+    plain = ekf.joint_ekf(two, settings=JointSettings(coordinates))
+    # At its back-projection, where it is linearised the same, but with 1 km of doubt.
+    world_T_cam = two.initial_pose @ SCENE.imu_T_cam
+    first = measured_rows(two.observations().pixel[:4])
+    X = back_projected(SCENE.camera, first) @ world_T_cam.T
+    prior = data.LandmarkPrior(np.zeros((len(two.features), 3)), 1e6 * np.eye(3))
+    prior.mean[:4] = X[:, :3] / X[:, 3:]
+    vague = ekf.joint_ekf(replace(two, landmark_prior=prior), settings=JointSettings(coordinates))
+    assert plain.covariance is not None
+    assert vague.covariance is not None
+    np.testing.assert_allclose(vague.world_T_imu[0], plain.world_T_imu[0], atol=1e-9)
+    np.testing.assert_allclose(vague.covariance[0], plain.covariance[0], rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(vague.world_T_imu[1], plain.world_T_imu[1], atol=1e-3)
+    np.testing.assert_allclose(np.diagonal(vague.covariance[1]), np.diagonal(plain.covariance[1]), rtol=2e-2)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10_000), st.sampled_from(["town", "loop", "handheld"]), st.sampled_from(EVERY_WAY))
+def test_covariances_are_covariances(seed: int, path: str, how: JointSettings) -> None:
+    problem = matched(drive(path, seconds=3.0, features_per_frame=15.0, seed=seed, wrong=0.05))
+    estimate = ekf.joint_ekf(problem, settings=how)
+    assert estimate.covariance is not None
+    assert estimate.landmarks.covariance is not None
+    assert not estimate.covariance[0].any()
+    assert_covariances(estimate.covariance[1:])
+    assert_covariances(estimate.landmarks.covariance)
+
+
+@pytest.mark.parametrize("how", EVERY_WAY, ids=lambda how: f"{how.coordinates}-{how.linearisation}")
+def test_where_the_world_has_its_origin_makes_no_difference(how: JointSettings) -> None:
+    problem = replace(plain_problem(SCENE), kernel=HuberKernel(1.5))
+    G = se3.exp([50.0, -20.0, 7.0, 0.5, -1.0, 2.0])
+    here = ekf.joint_ekf(problem, settings=how)
+    there = ekf.joint_ekf(replace(problem, initial_pose=G), settings=how)
+    np.testing.assert_allclose(there.world_T_imu, G @ here.world_T_imu, atol=1e-8)
+    np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-10)
+    np.testing.assert_allclose(there.landmarks.position, se3.transform(G, here.landmarks.position), atol=1e-6)
+
+
+@pytest.mark.parametrize("coordinates", Coordinates)
+def test_doubt_about_where_the_world_is_moves_nothing_unless_linearised_by_the_textbook(
+    coordinates: Coordinates,
+) -> None:
+    problem = replace(matched(drive("town", seconds=5.0, features_per_frame=20.0)), kernel=None)
+    doubt = replace(problem, initial_covariance=np.diag(np.repeat([1.0, 0.1], 3)))
+    apart = {}
+    for how in Linearisation:
+        sure, unsure = (ekf.joint_ekf(p, settings=JointSettings(coordinates, how)) for p in (problem, doubt))
+        apart[how] = np.abs(sure.world_T_imu - unsure.world_T_imu).max()
+    assert apart[Linearisation.INVARIANT] < 1e-6
+    assert apart[Linearisation.FIRST_ESTIMATE] < 1e-6
+    assert apart[Linearisation.TEXTBOOK] > 1e-3
+
+
+def test_a_frame_without_observations_is_a_prediction() -> None:
+    o = SCENE.observations
+    problem = plain_problem(replace(SCENE, observations=o.select(o.frame != 6)))
+    estimate = ekf.joint_ekf(problem)
+    expected = estimate.world_T_imu[5] @ se3.exp(problem.increment[5])
+    np.testing.assert_allclose(estimate.world_T_imu[6], expected, rtol=0, atol=1e-14)
+    assert estimate.status is Status.OK
+
+
+def test_without_observations_there_is_no_filter() -> None:
+    problem = matched(replace(drive(), observations=Observations.none()))
+    estimate = ekf.joint_ekf(problem)
+    assert estimate.status is Status.FAILED
+    assert estimate.reason == "no observations"
+    assert np.isnan(estimate.world_T_imu).all()
+    assert not estimate.used.any()
+
+
+def garbled(share: float, frames: range, seed: int = 0) -> tuple[Problem, np.ndarray]:
+    """A drive, and which of its observations in the given frames are tens of pixels off; the mask does not know."""
+    sequence = drive("town", seconds=10.0, features_per_frame=40.0)
+    o, random = sequence.observations, np.random.default_rng(seed)
+    wrong = np.isin(o.frame, np.array(frames)) & (random.random(len(o)) < share)
+    pixel = o.pixel.copy()
+    pixel[wrong] += random.uniform(20.0, 100.0, (wrong.sum(), 4)) * random.choice([-1.0, 1.0], (wrong.sum(), 4))
+    problem = matched(sequence)
+    return replace(problem, sequence=with_pixels(sequence, pixel)), wrong[problem.mask]
+
+
+def test_a_gate_rejects_wrong_matches_and_counts_them() -> None:
+    problem, wrong = garbled(0.1, range(20, 80))
+    gated = ekf.joint_ekf(problem)
+    rejected = ~gated.used[problem.mask]
+    first = np.zeros(len(wrong), dtype=np.bool_)
+    first[np.unique(problem.observations().landmark, return_index=True)[1]] = True
+    # A landmark whose first match is wrong starts in the wrong place, and disagrees with all that follow.
+    landmark = problem.observations().landmark
+    misplaced = np.isin(landmark, landmark[wrong & first])
+    assert rejected[wrong & ~first & ~misplaced].mean() > 0.95
+    assert rejected[~wrong & ~first & ~misplaced].mean() < 0.02
+    told = Counter[str]()
+    for event in gated.events:
+        if event.landmark is None:
+            told[event.kind] += int(event.reason.split(" of ")[0])
+    assert set(told) == {"outside the gate", "behind the camera"}
+    assert told["outside the gate"] > 0.75 * told.total()
+    assert told.total() == rejected.sum()
+    # What is rejected does not pull; the kernel alone lets 60 px pull as hard as 2.5 sigma, frame after frame.
+    weighted = ekf.joint_ekf_ungated(problem)
+    errors = [np.sqrt(np.mean(position_errors(e, problem.sequence) ** 2)) for e in (gated, weighted)]
+    assert errors[0] < 0.1
+    assert errors[0] < 0.1 * errors[1]
+
+
+@pytest.mark.parametrize("kernel", [HuberKernel(), None])
+def test_a_frame_of_garbage_costs_that_frame_and_not_the_filter(kernel: HuberKernel | None) -> None:
+    clean = replace(matched(drive("town", seconds=10.0, features_per_frame=40.0)), kernel=kernel)
+    problem, _ = garbled(0.9, range(50, 51))
+    problem = replace(problem, kernel=kernel)
+    estimate = ekf.joint_ekf_ungated(problem)
+    np.testing.assert_array_equal(~estimate.used[problem.mask], problem.observations().frame == 50)
+    assert estimate.status is Status.RECOVERED
+    assert "1 of 100 frames, first at frame 50" in estimate.reason
+    (event,) = (event for event in estimate.events if event.kind == "frame disagrees")
+    assert event.frame == 50
+    ours, undisturbed = (position_errors(e, clean.sequence) for e in (estimate, ekf.joint_ekf_ungated(clean)))
+    assert np.abs(ours - undisturbed).max() < 0.1
+    # Believed, it does harm.
+    believing = ekf.joint_ekf(problem, settings=JointSettings(gate=None, disagreeing_share=None))
+    assert np.abs(position_errors(believing, clean.sequence) - undisturbed).max() > 0.1
+
+
+def test_a_jump_of_everything_is_got_over_when_new_landmarks_come() -> None:
+    # A velocity that never was: all that is known disagrees until other landmarks take over.
+    sequence = drive("town", seconds=10.0, features_per_frame=40.0)
+    velocity = sequence.linear_velocity.copy()
+    velocity[50] += [300.0, 0.0, 0.0]
+    problem = matched(sequence)
+    increment = problem.increment.copy()
+    increment[50, 0] += 30.0
+    estimate = ekf.joint_ekf(replace(problem, increment=increment))
+    assert estimate.status is Status.RECOVERED
+    assert np.isfinite(estimate.world_T_imu).all()
+    late = problem.observations().frame > 90
+    assert estimate.used[problem.mask][late].mean() > 0.5
+
+
+def at_infinity(disparity: float) -> Sequence:
+    """The scene with two landmarks whose disparity is the given one in every frame."""
+    pixel = SCENE.observations.pixel.copy()
+    far = SCENE.observations.landmark < 2
+    pixel[far, 2] = pixel[far, 0] - disparity
+    return with_pixels(SCENE, pixel)
+
+
+@pytest.mark.parametrize("disparity", [0.0, -3.0])
+def test_landmarks_at_infinity_take_part_and_are_told(disparity: float) -> None:
+    estimate = ekf.joint_ekf_ungated(plain_problem(at_infinity(disparity)))
+    assert estimate.status is Status.OK
+    assert np.isfinite(estimate.world_T_imu).all()
+    assert estimate.used.mean() > 0.9
+    told = {event.landmark: event.reason for event in estimate.events if event.kind == "landmark never determined"}
+    for j in {0, 1} & set(told):
+        assert "infinity" in told[j]
+    assert {0, 1} <= set(told) | set(estimate.landmarks.index.tolist())
+    assert np.isfinite(estimate.landmarks.position).all()
+
+
+def test_in_world_coordinates_nothing_enters_without_depth() -> None:
+    estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
+    assert not estimate.used[SCENE.observations.landmark < 2].any()
+    assert estimate.used[SCENE.observations.landmark >= 2].all()
+    told = [event for event in estimate.events if event.kind == "landmark never determined"]
+    assert [event.landmark for event in told] == [0, 1]
+    assert estimate.status is Status.OK
+
+
+def test_what_was_never_a_covariance_is_told_with_its_frame() -> None:
+    problem = replace(plain_problem(SCENE), initial_covariance=-np.eye(6))
+    estimate = ekf.joint_ekf(problem)
+    assert estimate.status is Status.RECOVERED
+    assert "first at frame 1, the joint covariance was no longer positive definite" in estimate.reason
+    assert estimate.events[0].kind == "covariance lost"
+    assert estimate.events[0].frame == 1
+
+
+def test_what_is_not_finite_fails_with_its_frame() -> None:
+    problem = plain_problem(SCENE)
+    increment = problem.increment.copy()
+    increment[4] = np.nan
+    estimate = ekf.joint_ekf(replace(problem, increment=increment))
+    assert estimate.status is Status.FAILED
+    assert "frame 5" in estimate.reason
+    assert np.isfinite(estimate.world_T_imu[:5]).all()
+    assert np.isnan(estimate.world_T_imu[5:]).all()
+    assert not estimate.used[SCENE.observations.frame >= 5].any()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"gate": 0.0},
+        {"gate": 1.0},
+        {"gate": 99.0},
+        {"disagreeing_share": 0.0},
+        {"max_landmarks": 0},
+        {"unseen_frames": -1},
+    ],
+)
+def test_settings_that_cannot_be_are_named(wrong: dict[str, float]) -> None:
+    (name,) = wrong
+    with pytest.raises(FgbaselineError, match=f"^{name}: .*{wrong[name]}"):
+        JointSettings(**wrong)
+
+
+def test_masked_observations_take_no_part() -> None:
+    problem = plain_problem(SCENE)
+    excluded = problem.excluded.copy()
+    excluded[::3] = Excluded.PREDICTION
+    o = SCENE.observations
+    masked = ekf.joint_ekf(replace(problem, excluded=excluded))
+    without = ekf.joint_ekf(plain_problem(replace(SCENE, observations=o.select(excluded == Excluded.NO))))
+    np.testing.assert_array_equal(masked.world_T_imu, without.world_T_imu)
+    np.testing.assert_array_equal(masked.used, excluded == Excluded.NO)
+
+
+def test_progress_is_told_after_every_frame_and_time_is_kept() -> None:
+    told: list[tuple[int, int]] = []
+    estimate = ekf.joint_ekf(matched(drive()), lambda done, total: told.append((done, total)))
+    assert told == [(k + 1, 50) for k in range(50)]
+    assert np.all(estimate.seconds > 0.0)
+    assert estimate.seconds_total >= estimate.seconds.sum()
+
+
+def test_a_problem_is_not_changed_and_solved_the_same_way_twice() -> None:
+    problem = plain_problem(SCENE)
+    arrays = (problem.increment, problem.excluded, problem.initial_covariance, problem.initial_pose)
+    before = [array.copy() for array in arrays]
+    first, second = ekf.joint_ekf(problem), ekf.joint_ekf(problem)
+    for array, kept in zip(arrays, before, strict=True):
+        np.testing.assert_array_equal(array, kept)
+    np.testing.assert_array_equal(first.world_T_imu, second.world_T_imu)
+    np.testing.assert_array_equal(first.landmarks.covariance, second.landmarks.covariance)
+
+
+def test_it_is_installed_under_its_name() -> None:
+    assert data.find_estimator("joint-ekf") is ekf.joint_ekf
+
+
+def estimates(problem: Problem) -> dict[str, Estimate]:
+    return {
+        "joint": ekf.joint_ekf(problem),
+        "separate": ekf.ekf(problem),
+        "dead reckoning": ekf.dead_reckoning(problem),
+    }
+
+
+def test_on_clean_drives_it_is_nearer_to_the_truth_than_the_filter_with_separate_covariances() -> None:
+    squares: dict[str, list[float]] = {}
+    for path in ("town", "loop", "handheld"):
+        for seed in (1, 2, 3):
+            sequence = drive(path, seconds=20.0, features_per_frame=40.0, seed=seed)
+            for name, estimate in estimates(matched(sequence)).items():
+                assert estimate.status is Status.OK
+                squares.setdefault(name, []).append(float(np.mean(position_errors(estimate, sequence) ** 2)))
+    rmse = {name: np.sqrt(np.mean(each)) for name, each in squares.items()}
+    assert rmse["joint"] < 0.8 * rmse["separate"]
+    assert rmse["joint"] < 0.35 * rmse["dead reckoning"]
+
+
+WILD, TAME = 1e6, 1.0
+
+
+def measured(kernel: HuberKernel | None) -> StereoMeasurement:
+    return StereoMeasurement(SCENE.camera, 1.0, kernel)
+
+
+@pytest.mark.parametrize(
+    ("wild", "tame", "believed"), [(3, 3, True), (4, 3, False), (4, 0, True), (3, 2, False), (0, 6, True)]
+)
+def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
+    wild: int, tame: int, believed: bool
+) -> None:
+    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None))
+    assert verdict.taken.tolist() == [believed] * (wild + tame)
+    assert verdict.rejection is (None if believed else EventKind.FRAME_DISAGREES)
+    always = screened(
+        np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None, disagreeing_share=None)
+    )
+    assert always.plain
+
+
+def test_what_is_no_number_disagrees() -> None:
+    assert screened(np.full(5, np.nan), measured(None), JointSettings()).rejection is EventKind.FRAME_DISAGREES
+
+
+def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
+    at = chi2.ppf(0.99, 3)
+    gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), measured(None), JointSettings(gate=0.99))
+    assert gated.taken.tolist() == [True, True, False]
+    assert gated.rejection is EventKind.OUTSIDE_GATE
+    assert screened(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
+    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings(gate=None))
+    assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
+    assert not weighted.plain
+    assert screened(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).plain
+    assert not gated.plain
+
+
+def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it_cost() -> None:
+    problem = plain_problem(SCENE)
+    noise = problem.increment_covariance.copy()
+    noise[4] = -np.eye(6)
+    estimate = ekf.joint_ekf(replace(problem, increment_covariance=noise))
+    assert estimate.events[0] == data.Event(5, EventKind.COVARIANCE_LOST, "12 of 12 observations take no part")
+    assert not estimate.used[SCENE.observations.frame == 5].any()
+    assert estimate.used[SCENE.observations.frame < 5].all()
+
+
+def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
+    estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
+    said = (f"2 of {2 if k else 12} observations take no part" for k in range(10))
+    put_off = [data.Event(k, EventKind.ENTRY_PUT_OFF, text) for k, text in enumerate(said)]
+    never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no frame that was believed saw it", j) for j in (0, 1)]
+    assert list(estimate.events) == [*put_off, *never]
+
+
+def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
+    estimate = ekf.joint_ekf(replace(plain_problem(SCENE), initial_covariance=-np.eye(6)))
+    said = "P - W^T W has a negative variance after the update"
+    assert list(estimate.events) == [data.Event(k, EventKind.COVARIANCE_LOST, said) for k in range(1, 10)]
+    assert estimate.reason == (
+        "at 9 of 10 frames, first at frame 1, the joint covariance was no longer positive definite"
+    )
+
+
+def test_troubles_of_several_kinds_are_told_one_after_another() -> None:
+    problem, _ = garbled(0.9, range(50, 51))
+    estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=10))
+    full = [event for event in estimate.events if event.kind == "state full"]
+    waited = sum(int(event.reason.split(" of ")[0]) for event in full)
+    assert estimate.reason == (
+        "at 1 of 100 frames, first at frame 50, most observations disagreed with the prediction, which took no part; "
+        f"at {len(full)} of 100 frames, first at frame 0, the state was full: {waited} observations were not used"
+    )

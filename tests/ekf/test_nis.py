@@ -1,0 +1,68 @@
+"""What filters record of their innovations is nu^T S^-1 nu, and chi-square where the noise is what they are told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from fgbaseline.data import HuberKernel
+from fgbaseline.ekf import ekf, joint_ekf
+from fgbaseline.ekf.innovation_norm import squared_norm_of_known
+from fgbaseline.ekf.joint_update import Factor, NotPositiveDefiniteError
+from fgbaseline.geometry import se3
+
+from ..builders.synthetic import Scene, first_innovation, plain_problem
+
+
+def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
+    random = np.random.default_rng(1)
+    A = random.normal(size=(12, 20))
+    residual, variance = random.normal(size=(4, 3)), np.array([0.4, 0.4, 0.2])
+    HPHt = A @ A.T
+    before = HPHt.copy()
+    expected = residual.reshape(-1) @ np.linalg.solve(HPHt + np.diag(np.tile(variance, 4)), residual.reshape(-1))
+    assert Factor.of(HPHt, residual, variance).squared_norm == pytest.approx(expected, rel=1e-12)
+    np.testing.assert_array_equal(HPHt, before)
+    with pytest.raises(NotPositiveDefiniteError):
+        Factor.of(-HPHt, residual, variance)
+
+
+def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
+    pose = se3.exp([0.05, 0.02, -0.03, 0.01, 0.0, 0.02])
+    innovation = first_innovation(Scene().sequence(), pose)
+    A = np.random.default_rng(3).normal(size=(6, 6)) * 0.05
+    sigma = A @ A.T
+    three = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, 0.5, 0, 0.5]])
+    H, nu = (three @ innovation.jacobian).reshape(-1, 6), (innovation.residual @ three.T).reshape(-1)
+    S = H @ sigma @ H.T + 0.25 * np.diag(np.tile([1.0, 1.0, 0.5], 12))
+    assert squared_norm_of_known(innovation, sigma) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
+
+
+def test_what_is_no_covariance_has_no_norm() -> None:
+    innovation = first_innovation(Scene().sequence(), np.eye(4))
+    assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan)))
+
+
+@pytest.mark.parametrize("told", [1.0, 0.5])
+def test_the_joint_filter_s_innovations_are_chi_square_where_it_knows_its_noise_only(told: float) -> None:
+    total, degrees = 0.0, 0
+    for seed in range(8):
+        scene = Scene(seed=seed, frames=12)
+        innovations = joint_ekf(plain_problem(scene.sequence(), pixel_sigma=told * scene.sigma_pixel)).innovations
+        assert innovations is not None
+        assert np.isnan(innovations.nis[0])  # nothing was known before
+        total += np.nansum(innovations.nis)
+        degrees += int(innovations.degrees.sum())
+    assert degrees == 8 * 11 * 12 * 3
+    low, high = chi2.ppf([0.001, 0.999], degrees)
+    assert (low < total < high) == (told == 1.0)
+
+
+@pytest.mark.parametrize("estimator", [ekf, joint_ekf])
+def test_a_kernel_hides_no_innovation(estimator: object) -> None:
+    assert callable(estimator)
+    problem = plain_problem(Scene(frames=3).sequence())
+    plain, robust = (estimator(replace(problem, kernel=k)).innovations for k in (None, HuberKernel(1e-3)))
+    assert plain.nis[1] == pytest.approx(robust.nis[1], rel=1e-12)
+    np.testing.assert_array_equal(plain.degrees, [0, 36, 36])

@@ -1,0 +1,235 @@
+"""Every command and snippet of README and docs as it is printed, to its end, figures drawn: `make test-all`.
+
+The names that documents use are real recordings where these are at hand (`FGBASELINE_RECORDINGS`), else simulated ones
+of a minute. Targets of make that write into the project run in a copy of it.
+"""
+
+import os
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fgbaseline import data, ekf
+from fgbaseline.data.formats import attach_truth
+from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.geometry import se3
+
+from ..builders.commands import COMMAND, environment
+from ..builders.documents import DOCUMENTS, ROOT, blocks, commands, file_name, name
+from ..conftest import RECORDINGS
+from .test_bring_your_own_filter import ENTRY_POINTS, METADATA, PLUGIN, STANDALONE
+from .test_docs import NEVER_RUN, SHOWING, WRITING, has_chromium
+
+pytestmark = pytest.mark.full
+REAL = {
+    "drive.npz": "ece276a_2020/0027.npz",
+    "poses.txt": "ground_truth/kitti_odometry_07.txt",
+    "03.npz": "03.npz",
+    "10.npz": "10_imu_only.npz",
+    "10_imu_only.npz": "10_imu_only.npz",
+    "2011_09_26_drive_0036_sync_KLT.mat": "utias/2011_09_26_drive_0036_sync_KLT.mat",
+    "utias": "utias",
+    "ece276a_2020": "ece276a_2020",
+    "ground_truth": "ground_truth",
+}
+"""name in the documents -> the recording that stands for it"""
+HOST = "tcp://host:8786"
+"""the machine of a Dask scheduler, in whose place this one stands"""
+ALLOWED = {"diagnose": (0, 1), "check": (0, 1)}
+"""exit codes other than 0 alone: it found something; the limits of the example fall short on that recording"""
+
+
+class FullPlace:
+    """A folder with what the documents name, and their commands run there as a user runs them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.done: set[str] = set()
+        for below in ("accuracy", "docs/images", "out/simulated", "bin", "site/theirs", "site/theirs-1.0.dist-info"):
+            (folder / below).mkdir(parents=True)
+        shutil.copytree(ROOT / "suites", folder / "suites")
+        for limits in ("limits.toml", "accuracy/limits.toml"):
+            shutil.copy(ROOT / "docs" / "ci" / "limits.toml", folder / limits)
+        for block in blocks((ROOT / "docs" / "bench.md").read_text()):
+            if block.text.startswith('name = "mine"\n'):
+                (folder / "mine.toml").write_text(block.text)
+        self._recordings()
+        self._their_filter()
+        self.run("fgbaseline run drive.npz --out out/drive")
+        self.run("fgbaseline export drive.npz --out out/problem")
+        self.run("fgbaseline check out/drive --limits limits.toml --baseline baseline.json --update-baseline")
+        shutil.copytree(folder / "out" / "drive", folder / "out" / "simulated", dirs_exist_ok=True)
+
+    def _recordings(self) -> None:
+        for known, real in REAL.items():
+            if (RECORDINGS / real).exists():
+                (self.folder / known).symlink_to((RECORDINGS / real).resolve())
+        if not (self.folder / "drive.npz").exists() or not (self.folder / "poses.txt").exists():
+            sequence = simulate(Simulation(seed=3))
+            assert sequence.truth is not None
+            data.write_npz(sequence, self.folder / "drive.npz")
+            camera = se3.inverse(sequence.imu_T_cam) @ sequence.truth.world_T_imu @ sequence.imu_T_cam
+            data.write_kitti(self.folder / "poses.txt", camera)
+        sequence = data.read(self.folder / "drive.npz")
+        problem = data.calibrated(sequence)
+        mine = ekf.ekf(problem)
+        truth = attach_truth(sequence, self.folder / "poses.txt", "camera").truth
+        assert truth is not None
+        data.write_tum(self.folder / "truth.tum", sequence.t[truth.known], truth.world_T_imu[truth.known])
+        data.write_tum(self.folder / "mine.tum", sequence.t, mine.world_T_imu)
+        data.write_euroc(self.folder / "poses.csv", sequence.t, ekf.dead_reckoning(problem).world_T_imu)
+        table = np.column_stack([mine.landmarks.index, mine.landmarks.position])
+        rows = [f"{int(index)},{x},{y},{z}" for index, x, y, z in table.tolist()]
+        (self.folder / "mine.csv").write_text("\n".join(["id,x,y,z", *rows]) + "\n")
+
+    def _their_filter(self) -> None:
+        """`my-filter`, registered in a package, and `my_filter`, a program without a line of ours."""
+        site = self.folder / "site"
+        (site / "theirs" / "__init__.py").touch()
+        (site / "theirs" / "plugin.py").write_text(PLUGIN.replace("their-filter", "my-filter"))
+        (site / "theirs-1.0.dist-info" / "METADATA").write_text(METADATA)
+        registered = ENTRY_POINTS.replace("their-filter", "my-filter").partition("broken-filter")[0]
+        (site / "theirs-1.0.dist-info" / "entry_points.txt").write_text(registered)
+        program = self.folder / "bin" / "my_filter"
+        program.write_text(f"#!{sys.executable} -I\n{STANDALONE}")
+        program.chmod(0o755)
+
+    def run(self, command: str) -> None:
+        """The command, once, as a process of its own; fails where it does not end well."""
+        if command in self.done:
+            return
+        self.done.add(command)
+        program, *arguments = shlex.split(command)
+        if program == "make":
+            self._make(arguments)
+            return
+        if "report_image" in command and not has_chromium():
+            return  # said by tests/project/test_docs.py
+        needed = [*arguments, "utias"] if "mine.toml" in arguments else arguments
+        for known in set(REAL) & set(needed):
+            if not (self.folder / known).exists():
+                pytest.skip(f"{REAL[known]} is not in {RECORDINGS} (set FGBASELINE_RECORDINGS)")
+        if "--rerun" in arguments and not has_rerun():
+            pytest.skip("rerun-sdk is not installed (the extra fgbaseline[rerun])")
+        place, allowed = self.folder, (0,)
+        if program == "fgbaseline":
+            allowed = ALLOWED.get(arguments[0], (0,))
+            self._cleared(arguments)
+            command_line: list[str | Path] = [COMMAND, *arguments]
+        elif program == "python":
+            script = [str(ROOT / part) if part.startswith("benchmarks/") else part for part in arguments]
+            command_line = [sys.executable, *script]
+        else:
+            command_line = [self.folder / "bin" / program, *arguments]
+        path = f"{self.folder / 'site'}{os.pathsep}{ROOT}" if program == "python" else str(self.folder / "site")
+        with scheduler() if HOST in arguments else none() as address:
+            line = [str(part).replace(HOST, address or HOST) for part in command_line]
+            result = _ended(line, place, PYTHONPATH=path)
+        assert result.returncode in allowed, f"{command}: {result.returncode}\n{result.stderr[-2000:]}"
+
+    def _cleared(self, arguments: list[str]) -> None:
+        """Takes away what an earlier command left where this one writes, as it would refuse to replace it."""
+        if arguments[0] in (*WRITING, "reproduce", "figures"):
+            default = [f"out/{Path(arguments[1]).stem}"] if arguments[0] == "run" else []
+            after = arguments[arguments.index("--out") + 1 :] if "--out" in arguments else default
+            for below in after[:1]:
+                shutil.rmtree(self.folder / below, ignore_errors=True)
+
+    def _make(self, arguments: list[str]) -> None:
+        if arguments == ["test"]:
+            assert "test-all: test\n" in (ROOT / "Makefile").read_text()
+            return
+        copy = self.folder / "project"
+        if not copy.exists():
+            left_out = shutil.ignore_patterns(".venv", ".git", "out", "build", "__pycache__", ".*_cache", ".hypothesis")
+            shutil.copytree(ROOT, copy, ignore=left_out)
+            (copy / ".venv").symlink_to(ROOT / ".venv")
+        result = _ended(["make", *arguments], copy, FGBASELINE_RECORDINGS=str(RECORDINGS.resolve()))
+        assert result.returncode == 0, result.stderr[-2000:]
+
+
+def _ended(command: list[str], cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
+    kept = {key: value for key, value in environment(**env).items() if key not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    return subprocess.run(
+        command, cwd=cwd, env=kept, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+
+
+def has_rerun() -> bool:
+    """Whether the extra `rerun` is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("rerun") is not None
+
+
+@contextmanager
+def none() -> Iterator[None]:
+    """No scheduler."""
+    yield None
+
+
+@contextmanager
+def scheduler() -> Iterator[str]:
+    """The address of a Dask cluster on this machine."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what Dask has to say of itself
+        distributed = pytest.importorskip("distributed")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        cluster = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, scheduler_port=port
+        )
+        try:
+            yield str(cluster.scheduler_address)
+        finally:
+            cluster.close()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FullPlace]:
+    folder = tmp_path_factory.mktemp("docs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        yield FullPlace(folder)
+
+
+STEPS = [
+    pytest.param(document, number, id=f"{name(document)}-{number}-{(commands(block) or ['python'])[0][:60]}")
+    for document in SHOWING
+    for number, block in enumerate(blocks(document.read_text()))
+    if block.language == "python" or commands(block)
+]
+"""the blocks of each document that do something, in its order"""
+
+
+@pytest.fixture(scope="module")
+def names() -> dict[Path, dict[str, object]]:
+    """What the snippets of each document have defined so far."""
+    return {document: {} for document in DOCUMENTS}
+
+
+@pytest.mark.parametrize(("document", "number"), STEPS)
+def test_every_command_and_snippet_runs_as_printed(
+    document: Path, number: int, place: FullPlace, names: dict[Path, dict[str, object]]
+) -> None:
+    every = blocks(document.read_text())
+    for block in every[:number]:
+        if (file := file_name(block)) is not None:
+            (place.folder / file).write_text(block.text)
+    block = every[number]
+    if block.language == "python":
+        shutil.rmtree(place.folder / "out" / "comparison", ignore_errors=True)  # which several write
+        exec(compile(block.text, name(document), "exec"), names[document])
+    for command in commands(block):
+        if command not in NEVER_RUN:
+            place.run(command)

@@ -1,0 +1,398 @@
+"""A comparison from Python: its tables, captions and sentences, whatever the files are and whoever wrote them."""
+
+import json
+import shutil
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+from evo.core import metrics
+from evo.core.trajectory import PoseTrajectory3D
+
+from fgbaseline import data
+from fgbaseline.data import Trajectory
+from fgbaseline.data.exchange import write_problem
+from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparing.paper import latex, markdown
+from fgbaseline.reports.comparing.schema import json_schema
+from fgbaseline.reports.comparing.summary import summarise
+
+from ..builders.synthetic import drive, matched
+
+
+@cache
+def truth() -> tuple[FloatArray, FloatArray]:
+    """Stamps and poses of a drive of 12 s."""
+    sequence = drive(seconds=12.0)
+    assert sequence.truth is not None
+    return sequence.t, sequence.truth.world_T_imu
+
+
+def astray(poses: FloatArray, size: float, seed: int) -> FloatArray:
+    """The path with an error that wanders."""
+    steps = size * np.random.default_rng(seed).normal(size=(len(poses), 6)) * np.repeat([1.0, 0.1], 3)
+    return poses @ se3.exp(np.cumsum(steps, axis=0))
+
+
+@pytest.fixture
+def files(tmp_path: Path, written: Path) -> Path:
+    """A folder with them that a test may write into."""
+    return Path(shutil.copytree(written, tmp_path, dirs_exist_ok=True))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A truth and two estimates, elsewhere in the world, in four forms."""
+    tmp_path = tmp_path_factory.mktemp("written")
+    t, poses = truth()
+    elsewhere = se3.exp([5.0, -3.0, 1.0, 0.1, 0.2, 2.0])
+    data.write_tum(tmp_path / "truth.tum", t, poses)
+    data.write_euroc(tmp_path / "near.csv", t, elsewhere @ astray(poses, 0.005, 1))
+    data.write_trajectory_npz(tmp_path / "far.npz", t, elsewhere @ astray(poses, 0.05, 2))
+    data.write_kitti(tmp_path / "frames.txt", elsewhere @ astray(poses, 0.005, 1))
+    (tmp_path / "times.txt").write_text("\n".join(map(repr, t.tolist())))
+    return tmp_path
+
+
+def test_three_lines_give_tables_and_figures(files: Path) -> None:
+    result = compare(files / "truth.tum", files / "near.csv", files / "far.npz")
+    assert list(result.table.index) == ["near", "far"]
+    rmse = result.table["absolute error: RMSE, m"]
+    assert rmse["near"] < rmse["far"]
+    assert result.table["absolute error: RMSE, m, low"]["near"] <= rmse["near"]
+    assert "SE(3)-aligned over all" in result.caption
+    assert set(result.figures()) == {"paths", "errors", "growth", "relative", "segments"}
+    assert set(result.metrics.columns) == {"estimate", "metric", "value", "low", "high"}
+    assert result.verdict[0].startswith("The reference, truth, is taken as given")
+    assert any(sentence.startswith("Nearest: near is ") for sentence in result.verdict)
+
+
+def test_the_figures_of_the_table_are_evos(files: Path) -> None:
+    result = compare(files / "truth.tum", files / "far.npz", deltas=["5frames"], all_pairs=True)
+    t, poses = truth()
+    theirs = PoseTrajectory3D(poses_se3=list(data.read_trajectory(files / "far.npz").world_T_body), timestamps=t)
+    reference = PoseTrajectory3D(poses_se3=list(poses), timestamps=t)
+    theirs.align(reference)
+    ape, rpe = (
+        metrics.APE(metrics.PoseRelation.translation_part),
+        metrics.RPE(metrics.PoseRelation.translation_part, 5, metrics.Unit.frames, all_pairs=True),
+    )
+    ape.process_data((reference, theirs))
+    rpe.process_data((reference, theirs))
+    row = result.table.loc["far"]
+    assert row["absolute error: RMSE, m"] == pytest.approx(ape.get_statistic(metrics.StatisticsType.rmse), rel=1e-9)
+    assert row["error of motion over 5 frames: RMSE, m"] == pytest.approx(
+        rpe.get_statistic(metrics.StatisticsType.rmse), rel=1e-9
+    )
+
+
+def test_every_form_of_the_same_path_gives_the_same_table(files: Path) -> None:
+    expected = compare(files / "truth.tum", f"it={files / 'near.csv'}")
+    from_kitti = compare(files / "truth.tum", f"it={files / 'frames.txt'}", times=files / "times.txt")
+    at_hand = compare(files / "truth.tum", data.read_trajectory(files / "near.csv", name="it"))
+    for other in (from_kitti, at_hand):
+        pd.testing.assert_frame_equal(other.table, expected.table, rtol=1e-9)
+
+
+def test_two_paths_without_stamps_are_compared_by_frame(files: Path) -> None:
+    _, poses = truth()
+    data.write_kitti(files / "truth.txt", poses)
+    result = compare(files / "truth.txt", files / "frames.txt")
+    assert "error of motion over 1 frames: RMSE, m" in result.table.columns
+    assert "translation per second" not in result.results["frames"].drift.index  # type: ignore[union-attr]
+    with pytest.raises(InputError, match=r"frames\.txt: it has no time stamps, .*--times"):
+        compare(files / "truth.tum", files / "frames.txt")
+
+
+@pytest.mark.parametrize("kind", ["none", "first-pose", "yaw", "se3", "sim3"])
+def test_every_alignment_is_said(files: Path, kind: str) -> None:
+    result = compare(files / "truth.tum", files / "near.csv", align=kind)
+    said = {"none": "not aligned", "first-pose": "first pose", "yaw": "yaw", "se3": "SE(3)", "sim3": "Sim(3)"}[kind]
+    assert said in result.caption
+    assert summarise(result).estimates["near"].alignment.kind == kind
+    assert said.lower() in markdown(result).lower()
+
+
+def test_an_offset_is_found_and_told(files: Path) -> None:
+    t, poses = truth()
+    data.write_tum(files / "late.tum", t + 0.25, poses)
+    result = compare(files / "truth.tum", files / "late.tum", search_offset=0.5, association="interpolated")
+    assert result.results["late"].matched.offset == pytest.approx(-0.25, abs=1e-3)
+    assert any("fit best 250 ms earlier" in sentence for sentence in result.verdict)
+
+
+def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:
+    t, poses = truth()
+    imu_T_cam = drive().imu_T_cam
+    data.write_tum(files / "camera.tum", t, poses @ imu_T_cam)
+    data.write_kitti(files / "extrinsic.txt", imu_T_cam[None])
+    result = compare(
+        files / "truth.tum", files / "camera.tum", extrinsic=files / "extrinsic.txt", estimate_body="camera"
+    )
+    assert result.table["absolute error: largest, m"]["camera"] < 1e-9
+    with pytest.raises(InputError, match=r"camera\.tum: its poses are the camera's; add --sequence or --extrinsic"):
+        compare(files / "truth.tum", files / "camera.tum", estimate_body="camera")
+
+
+def test_up_is_carried_from_the_recording_into_the_worlds_of_others(files: Path) -> None:
+    t, poses = truth()
+    problem = matched(drive(seconds=12.0))
+    (files / "problem").mkdir()
+    write_problem(problem, files / "problem")
+    turned = se3.exp([1.0, 2.0, 3.0, 2.0, -1.0, 0.5])
+    data.write_tum(files / "turned.tum", t, turned @ poses)
+    data.write_tum(files / "late.tum", t[7:], (turned @ poses)[7:])
+    expected = turned[:3, :3] @ problem.sequence.up
+    for name, tolerance in (("turned.tum", 1e-12), ("late.tum", 0.02)):
+        result = compare(files / name, files / "near.csv", sequence=files / "problem")
+        np.testing.assert_allclose(result.up, expected, atol=tolerance)
+    np.testing.assert_array_equal(compare(files / "turned.tum", files / "near.csv").up, [0.0, 0.0, 1.0])
+
+
+def test_yaw_is_refused_between_worlds_that_are_not_both_level(files: Path) -> None:
+    t, poses = truth()
+    problem = matched(drive(seconds=12.0))
+    (files / "problem").mkdir()
+    write_problem(problem, files / "problem")
+    data.write_tum(files / "camera_world.tum", t, se3.inverse(problem.sequence.imu_T_cam) @ poses)
+    with pytest.raises(InputError, match=r"truth\.tum: up in its world is 9\d degrees off .*--align se3"):
+        compare(files / "camera_world.tum", files / "truth.tum", align="yaw", sequence=files / "problem")
+    level = compare(files / "truth.tum", f"it={files / 'truth.tum'}", align="yaw", sequence=files / "problem")
+    assert level.table["absolute error: largest, m"]["it"] < 1e-9
+
+
+def test_held_out_tracks_rank_the_paths(files: Path) -> None:
+    data.write_npz(drive(seconds=12.0, features_per_frame=30.0), files / "drive.npz")
+    t, poses = truth()
+    data.write_tum(files / "shaken.tum", t, astray(poses, 0.1, 5))
+    given = {"sequence": files / "drive.npz", "held_out": 0.3}
+    result = compare(files / "truth.tum", files / "near.csv", files / "shaken.tum", **given)
+    assert result.held_out is not None
+    assert list(result.held_out.index) == ["truth", "near", "shaken"]
+    figures = summarise(result).estimates["shaken"].held_out
+    assert figures is not None
+    assert figures.behind.low is not None
+    assert figures.behind.low > 0.0
+    assert "held-out tracks: median, px" in result.table.columns
+    assert any(sentence.startswith("On tracks that were held out") for sentence in result.verdict)
+    assert compare(files / "truth.tum", files / "near.csv", sequence=files / "drive.npz").held_out is None
+
+
+def test_when_a_path_leaves_is_said_only_of_paths_that_start_together(files: Path) -> None:
+    aligned = compare(files / "truth.tum", files / "far.npz")
+    assert aligned.results["far"].passing is None
+    assert "do not start together" in aligned.results["far"].notes["passing"]
+    together = compare(files / "truth.tum", files / "far.npz", align="first-pose").results["far"]
+    assert together.passing is not None
+    assert together.departure["position"][together.passing.frame] > together.bound
+    assert (together.departure["position"][: together.passing.frame] <= together.bound).all()
+
+
+def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> None:
+    problem = matched(drive(seconds=12.0))
+    sequence = problem.sequence
+    assert sequence.truth is not None
+    assert sequence.truth.landmarks is not None
+    (files / "problem").mkdir()
+    write_problem(problem, files / "problem")
+    rows = [f"{i},{x!r},{y!r},{z!r}" for i, (x, y, z) in enumerate(sequence.truth.landmarks.tolist())]
+    (files / "landmarks.csv").write_text("\n".join(["id,x,y,z", *reversed(rows)]))
+    result = compare(
+        files / "truth.tum",
+        f"same={files / 'truth.tum'}",
+        files / "far.npz",
+        sequence=str(files / "problem"),
+        landmarks=[f"same={files / 'landmarks.csv'}"],
+    )
+    row, far = result.table.loc["same"], result.table.loc["far"]
+    # Norm of four numbers of 0.5 px each: 0.5 sqrt(chi-square with 4 degrees of freedom), median 0.916.
+    assert row["reprojection, median px: its landmarks"] == pytest.approx(0.916, abs=0.03)
+    assert row["reprojection, median px: triangulated"] < row["reprojection, median px: its landmarks"]
+    assert far["reprojection, median px: triangulated"] > 2.0 * row["reprojection, median px: triangulated"]
+    assert summarise(result).estimates["far"].notes["reprojection"] == "no landmarks came with it"
+    assert "reprojection" in result.figures()
+
+
+def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
+    """Both share an error that makes their own intervals wide; one adds to it everywhere."""
+    t, poses = truth()
+    shared = se3.compose(se3.exp(np.random.default_rng(0).normal(size=(len(t) - 1, 6)) * 1e-3))
+    for name, more in (("one", 0.0), ("two", 0.01), ("three", 0.0)):
+        moved = poses @ shared
+        moved[:, :3, 3] += (0.02 + more) * np.sin(np.arange(len(t)))[:, None]
+        data.write_tum(files / f"{name}.tum", t, moved)
+    result = compare(files / "truth.tum", *(files / f"{name}.tum" for name in ("two", "one", "three")), align="none")
+    assert result.behind["two"].low > 0.0
+    assert result.behind["three"].value == 0.0
+    said = " ".join(result.verdict)
+    assert "Farther than one, by paired bootstrap of their RMSE: two (" in said
+    assert "does not settle whether one is nearer than three" in said
+    summary = summarise(result).estimates
+    assert summary["one"].behind is None
+    assert summary["two"].behind is not None
+    rmse = {name: summary[name].translation.rmse.value or 0.0 for name in ("one", "two")}
+    assert summary["two"].behind.value == pytest.approx(rmse["two"] - rmse["one"], rel=1e-9)
+
+
+def test_stamps_that_are_no_frames_of_the_recording_are_told(files: Path) -> None:
+    t, poses = truth()
+    data.write_npz(drive(), files / "drive.npz")
+    data.write_tum(files / "later.tum", t + 1e6, poses)
+    data.write_tum(files / "later2.tum", t + 1e6, poses)
+    result = compare(files / "later.tum", files / "later2.tum", sequence=files / "drive.npz")
+    assert any(s.startswith("No pose of later and later2 is at a frame of ") for s in result.verdict)
+
+
+def test_covariances_that_came_along_are_judged_with_and_without_alignment(files: Path) -> None:
+    t, poses = truth()
+    deviation = np.repeat([0.1, 0.01], 3)
+    error = deviation * np.random.default_rng(0).normal(size=(len(t), 6))
+    covariance = np.tile(np.diag(deviation**2), (len(t), 1, 1))
+    data.write_trajectory_npz(files / "mine.npz", t, poses @ se3.exp(error), covariance)
+    result = compare(files / "truth.tum", files / "mine.npz", align="none")
+    nees = summarise(result).estimates["mine"].nees
+    assert nees is not None
+    assert nees.mean == pytest.approx(6.0, abs=1.0)
+    assert (nees.frames, nees.not_positive_definite) == (len(t), 0)
+    assert any("mean NEES" in sentence for sentence in result.verdict)
+    figure = result.figures()["three_sigma_mine"]
+    assert all(float(panel.get_title(loc="left").split()[-3]) > 95.0 for panel in figure.axes)
+    covariance[3] = -covariance[3]
+    data.write_trajectory_npz(files / "bad.npz", t, poses @ se3.exp(error), covariance)
+    bad = compare(files / "truth.tum", files / "bad.npz", align="none")
+    assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
+    aligned = summarise(compare(files / "truth.tum", files / "mine.npz")).estimates["mine"]
+    assert aligned.nees is not None
+    assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
+    between = compare(files / "truth.tum", files / "mine.npz", association="interpolated")
+    assert any(s.startswith("The covariances of mine are not judged: poses were inter") for s in between.verdict)
+
+
+def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
+    result = compare(files / "truth.tum", files / "near.csv", f"<b>&|%_$={files / 'far.npz'}")
+    report = result.write(files / "out")
+    written = {path.name for path in (files / "out").iterdir()}
+    assert written == {
+        "comparison.json", "figures", "metrics.csv", "report.html", "series", "table.csv", "table.md", "table.tex",
+        "trajectories",
+    }  # fmt: skip
+    summary = json.loads((files / "out" / "comparison.json").read_text())
+    jsonschema.validate(summary, json.loads(json_schema()))
+    page = report.read_text()
+    assert "<b>&|" not in page
+    assert "&lt;b&gt;&amp;|%_$" in page
+    assert "default-src 'none'" in page
+    assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
+    assert r"\textless{}b\textgreater{}\&\textbar{}\%\_\$" in latex(result)
+    aligned = data.read_trajectory(files / "out" / "trajectories" / "near.tum")
+    assert np.linalg.norm(aligned.position - truth()[1][:, :3, 3], axis=1).mean() < 0.2
+    series = pd.read_csv(files / "out" / "series" / "near.csv")
+    assert len(series) == len(truth()[0])
+    table = pd.read_csv(files / "out" / "table.csv", index_col="estimate")
+    pd.testing.assert_frame_equal(table, result.table, rtol=1e-12)
+    with pytest.raises(InputError, match="--force"):
+        result.write(files / "out")
+    before = {path: path.read_bytes() for path in (files / "out").rglob("*") if path.is_file()}
+    again = compare(files / "truth.tum", files / "near.csv", f"<b>&|%_$={files / 'far.npz'}")
+    assert again.write(files / "out", force=True) == report
+    assert {path: path.read_bytes() for path in (files / "out").rglob("*") if path.is_file()} == before
+
+
+def test_the_published_schema_is_the_one_that_is_kept_to() -> None:
+    published = Path(__file__).parents[2] / "docs" / "comparison.schema.json"
+    assert published.read_text() == json_schema() + "\n"  # make schema writes it
+
+
+def test_short_and_standing_paths_say_what_they_lack(tmp_path: Path) -> None:
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    data.write_tum(tmp_path / "standing.tum", np.arange(5.0), poses)
+    off = poses.copy()
+    off[:, 0, 3] = 0.1
+    data.write_tum(tmp_path / "off.tum", np.arange(5.0), off)
+    result = compare(tmp_path / "standing.tum", tmp_path / "off.tum", align="none")
+    assert result.table["absolute error: RMSE, m"]["off"] == pytest.approx(0.1)
+    notes = summarise(result).estimates["off"].notes
+    assert set(notes) >= {"segments", "drift", "relative.10 m"}
+    assert all(notes.values())
+    result.write(tmp_path / "out")
+
+
+def test_names_are_kept_apart(files: Path) -> None:
+    (files / "other").mkdir()
+    (files / "other" / "near.csv").write_bytes((files / "near.csv").read_bytes())
+    result = compare(files / "truth.tum", files / "near.csv", files / "other" / "near.csv", files / "truth.tum")
+    assert len(set(result.results)) == 3
+    assert "other-near" in result.results
+
+
+Bad = tuple[tuple[Any, ...], dict[str, Any], str]
+BAD: dict[str, Bad] = {
+    "nothing to compare": (("truth.tum",), {}, "there is nothing to compare"),
+    "missing": (("truth.tum", "missing.tum"), {}, r"missing\.tum: there is no such file"),
+    "a folder": (("truth.tum", "."), {}, "this is a folder"),
+    "no run": ((".", "near.csv"), {}, r"no summary\.json"),
+    "alignment": (("truth.tum", "near.csv"), {"align": "best"}, "alignment: 'best'"),
+    "up": (("truth.tum", "near.csv"), {"up": (0.0, 0.0, 0.0)}, "up: expected a direction"),
+    "delta": (("truth.tum", "near.csv"), {"deltas": ["10"]}, "delta: expected a length above 0 with its unit.*'10'"),
+    "zero delta": (("truth.tum", "near.csv"), {"deltas": ["0m"]}, "delta: expected a length above 0.*'0m'"),
+    "insisted": (("truth.tum", "near.csv"), {"form": "kitti"}, r"truth\.tum: line 2: expected 12 numbers \(KITTI\)"),
+    "another time": (("truth.tum", "near.csv"), {"offset": 100.0}, r"no pose of .*near\.csv is within 0\.01 s"),
+    "landmarks alone": (("truth.tum", "near.csv"), {"landmarks": ["times.txt"]}, "landmarks: .* add --sequence"),
+    "held out of nothing": (("truth.tum", "near.csv"), {"held_out": 0.2}, "held-out: .* give it with --sequence"),
+    "no name": (("truth.tum", "=near.csv"), {}, "expected FILE or NAME=FILE"),
+    "many extrinsics": (("truth.tum", "near.csv"), {"extrinsic": "frames.txt"}, "imu_T_cam in one line of 12 numbers"),
+    "first": (("truth.tum", "near.csv"), {"align_first": 10_000}, "the first 10000 cannot be taken"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_wrong_is_said_in_a_sentence(files: Path, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given, options, sentence = BAD[case]
+    monkeypatch.chdir(files)
+    options = {k: Path(v) if k == "extrinsic" else v for k, v in options.items()}
+    with pytest.raises(InputError, match=sentence) as raised:
+        compare(*given, **options)
+    assert "\n" not in str(raised.value)
+
+
+BAD_LANDMARKS = {
+    "id;x;y;z\n1;2;3;4": "line 1: expected a header with id,x,y,z, but id, x, y, z is missing",
+    "id,x,y\n1,2,3": "line 1: expected a header with id,x,y,z, but z is missing",
+    "id,x,y,z\n1,2,3": "line 2: expected 4",
+    "id,x,y,z\n1,2,3,4\n2,x,3,4": "line 3: 'x' is no finite number",
+    "id,x,y,z\n1.5,2,3,4": r"line 2: the id 1\.5 is no whole number",
+    "id,x,y,z\n7,2,3,4\n1,2,3,4\n7,0,0,0": "line 4: the landmark 7 stands on line 2 too",
+}
+
+
+@pytest.mark.parametrize("text", BAD_LANDMARKS)
+def test_bad_landmarks_are_told_with_their_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "l.csv").write_text(text)
+    with pytest.raises(InputError, match=BAD_LANDMARKS[text]):
+        data.formats.read_landmarks(tmp_path / "l.csv")
+
+
+def test_no_landmark_is_none(tmp_path: Path) -> None:
+    (tmp_path / "l.csv").write_text("id,x,y,z,n_used\n")
+    assert len(data.formats.read_landmarks(tmp_path / "l.csv")) == 0
+
+
+def test_landmarks_that_the_sequence_does_not_have(files: Path) -> None:
+    data.write_npz(drive(seconds=12.0), files / "drive.npz")
+    write_problem(matched(drive(seconds=12.0)), (files / "p").mkdir() or files / "p")  # type: ignore[func-returns-value]
+    (files / "l.csv").write_text("id,x,y,z\n99999,0,0,0\n")
+    with pytest.raises(InputError, match="near: its landmark 99999 is not one of the sequence's"):
+        compare(files / "truth.tum", files / "near.csv", sequence=files / "p", landmarks=[files / "l.csv"])
+
+
+def test_arguments_are_left_as_they_were(files: Path) -> None:
+    t, poses = truth()
+    path = Trajectory(t, poses, "mine")
+    before = path.world_T_body.tobytes()
+    compare(files / "truth.tum", path, align="sim3")
+    assert path.world_T_body.tobytes() == before

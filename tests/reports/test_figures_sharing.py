@@ -1,0 +1,34 @@
+"""Figures drawn by several processes are those that one draws."""
+
+from functools import cache
+
+from fgbaseline.reports import figures
+from fgbaseline.reports.comparison import Run
+
+from ..builders.reported import answer, run_of, scene
+from ..builders.synthetic import plain_problem
+
+
+@cache
+def small_run() -> Run:
+    problem = plain_problem(scene())
+    return run_of(problem, answer(problem, "ekf"))
+
+
+@cache
+def drawn_by_one() -> dict[str, figures.Written]:
+    return figures.draw_and_write(small_run())
+
+
+def test_one_process_writes_what_draw_draws() -> None:
+    drawn = figures.draw(small_run())
+    assert list(drawn) == list(drawn_by_one())
+    name = "paths_overlaid"
+    assert drawn_by_one()[name].title == drawn[name].get_label()
+    assert drawn_by_one()[name].files == {form: figures.encoded(drawn[name], form) for form in ("png", "svg")}
+
+
+def test_three_processes_write_the_same_bytes_in_the_same_order() -> None:
+    shared = figures.draw_and_write(small_run(), 3)
+    assert list(shared) == list(drawn_by_one())
+    assert shared == drawn_by_one()

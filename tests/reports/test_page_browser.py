@@ -1,0 +1,311 @@
+"""The page in a real browser: it moves as its controls say, asks nobody for anything, and fits a phone.
+
+Skipped where there is no Chromium, or no Playwright to drive it; FGBASELINE_CHROMIUM names another one.
+"""
+
+import math
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fgbaseline.data import Excluded, Landmarks
+from fgbaseline.reports import page
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.figures.paths import paths_overlaid
+from fgbaseline.reports.figures.style import in_style
+
+from ..builders.reported import answer, as_dict, failed, run_of, scene
+from ..builders.synthetic import plain_problem
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+SCRIPT = "<script>alert(1)</script>"
+NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def example() -> Run:
+    """A filter that leaves, with two of its matches of frame 7 not used and three excluded, under a hostile name."""
+    problem = plain_problem(scene(name=SCRIPT))
+    excluded = problem.excluded.copy()
+    at_7 = np.flatnonzero(problem.sequence.observations.frame == 7)
+    excluded[at_7[:3]] = Excluded.PREDICTION
+    problem = replace(problem, excluded=excluded)
+    used = problem.mask.copy()
+    used[at_7[3:5]] = False
+    return run_of(
+        problem,
+        answer(problem, "dead-reckoning", (0.0, 60.0, 0.0), used=np.zeros(len(used), dtype=np.bool_)),
+        answer(problem, SCRIPT, (3.0, 0.0, 0.0), used=used),
+        answer(problem, "isam2", (0.0, 0.0, 0.3), used=problem.mask),
+    )
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return example()
+
+
+@pytest.fixture(scope="module")
+def address(run: Run, tmp_path_factory: pytest.TempPathFactory) -> str:
+    file = tmp_path_factory.mktemp("page") / "report.html"
+    with in_style():
+        drawn = {"paths_overlaid": paths_overlaid(run)}
+    file.write_text(page.render(run, as_dict(run), drawn), encoding="utf-8")
+    return file.as_uri()
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    path = next((found for name in NAMES if name and (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no Chromium here; install Debian's package chromium, or name one in FGBASELINE_CHROMIUM")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+class Opened:
+    """A page, and all that it said and asked for."""
+
+    def __init__(self, browser: Any, address: str, width: int = 1400, height: int = 900, scheme: str = "light") -> None:
+        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        self.page = context.new_page()
+        self.page.set_default_timeout(20_000)
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("dialog", lambda dialog: (self.said.append("a dialog"), dialog.dismiss()))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+        self.page.wait_for_selector("#path-view .line")
+
+    def attribute(self, selector: str, name: str) -> str:
+        return str(self.page.eval_on_selector(selector, f"element => element.getAttribute('{name}')"))
+
+    def count(self, selector: str) -> int:
+        return int(self.page.locator(selector).count())
+
+    def text(self, selector: str) -> str:
+        return str(self.page.inner_text(selector))
+
+    def set_frame(self, frame: int) -> None:
+        self.page.eval_on_selector("#frame", f"e => {{ e.value = {frame}; e.dispatchEvent(new Event('input')); }}")
+
+
+@pytest.fixture
+def opened(chromium: Any, address: str) -> Iterator[Opened]:
+    it = Opened(chromium, address)
+    yield it
+    assert it.said == []
+    assert it.asked == [address]
+    it.page.context.close()
+
+
+def test_it_loads_without_a_word_and_without_asking_anybody(opened: Opened, run: Run) -> None:
+    assert opened.text("h1") == SCRIPT
+    assert opened.count("#path-view .line") == 4
+    assert opened.count(".chart svg") == opened.count(".chart") >= 10
+    assert opened.count(".chart .cursor") == opened.count(".chart")
+    assert SCRIPT in opened.text("#who")
+
+
+def test_nothing_that_comes_from_files_can_run(opened: Opened) -> None:
+    opened.page.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
+    opened.page.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'ran = 1'}))")
+    opened.page.wait_for_timeout(100)
+    assert opened.page.evaluate("window.ran === undefined")
+    assert len(opened.said) >= 2  # the browser says what it refused
+    assert all("Content Security Policy" in text for text in opened.said)
+    opened.said.clear()
+    opened.asked[1:] = []
+
+
+def test_switching_an_estimator_off_takes_its_lines_away_and_frees_the_axis(opened: Opened) -> None:
+    before = opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg')
+    assert opened.count("#over-time .line.who-0") > 3
+    opened.page.uncheck('#who input[value="0"]')
+    assert opened.count("#over-time .line.who-0") == 0
+    assert opened.count("#path-view .who-0") == 0
+    assert opened.count("#path-view .line.who-1") == 1
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') != before
+    opened.page.check('#who input[value="0"]')
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') == before
+
+
+def test_the_slider_moves_one_cursor_through_every_plot(opened: Opened) -> None:
+    opened.set_frame(0)
+    cursors = opened.page.eval_on_selector_all(".chart .cursor", "all => all.map(e => e.getAttribute('x1'))")
+    here = opened.attribute("#path-view .here.who-1", "cx")
+    said = opened.text(".said")
+    opened.set_frame(40)
+    moved = opened.page.eval_on_selector_all(".chart .cursor", "all => all.map(e => e.getAttribute('x1'))")
+    assert all(float(b) > float(a) for a, b in zip(cursors, moved, strict=True))
+    assert opened.attribute("#path-view .here.who-1", "cx") != here
+    assert opened.text(".said") != said
+    assert opened.text("#clock") == "frame 40 · 4.0\u00a0s"
+    assert opened.attribute("#frame", "aria-valuetext") == "frame 40, 4.0\u00a0s"
+
+
+def test_a_frame_shows_what_became_of_each_observation_and_its_true_reprojection_error(
+    opened: Opened, run: Run
+) -> None:
+    opened.set_frame(7)
+    opened.page.select_option("#frame-view select", "1")
+    for side in ("left", "right"):
+        image = f'[data-side="{side}"]'
+        counts = [opened.count(f"{image} .{fate}") for fate in ("used", "rejected", "excluded")]
+        assert counts == [7, 2, 3]
+        assert opened.count(f"{image} .predicted") == 12
+    table = run.results[SCRIPT].reprojection
+    table = table[(table["frame"] == 7) & table["used"]]
+    shown = float(opened.text(".said").partition("median error ")[2].partition("\u00a0")[0])
+    assert math.isclose(shown, float(table["error"].median()), rel_tol=0.01)
+    assert "3 × contradicts its own track" in opened.text(".said")
+    used = opened.page.inner_html('[data-side="left"]')
+    opened.page.select_option("#frame-view select", "2")
+    assert opened.page.inner_html('[data-side="left"]') != used
+
+
+def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> None:
+    opened.page.click("summary:has-text('in numbers')")
+    opened.set_frame(59)
+    row = opened.text("#values tr:has-text('Distance from isam2')")
+    assert row.split("\t")[1:3] == [
+        f"{run.results[n].divergence['position'].iloc[59]:#.3g}" for n in list(run.results)[:2]
+    ]
+
+
+def test_the_paths_turn_into_space_with_landmarks_and_ellipses(opened: Opened) -> None:
+    flat = opened.attribute("#path-view .line.who-1", "d")
+    opened.page.click('[data-do="solid"]')
+    assert opened.attribute('[data-do="solid"]', "aria-pressed") == "true"
+    assert opened.attribute("#path-view .line.who-1", "d") != flat
+    opened.page.click('[data-do="landmarks"]')
+    assert opened.count("#path-view .dots") == 3
+    opened.page.click('[data-do="ellipses"]')
+    assert opened.count("#path-view .ellipse.who-2") >= 1
+
+
+def test_a_path_tells_frame_time_and_error_where_it_is_pointed_at_and_a_click_goes_there(opened: Opened) -> None:
+    opened.set_frame(30)
+    box = opened.page.locator("#path-view .here.who-2").bounding_box()
+    opened.set_frame(5)
+    at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.page.mouse.move(*at)
+    told = opened.text(".hint")
+    assert "frame 30" in told
+    assert "3.0\u00a0s" in told
+    assert "from the truth" in told or told.startswith("truth")
+    opened.page.mouse.click(*at)
+    assert opened.text("#clock").startswith("frame 30 ")
+
+
+def test_the_keyboard_is_enough(opened: Opened) -> None:
+    opened.set_frame(10)
+    opened.page.focus("#frame")
+    opened.page.keyboard.press("ArrowRight")
+    assert opened.text("#clock").startswith("frame 11 ")
+    opened.page.focus('#who input[value="0"]')
+    opened.page.keyboard.press("Space")
+    assert opened.count("#path-view .who-0") == 0
+    opened.page.focus("#path-view svg")
+    before = opened.attribute("#path-view .line.who-1", "d")
+    opened.page.keyboard.press("+")
+    closer = opened.attribute("#path-view .line.who-1", "d")
+    assert closer != before
+    opened.page.keyboard.press("0")
+    assert opened.attribute("#path-view .line.who-1", "d") == before
+    reached = {""}
+    opened.page.focus(".skip")
+    for _ in range(60):
+        opened.page.keyboard.press("Tab")
+        reached.add(str(opened.page.evaluate("document.activeElement.id || document.activeElement.dataset.do || ''")))
+    assert {"solid", "landmarks", "ellipses", "in", "out", "reset", "frame", "play"} <= reached
+
+
+@pytest.mark.parametrize("width", [360, 800])
+def test_nothing_runs_over_the_edge_of_a_phone(chromium: Any, address: str, width: int) -> None:
+    opened = Opened(chromium, address, width=width, height=740)
+    assert opened.page.evaluate("document.documentElement.scrollWidth") == width
+    slider = opened.page.locator("#frame").bounding_box()
+    assert slider["x"] >= 0
+    assert slider["x"] + slider["width"] <= width
+    assert slider["y"] < 740
+    opened.page.context.close()
+
+
+def test_dark_ground_changes_every_colour_that_it_would_swallow(chromium: Any, address: str) -> None:
+    stroke = "getComputedStyle(document.querySelector('#path-view .line.who-2')).stroke"
+    colours = {}
+    for scheme in ("light", "dark"):
+        opened = Opened(chromium, address, scheme=scheme)
+        colours[scheme] = opened.page.evaluate(stroke)
+        if scheme == "dark":
+            opened.page.emulate_media(media="print")
+            colours["print"] = opened.page.evaluate(stroke)
+        opened.page.context.close()
+    assert colours == {"light": "rgb(0, 0, 0)", "dark": "rgb(255, 255, 255)", "print": "rgb(0, 0, 0)"}
+
+
+def test_on_paper_there_are_no_controls(opened: Opened, tmp_path: Path) -> None:
+    opened.page.emulate_media(media="print")
+    for selector in ("#controls", ".tools", "nav"):
+        assert not opened.page.is_visible(selector)
+    assert opened.page.is_visible("#path-view svg")
+    assert not opened.page.is_visible("#behind li")
+    opened.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert opened.page.is_visible("#behind li")
+    opened.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert not opened.page.is_visible("#behind li")
+    assert len(opened.page.pdf(format="A4")) > 20_000
+
+
+def test_figures_folded_away_are_there_when_unfolded_or_printed(chromium: Any, address: str) -> None:
+    drawn = "() => [...document.images].every(image => image.complete && image.naturalWidth > 0)"
+    unfolded = Opened(chromium, address).page
+    unfolded.eval_on_selector_all("details", "all => all.forEach(details => { details.open = true; })")
+    unfolded.locator("img").first.scroll_into_view_if_needed()
+    unfolded.wait_for_function(drawn)
+    printed = Opened(chromium, address).page
+    assert printed.locator("img").count() > 0
+    printed.pdf(format="A4")
+    printed.wait_for_function(drawn)
+    for page_ in (unfolded, printed):
+        page_.context.close()
+
+
+def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: Any, tmp_path: Path) -> None:
+    problem = plain_problem(scene(truth=None))
+    alone = answer(problem, "dead-reckoning", covariance=None, seconds=np.empty(0), landmarks=Landmarks.none())
+    gone = alone.world_T_imu.copy()
+    gone[20:] = np.nan
+    run = run_of(problem, failed(problem, "ekf", "no"), replace(alone, world_T_imu=gone))
+    file = tmp_path / "report.html"
+    file.write_text(page.render(run, as_dict(run), {}), encoding="utf-8")
+    opened = Opened(chromium, file.as_uri())
+    opened.page.click('[data-do="ellipses"]')
+    opened.page.click('[data-do="landmarks"]')
+    opened.page.click('[data-do="solid"]')
+    opened.set_frame(30)
+    assert opened.said == []
+    assert opened.count("#path-view .line") == 1
+    assert opened.count("#path-view .here") == 0
+    assert "12 in the problem" in opened.text(".said")
+    assert opened.count('[data-side="left"] .measured') == 12
+    opened.page.context.close()
+
+
+def test_without_a_script_the_still_figures_stand_in(chromium: Any, address: str) -> None:
+    context = chromium.new_context(java_script_enabled=False)
+    it = context.new_page()
+    it.goto(address)
+    assert it.is_visible("#figure-paths_overlaid-noscript img")
+    assert not it.is_visible("#controls")
+    context.close()

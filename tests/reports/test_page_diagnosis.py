@@ -1,0 +1,67 @@
+"""What the page says of the recording, and what stands above its table."""
+
+from dataclasses import replace
+
+import pytest
+
+from fgbaseline.data.diagnose import Finding
+from fgbaseline.reports import page
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.page.numbers import quantity
+from fgbaseline.reports.summary import summarise
+
+from ..builders.reported import standard_run
+
+
+def rendered(run: Run) -> str:
+    return page.render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
+
+
+def test_findings_stand_with_their_figures_and_repairs_below() -> None:
+    run = standard_run()
+    found = (
+        Finding("gyro_bias", "It <drifts>.", 0.0271, 0.0201, "rad/s", "standard error 0.001 rad/s"),
+        Finding("copied_frames", "Tracks are copies.", 6562, 0, "observations", "counted"),
+        Finding("bursts", "Bursts.", 0.412, 0.002, "share of the matches", "counted"),
+    )
+    problem = replace(run.problem, diagnosed=True, findings=found, repairs=("set by hand: velocity_scale = 1.5",))
+    html = rendered(replace(run, problem=problem))
+    assert "The recording: 3 things were found to be wrong" in html
+    assert "It &lt;drifts&gt;." in html
+    assert "<td>0.0271\N{NO-BREAK SPACE}rad/s</td><td>0.0201\N{NO-BREAK SPACE}rad/s</td>" in html
+    assert "<td>6\N{NARROW NO-BREAK SPACE}562</td><td>0</td>" in html
+    assert "<td>41.2 %</td><td>0.2 %</td>" in html
+    assert "standard error 0.001 rad/s" in html
+    assert "counted" not in html
+    assert "<li>Set by hand: velocity_scale = 1.5.</li>" in html
+
+
+def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -> None:
+    run = standard_run()
+    assert "The recording:" not in rendered(run)
+    clean = rendered(replace(run, problem=replace(run.problem, diagnosed=True)))
+    assert "The recording: nothing was found to be wrong" in clean
+
+
+def test_three_sentences_stand_above_the_table_and_the_rest_is_folded_below() -> None:
+    run = standard_run()
+    sentences, html = page.verdict(run), rendered(run)
+    assert len(sentences) > 3
+    table = html.index('<section id="table"')
+    above, below = html[:table], html[table:]
+    assert above.count("<li>") == 3
+    assert f"{len(sentences) - 3} more sentences" in below
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.5, "share of the tracks", "50 %"),
+        (0.02, "m/s", "0.0200\N{NO-BREAK SPACE}m/s"),
+        (0.793, "°", "0.793°"),
+        (1.06, "recorded over seen", "1.06"),
+        (12.0, "frames", "12"),
+    ],
+)
+def test_a_finding_s_figure_has_its_unit(value: float, unit: str, text: str) -> None:
+    assert quantity(value, unit) == text

@@ -1,0 +1,159 @@
+"""The verdict says what constructed runs are known to show."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fgbaseline import compare
+from fgbaseline.data import Excluded, Observations
+from fgbaseline.reports.comparison import Run
+from fgbaseline.reports.page import verdict
+from fgbaseline.reports.page.departure import departure
+from fgbaseline.reports.page.numbers import number
+
+from ..builders.reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
+from ..builders.synthetic import plain_problem
+
+
+def told(run: Run, start: str) -> str:
+    """The one sentence that begins so."""
+    (sentence,) = [s for s in verdict(run) if s.startswith(start)]
+    return sentence
+
+
+def with_trust(run: Run, verdict_on_it: compare.Verdict, *reasons: str) -> Run:
+    return replace(run, trust=compare.Trust(verdict_on_it, reasons))
+
+
+def test_every_sentence_has_a_number_or_a_reason() -> None:
+    for sentence in verdict(standard_run()):
+        assert any(c.isdigit() for c in sentence) or ":" in sentence, sentence
+
+
+def test_the_nearest_estimator_comes_first_with_metres_and_share_of_the_path() -> None:
+    run = standard_run()
+    sentence = told(run, "Nearest to isam2 is ekf")
+    table = run.results["ekf"].divergence
+    assert table is not None
+    rmse, length = float(np.sqrt(np.mean(table["position"] ** 2))), float(table["travelled"].max())
+    assert f"{rmse:.3g} m ({100 * rmse / length:.3g} % of the path)" in sentence
+    assert sentence.index("ekf") < sentence.index("dead-reckoning")
+
+
+def test_a_departure_is_dated_to_the_first_frame_beyond_the_limit() -> None:
+    run = standard_run()
+    left = departure(run, run.results["ekf"])
+    table = run.results["ekf"].divergence
+    assert left is not None
+    assert table is not None
+    limit = 0.01 * float(table["travelled"].max())
+    assert limit < 5.0
+    assert table["position"][left.frame] > limit
+    assert (table["position"][: left.frame] <= limit).all()
+    assert f"at {left.seconds:.1f} s (frame {left.frame}), for good" in told(run, "ekf is first more than")
+
+
+def test_whoever_stays_near_is_said_to_stay() -> None:
+    problem = plain_problem(scene())
+    run = run_of(problem, answer(problem, "ekf", (0.0, 0.1, 0.0)), answer(problem, "isam2"))
+    assert "throughout: 0.100 m at most" in told(run, "ekf stays within")
+
+
+def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> None:
+    problem = plain_problem(scene())
+    frame = problem.sequence.observations.frame
+    run = run_of(problem, answer(problem, "ekf", (0.0, 3.0, 0.0)), answer(problem, "isam2"))
+    assert "mask" not in told(run, "ekf is first more than")
+    left = departure(run, run.results["ekf"])
+    assert left is not None
+    excluded = np.where(frame == left.frame, Excluded.PREDICTION, Excluded.NO).astype(np.uint8)
+    t = problem.sequence.t
+    around = np.sum(np.abs(t - t[left.frame]) <= 1.0)
+    masked = replace(run, problem=replace(problem, excluded=excluded))
+    sentence = told(masked, "ekf is first more than")
+    assert f"excluded {100 / around:.3g} % of the matches ({100 / 60:.3g} % in the whole recording)" in sentence
+
+
+def test_a_reference_worse_than_the_filter_is_called_so() -> None:
+    problem = plain_problem(scene())
+    run = run_of(
+        problem,
+        answer(problem, "dead-reckoning", (0.1, 0.0, 0.0)),
+        answer(problem, "ekf", (0.0, 0.2, 0.0)),
+        answer(problem, "isam2", (4.0, 4.0, 0.0)),
+    )
+    sentence = told(run, "The reference is worse than dead-reckoning")
+    assert "and ekf" in sentence
+    assert not [s for s in verdict(standard_run()) if "worse" in s]
+
+
+def test_the_online_answer_of_the_reference_is_no_rival_of_it() -> None:
+    problem = plain_problem(scene())
+    online = answer(problem, "isam2-online", (0.0, 0.0, 0.1))
+    reference = answer(problem, "isam2", (0.0, 0.0, 1.0), by_products={"isam2-online": online})
+    run = run_of(problem, reference, online, answer(problem, "ekf", (0.0, 5.0, 0.0)))
+    assert any(" of the path) from isam2 (RMSE along" in s for s in verdict(run))
+    assert "same run" in told(run, "isam2-online")
+    assert not [s for s in verdict(run) if "worse" in s]
+
+
+def test_frames_without_truth_are_counted() -> None:
+    sequence = scene()
+    assert sequence.truth is not None
+    whole = plain_problem(sequence)
+    problem = plain_problem(replace(sequence, truth=partly_known(sequence.truth, 7)))
+    run = run_of(problem, answer(whole, "ekf", (1.0, 0.0, 0.0)), answer(whole, "isam2"))
+    assert "53 of 60 frames; the other 7 are left out" in told(run, "Against the truth")
+    assert not [s for s in verdict(standard_run(truth=None)) if "truth" in s]
+
+
+def test_trust_comes_first_with_its_reasons() -> None:
+    run = standard_run()
+    untrusted = with_trust(run, compare.Verdict.UNTRUSTED, "it used 12% of the observations")
+    first = verdict(untrusted)[0]
+    assert first.startswith("The reference, isam2, is untrusted: it used 12% of the observations")
+    trusted = with_trust(run, compare.Verdict.TRUSTED, "it used 98% of the observations")
+    assert verdict(trusted)[0].startswith("The reference, isam2, is trusted")
+
+
+def test_failures_and_recoveries_are_told_with_their_reason() -> None:
+    problem = plain_problem(scene())
+    run = run_of(
+        problem,
+        failed(problem, "ekf", "no observations"),
+        failed(problem, "joint-ekf", "no observations"),
+        answer(problem, "isam2", status=RECOVERED, reason="8 landmarks were given up"),
+    )
+    assert "ekf and joint-ekf failed: no observations." in verdict(run)
+    assert "isam2 recovered: 8 landmarks were given up." in verdict(run)
+
+
+def test_without_an_answer_it_says_that_nothing_is_compared() -> None:
+    problem = plain_problem(scene(observations=Observations.none(), truth=None))
+    run = run_of(problem, failed(problem, "ekf", "no observations"))
+    assert verdict(run)[0].startswith("There is no reference, so nothing is compared")
+
+
+def test_assumed_noise_is_said_to_be_assumed() -> None:
+    run = standard_run()
+    assert "0.500 px" in told(run, "Not diagnosed")
+    diagnosed = replace(run, problem=replace(run.problem, diagnosed=True))
+    assert not [s for s in verdict(diagnosed) if "Not diagnosed" in s]
+
+
+def test_overconfidence_is_told_as_a_ratio_of_errors() -> None:
+    problem = plain_problem(scene())
+    bold = np.tile(1e-4 * np.eye(6), (60, 1, 1))
+    run = run_of(problem, answer(problem, "ekf", (3.0, 0.0, 0.0), covariance=bold), answer(problem, "isam2"))
+    nees = run.results["ekf"].nees
+    assert nees is not None
+    mean = float(np.nanmean(nees))
+    assert f"{number(np.sqrt(mean / 6))} for ekf (NEES {number(mean)})" in told(run, "Normalized error RMS")
+
+
+def test_a_path_with_holes_is_said_to_have_them() -> None:
+    problem = plain_problem(scene())
+    broken = answer(problem, "ekf", (1.0, 0.0, 0.0))
+    broken.world_T_imu[50:] = np.nan
+    run = run_of(problem, broken, answer(problem, "isam2"))
+    assert "ekf has no pose in 10 of 60 frames." in verdict(run)

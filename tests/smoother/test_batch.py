@@ -1,0 +1,168 @@
+"""Batch finds the minimum from far and near, says whether both agree, and has the covariances of the curvature."""
+
+from dataclasses import replace
+
+import gtsam
+import numpy as np
+import pytest
+
+from fgbaseline import data, smoother
+from fgbaseline.data import Estimate, Observations, Problem, Status
+from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.geometry import FloatArray
+from fgbaseline.smoother.convention import reordered
+from fgbaseline.smoother.covariances import covariances
+from fgbaseline.smoother.keys import landmark_key, pose_key
+from fgbaseline.smoother.pieces import piecewise
+from fgbaseline.smoother.whole_graph import values_at, whole_graph
+
+from ..builders.four_rows import cost, information
+from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
+from .test_isam2 import PROBLEMS, SCENE, state_of
+
+
+def kinds(estimate: Estimate) -> set[str]:
+    return {event.kind for event in estimate.events}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_from_both_starts_it_ends_where_isam2_does(name: str) -> None:
+    problem = PROBLEMS[name]
+    estimate = smoother.batch(problem)
+    assert estimate.status is Status.OK
+    assert "both starts end at the same cost" in kinds(estimate)
+    isam2 = estimate.by_products["isam2"]
+    np.testing.assert_array_equal(estimate.used, isam2.used)
+    np.testing.assert_array_equal(estimate.landmarks.index, isam2.landmarks.index)
+    np.testing.assert_allclose(estimate.world_T_imu, isam2.world_T_imu, rtol=0, atol=5e-5)
+
+
+@pytest.mark.parametrize("name", ["plain", "held", "prior"])
+def test_no_small_step_lowers_the_cost_of_the_four_rows(name: str) -> None:
+    problem = PROBLEMS[name]
+    state = state_of(smoother.batch(problem))
+    lowest, random = cost(problem, state), np.random.default_rng(2)
+    L_inverse = np.linalg.inv(np.linalg.cholesky(information(problem, state)))
+    for size in (1e-1, 1e-2, 1e-3):
+        for _ in range(20):
+            assert cost(problem, state.moved(size * L_inverse.T @ random.standard_normal(state.size))) > lowest
+
+
+@pytest.mark.parametrize("name", ["plain", "prior"])
+def test_the_covariances_are_the_dense_inverse_of_the_curvature(name: str) -> None:
+    problem = PROBLEMS[name]
+    estimate = smoother.batch(problem)
+    assert estimate.covariance is not None
+    assert estimate.landmarks.covariance is not None
+    dense, T = np.linalg.inv(information(problem, state_of(estimate))), problem.n_frames
+    for k, covariance in enumerate(estimate.covariance):
+        assert_near(covariance, dense[6 * k : 6 * k + 6, 6 * k : 6 * k + 6])
+    for row, covariance in enumerate(estimate.landmarks.covariance):
+        at = slice(6 * T + 3 * row, 6 * T + 3 * row + 3)
+        assert_near(covariance, dense[at, at])
+
+
+def assert_near(covariance: FloatArray, expected: FloatArray) -> None:
+    unit = 1.0 / np.sqrt(np.diag(expected))
+    scale = unit[:, None] * unit[None, :]
+    np.testing.assert_allclose(covariance * scale, expected * scale, rtol=0, atol=1e-3)
+
+
+def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
+    problem = matched(drive(features_per_frame=30.0))
+    estimate = smoother.isam2(problem)
+    assert estimate.covariance is not None
+    kept = replace(problem, excluded=np.where(estimate.used, 0, 2).astype(np.uint8))
+    graph, values = whole_graph(kept), values_at(estimate.world_T_imu, estimate.landmarks)
+    swept, marginals = covariances(graph, values), gtsam.Marginals(graph, values)
+    assert len(swept) == problem.n_frames + len(estimate.landmarks)
+    for key in [pose_key(1), pose_key(20), pose_key(problem.n_frames - 1), landmark_key(int(kept.features[0]))]:
+        expected = marginals.marginalCovariance(key)
+        np.testing.assert_allclose(swept[key], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(estimate.covariance[9], reordered(swept[pose_key(9)]), rtol=1e-6, atol=1e-12)
+
+
+def test_an_answer_that_is_given_is_not_found_again() -> None:
+    problem = PROBLEMS["plain"]
+    known = smoother.isam2(problem)
+    told: list[tuple[int, int]] = []
+    estimate = smoother.batch(problem, lambda done, total: told.append((done, total)), given={"isam2": known})
+    assert told == [(10, 10)]
+    assert not estimate.by_products
+    np.testing.assert_array_equal(estimate.world_T_imu, smoother.batch(problem).world_T_imu)
+
+
+def test_the_answers_found_on_the_way_come_along() -> None:
+    estimate = smoother.batch(PROBLEMS["plain"])
+    assert list(estimate.by_products) == ["isam2", "isam2-online"]
+    assert list(estimate.by_products["isam2"].by_products) == ["isam2-online"]
+
+
+def biased(problem: Problem, rate: float) -> Problem:
+    """The problem with a yaw rate that is off by `rate` (rad/s), and known to no better than a third of that."""
+    increment, covariance = problem.increment.copy(), problem.increment_covariance.copy()
+    increment[:, 5] += rate * problem.sequence.dt
+    covariance[:, 5, 5] += (rate / 3.0 * problem.sequence.dt) ** 2
+    return replace(problem, increment=increment, increment_covariance=covariance)
+
+
+def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> None:
+    problem = biased(matched(drive(seconds=15.0, features_per_frame=40.0)), 0.15)
+    truth = problem.sequence.truth
+    assert truth is not None
+    path = dead_reckoned_path(problem.increment, problem.initial_pose)
+    near, far = (
+        np.linalg.norm((p - truth.world_T_imu)[:, :3, 3], axis=1).max() for p in (piecewise(problem, path), path)
+    )
+    assert far > 5.0
+    assert near < 0.2 * far
+    estimate = smoother.batch(problem)
+    assert "both starts end at the same cost" in kinds(estimate)
+
+
+def test_starts_that_end_apart_are_told_loudly_and_the_lower_cost_counts() -> None:
+    problem = PROBLEMS["plain"]
+    good = smoother.isam2(problem)
+    # Behind the cameras no landmark pulls: a start from there stays there.
+    lost = replace(good.landmarks, position=good.landmarks.position - [200.0, 0.0, 0.0])
+    estimate = smoother.batch(problem, given={"isam2": replace(good, landmarks=lost)})
+    (event,) = estimate.events
+    assert event.kind == "starts end at different costs"
+    assert "dead reckoning" in event.reason
+    assert "isam2's answer" in event.reason
+    np.testing.assert_allclose(estimate.world_T_imu, good.world_T_imu, rtol=0, atol=1e-5)
+
+
+def test_without_an_answer_of_isam2_there_is_one_start_and_batch_says_so() -> None:
+    problem = PROBLEMS["kernel"]
+    failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
+    estimate = smoother.batch(problem, given={"isam2": failed})
+    assert estimate.status is Status.RECOVERED
+    assert "indeterminate" in estimate.reason
+    assert "one start only" in kinds(estimate)
+    assert estimate.used.all()
+    np.testing.assert_allclose(estimate.world_T_imu, smoother.isam2(problem).world_T_imu, rtol=0, atol=1e-3)
+
+
+def test_a_landmark_behind_the_cameras_is_given_up() -> None:
+    pixel = SCENE.observations.pixel.copy()
+    flipped = SCENE.observations.landmark == 5
+    pixel[flipped & (SCENE.observations.frame > 3)] = pixel[flipped & (SCENE.observations.frame > 3)][:, [2, 1, 0, 3]]
+    problem = plain_problem(with_pixels(SCENE, pixel))
+    estimate = smoother.batch(problem)
+    assert 5 not in estimate.landmarks.index
+    np.testing.assert_array_equal(estimate.used, SCENE.observations.landmark != 5)
+
+
+def test_without_observations_there_is_no_answer() -> None:
+    problem = matched(replace(drive(), observations=Observations.none()))
+    estimate = smoother.batch(problem)
+    assert estimate.status is Status.FAILED
+    assert np.isnan(estimate.world_T_imu).all()
+
+
+def test_the_documented_problem_as_a_batch() -> None:
+    problem = data.documented(Scene(frames=20, n_points=20).sequence())
+    estimate = smoother.batch(problem)
+    assert estimate.status is not Status.FAILED
+    assert kinds(estimate) & {"both starts end at the same cost", "starts end at different costs", "one start only"}
