@@ -16,9 +16,9 @@ from fgbaseline.data import Estimate, write_tum
 from . import figures, page
 from .comparison import Result, Run
 from .job import MARK
+from .run_tables import consistency_series, write_tables
 from .schema import Summary
 from .summary import metrics_table, summarise
-from .tables import consistency_series, write_tables
 
 TRUTH_FILE = "truth.tum"
 

@@ -4,8 +4,6 @@ from pydantic import BaseModel, ConfigDict
 
 Number = float | None
 """null for what is not a finite number; `notes` then says why"""
-INFINITE = "infinite"
-"""the note of a figure that is infinite"""
 
 
 class Part(BaseModel):

@@ -20,10 +20,9 @@ from .common_frames import share_of_time
 from .comparison import Result, Run
 from .evidence_summary import evidence_reasons, evidence_summary, held_out_summary
 from .figures.view import TopView
-from .json_numbers import finite, nulls
+from .results.tree import INFINITE, finite, nulls
 from .samples import samples
 from .schema import EstimatorSummary, Summary
-from .schema_base import INFINITE
 
 TOO_FEW = "it has too few frames in common with the other estimators to be ranked"
 LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from ..page.numbers import number
+from ..formatting import interval, number
 from .results import METRICS, Results
 from .tables import cases, consistency, costs, records
 
@@ -85,13 +85,6 @@ def main_grid(results: Results, *, with_costs: bool) -> Grid:
         best = tuple(key in column.best for column in columns)
         rows.append(Row(*key, cells, best, reason, references.get(key[0]) == key[1]))
     return Grid(tuple(column.heading for column in columns), tuple(rows), CAPTION)
-
-
-def interval(value: float, low: float, high: float) -> str:
-    """`0.52 [0.41, 0.66]`, or the value alone."""
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return number(value)
-    return f"{number(value)} [{number(low)}, {number(high)}]"
 
 
 def _metrics(table: Mapping[Key, Mapping[str, Any]]) -> Iterator[_Column]:

@@ -10,10 +10,10 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ..figures.palette import colours_of
+from ..formatting import counted, interval
 from ..page.embedding import picture
-from ..page.numbers import counted
 from ..page.rendering import environment
-from .grid import interval, main_grid
+from .grid import main_grid
 from .progress import duration
 from .results import METRICS, Results
 from .store import RUNS

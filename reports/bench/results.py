@@ -11,7 +11,7 @@ import pandas as pd
 from fgbaseline.geometry import FloatArray
 
 from ..job import MARK
-from ..schema_base import INFINITE
+from ..results.tree import INFINITE
 from .job import Planned
 from .store import Store
 from .work import COSTS

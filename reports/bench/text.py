@@ -1,7 +1,7 @@
 """The main table in Markdown and in LaTeX."""
 
-from ..checking.markdown import escaped
-from ..latex import tex
+from ..formatting import md as escaped
+from ..formatting import tex
 from .grid import Grid
 
 
@@ -21,21 +21,21 @@ def latex(grid: Grid) -> str:
     n = len(grid.headings)
     body: list[str] = []
     for case, rows in grid.by_case:
-        body += [r"\midrule", rf"\multicolumn{{{n + 1}}}{{l}}{{\emph{{{_tex(case)}}}}} \\"]
+        body += [r"\midrule", rf"\multicolumn{{{n + 1}}}{{l}}{{\emph{{{tex(case)}}}}} \\"]
         for row in rows:
-            cells = [rf"\textbf{{{_tex(c)}}}" if best else _tex(c) for c, best in zip(row.cells, row.best, strict=True)]
+            cells = [rf"\textbf{{{tex(c)}}}" if best else tex(c) for c, best in zip(row.cells, row.best, strict=True)]
             if row.reason:
-                cells = [rf"\multicolumn{{{n}}}{{l}}{{failed: {_tex(row.reason)}}}"]
-            body.append(" & ".join([rf"\quad {_tex(row.name)}", *cells]) + r" \\")
+                cells = [rf"\multicolumn{{{n}}}{{l}}{{failed: {tex(row.reason)}}}"]
+            body.append(" & ".join([rf"\quad {tex(row.name)}", *cells]) + r" \\")
     return "\n".join(
         [
             r"% needs \usepackage{booktabs}",
             r"\begin{table}",
             r"\centering",
-            rf"\caption{{{_tex(grid.caption)}}}",
+            rf"\caption{{{tex(grid.caption)}}}",
             rf"\begin{{tabular}}{{l{'r' * n}}}",
             r"\toprule",
-            " & ".join(["", *map(_tex, grid.headings)]) + r" \\",
+            " & ".join(["", *map(tex, grid.headings)]) + r" \\",
             *body,
             r"\bottomrule",
             r"\end{tabular}",
@@ -43,7 +43,3 @@ def latex(grid: Grid) -> str:
             "",
         ]
     )
-
-
-def _tex(text: str) -> str:
-    return tex(text).replace("↑", r"$\uparrow$").replace("↓", r"$\downarrow$")

@@ -5,10 +5,9 @@ from typing import Any
 
 import pandas as pd
 
+from ..formatting import interval, listed, number
 from ..page.accuracy_verdict import SAME_GRAPH
-from ..page.numbers import listed, number
 from .figures import judge
-from .grid import interval
 from .results import ANSWERED, METRICS, Metric, Results
 from .tables import consistency, overall, rankings, records
 

@@ -9,7 +9,7 @@ from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
-from ..schema_base import INFINITE
+from ..results.tree import INFINITE
 from .baseline import before, is_timing
 from .limits_file import Limit, Limits, Needed
 from .line import NEW, Checked, Line, Shortage

@@ -1,9 +1,8 @@
 """A check as Markdown for a pull request."""
 
-import re
-
 from fgbaseline.compare.limits import Outcome
 
+from ..formatting import md as escaped
 from .line import Checked
 from .wording import WORDS, cells, columns, remarks, verdict
 
@@ -32,8 +31,3 @@ def markdown(checked: Checked) -> str:
             "",
         ]
     )
-
-
-def escaped(text: str) -> str:
-    """Text that Markdown shows as it is, on one line: names of estimators and reasons come from files."""
-    return re.sub(r"([\\`*_{}\[\]<>#|~@])", r"\\\1", " ".join(text.split()))

@@ -14,7 +14,7 @@ from fgbaseline.data.finite import is_finite_number
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
-from ..schema_base import INFINITE
+from ..results.tree import INFINITE
 
 SUMMARY = "summary.json"
 COMPARISON = "comparison.json"

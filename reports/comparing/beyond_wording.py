@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..page.numbers import counted, listed, number
+from ..formatting import counted, listed, number
 from .comparison import Comparison
 
 

@@ -12,7 +12,7 @@ from fgbaseline.compare import Align, Matched, Passing, TimeOffset
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..page.numbers import listed
+from ..formatting import listed
 from .claimed import claimed_by
 from .comparison import Comparison, Result
 from .entries import Entries

@@ -2,7 +2,7 @@
 
 from itertools import groupby
 
-from ..latex import tex
+from ..formatting import tex
 from .comparison import Comparison
 from .tables import text_table
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..page.numbers import listed
+from ..formatting import listed
 from .comparison import Comparison
 
 

@@ -12,8 +12,7 @@ from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors
 from fgbaseline.compare.travel import distance_travelled
 
-from ..json_numbers import finite, nulls
-from ..schema_base import INFINITE
+from ..results.tree import INFINITE, finite, nulls
 from .claimed import Claimed
 from .comparison import Comparison, Result
 from .pixels import Pixels

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..page.numbers import number
+from ..formatting import number
 from .comparison import Comparison
 from .summary import summarise
 

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, RmseDifference, Verdict, too_small
 from fgbaseline.compare.travel import distance_travelled
 
-from ..page.numbers import counted, listed, number, per_cent
+from ..formatting import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
 from .comparison import Comparison, Result
 from .recognized import recognized, up_of

@@ -12,9 +12,9 @@ import numpy as np
 from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
 from fgbaseline.reports.comparison import Result, Run
 
+from ..formatting import listed, number, per_cent
 from .coverage import little_truth_sentences
 from .departure import path_length
-from .numbers import listed, number, per_cent
 
 SAME_GRAPH = ("isam2", "batch")
 """estimators that minimize one and the same graph"""

@@ -5,7 +5,7 @@ from fgbaseline.reports.common_frames import known, same_frames, share_of_time
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.samples import of_truth
 
-from .numbers import listed, number, per_cent
+from ..formatting import listed, number, per_cent
 
 
 def little_truth_sentences(run: Run) -> list[str]:

@@ -2,7 +2,7 @@
 
 from fgbaseline.reports.comparison import Run
 
-from .numbers import quantity
+from ..formatting import quantity
 
 
 def findings(run: Run) -> list[dict[str, str]]:

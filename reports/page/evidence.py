@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.tables import map_by_depth
+from fgbaseline.reports.run_tables import map_by_depth
 
-from .numbers import counted
+from ..formatting import counted
 from .table import Column, Table, table_of
 
 EVIDENCE = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")

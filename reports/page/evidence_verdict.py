@@ -8,8 +8,8 @@ from fgbaseline.compare import CovarianceState, held_out_ranking
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.evidence import frames_in_words
 
+from ..formatting import counted, listed, number
 from .accuracy_verdict import same_graph
-from .numbers import counted, listed, number
 
 MOST_FRAMES = 80
 """letters of a list of frames, from which on only the first are told"""

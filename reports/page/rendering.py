@@ -14,12 +14,12 @@ from fgbaseline.data import Event
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import Written
 
+from ..formatting import counted, number, per_cent
 from .charts import TRUTH_LINE
 from .colouring import colour_rules, keys
 from .diagnosis import findings
 from .embedding import picture
 from .evidence import EVIDENCE, evidence_table, folded_tables
-from .numbers import counted, number, per_cent
 from .packing import embedded_json
 from .payload import payload
 from .scripting import policy, script

@@ -11,10 +11,10 @@ import numpy as np
 from fgbaseline.reports.common_frames import same_frames
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import colours
-from fgbaseline.reports.schema_base import INFINITE
+from fgbaseline.reports.results.tree import INFINITE
 
+from ..formatting import DASH, INFINITY, counted, number
 from .accuracy_verdict import unranked
-from .numbers import DASH, INFINITY, counted, number
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,11 @@ from fgbaseline.reports.common_frames import known
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
 
+from ..formatting import counted, listed, number, per_cent
 from .accuracy_verdict import by_products, compared, nearest_sentences, truth_sentences
 from .coverage import coverage_sentences, little_truth_sentences
 from .departure import AROUND, departure, far, worst_second, wrong_share
 from .evidence_verdict import covariance_sentences, held_out_sentences
-from .numbers import counted, listed, number, per_cent
 
 
 def verdict(run: Run) -> list[str]:

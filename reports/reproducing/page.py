@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data.plural import plural
 
+from ..formatting import number
 from ..page.embedding import Picture, picture
-from ..page.numbers import number
 from .claim import Claim, Verdict
 from .measures import metres, per_cent
 from .study import Study

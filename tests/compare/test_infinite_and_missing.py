@@ -15,7 +15,7 @@ from fgbaseline.compare.statistics import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.reports import comparison, page
-from fgbaseline.reports.page.numbers import number
+from fgbaseline.reports.formatting import number
 from fgbaseline.reports.page.table import main_table
 from fgbaseline.reports.summary import metrics_table, summarise
 

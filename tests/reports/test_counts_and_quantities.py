@@ -9,7 +9,7 @@ from fgbaseline import compare, data
 from fgbaseline.data.plural import noun, plural
 from fgbaseline.geometry import se3
 from fgbaseline.reports.comparing import compare as compared
-from fgbaseline.reports.page.numbers import counted, number
+from fgbaseline.reports.formatting import counted, number
 
 
 def test_a_count_of_one_has_a_singular() -> None:

@@ -16,7 +16,7 @@ from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures, page
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.palette import OWN, REFERENCE, SPARE, TRUTH, on_dark
-from fgbaseline.reports.page.numbers import number
+from fgbaseline.reports.formatting import number
 from fgbaseline.reports.page.table import COLUMNS, main_table
 
 from ..builders.reported import answer, as_dict, failed, run_of, scene, standard_run

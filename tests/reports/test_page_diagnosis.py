@@ -7,7 +7,7 @@ import pytest
 from fgbaseline.data.diagnose import Finding
 from fgbaseline.reports import page
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.page.numbers import quantity
+from fgbaseline.reports.formatting import quantity
 from fgbaseline.reports.summary import summarise
 
 from ..builders.reported import standard_run

@@ -1,0 +1,100 @@
+"""Numbers, counts and names as text: for sentences and tables, and made safe for LaTeX and Markdown."""
+
+import re
+from collections.abc import Iterable
+from math import isfinite, isinf
+
+from fgbaseline.data.plural import noun
+
+DASH = "–"
+INFINITY = "∞"
+MINUS = "\N{MINUS SIGN}"
+NO_BREAK = "\N{NO-BREAK SPACE}"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_TEX = {
+    "\\": r"\textbackslash{}",
+    **{c: "\\" + c for c in "&%$#_{}"},
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "°": r"$^\circ$",
+    "×": r"$\times$",
+    "↑": r"$\uparrow$",
+    "↓": r"$\downarrow$",
+    "–": "--",
+    MINUS: "$-$",
+    "\N{NARROW NO-BREAK SPACE}": r"\,",
+}
+
+
+def number(value: object) -> str:
+    """A number to three significant digits (whole from 1000 on, counts in full), ∞, or a dash for None and NaN."""
+    if isinstance(value, float) and isinf(value):
+        return INFINITY if value > 0 else f"{MINUS}{INFINITY}"
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        return DASH
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    size = abs(value)
+    if size == 0.0:
+        return "0"
+    if 1e-3 <= size < 999.5:
+        return f"{value:#.3g}".rstrip(".").replace("-", MINUS)
+    if 999.5 <= size < 1e6:
+        return number(round(value)).replace("-", MINUS)
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", MINUS)
+
+
+def interval(value: float, low: float, high: float) -> str:
+    """`0.52 [0.41, 0.66]`, or the value alone where its interval is not finite."""
+    return f"{number(value)} [{number(low)}, {number(high)}]" if isfinite(low) and isfinite(high) else number(value)
+
+
+def counted(n: int, one: str, many: str = "") -> str:
+    """A count and its noun: `one` for 1, else `many`, by default `one` with an s."""
+    return f"{number(n)} {noun(n, one, many)}"
+
+
+def per_cent(share: float) -> str:
+    """A share of one as per cent; a dash for NaN."""
+    return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
+
+
+def meters(value: float) -> str:
+    """`0.35 m`, `79.6 m`, `1342 m`, `28.9 km`; `no path` for what is not finite."""
+    if not isfinite(value):
+        return "no path"
+    size = abs(value)
+    if size >= 9_999.5:
+        return f"{value / 1000:.3g} km"
+    return f"{value:.0f} m" if size >= 999.5 else f"{value:.3g} m"
+
+
+def quantity(value: float, unit: str) -> str:
+    """A finding's figure: a share as per cent, a physical unit beside the number, and none beside a count."""
+    if unit.startswith("share"):
+        return per_cent(value)
+    if unit in ("m/s", "rad/s", "°"):
+        return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
+    return number(int(value) if float(value).is_integer() else value)
+
+
+def listed(items: Iterable[str]) -> str:
+    """`a, b and c`."""
+    every = list(items)
+    return " and ".join([", ".join(every[:-1]), every[-1]] if len(every) > 1 else every)
+
+
+def tex(text: str) -> str:
+    """Text from files, escaped for LaTeX."""
+    escaped = "".join(_TEX.get(c, c) for c in text)
+    return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda found: f"$^{{{found[0].translate(_DIGITS)}}}$", escaped)
+
+
+def md(text: str) -> str:
+    """Text from files on one line, escaped for Markdown."""
+    return re.sub(r"([\\`*_{}\[\]<>#|~@])", r"\\\1", " ".join(text.split()))
