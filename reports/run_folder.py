@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from fgbaseline.compare import reprojection_by
 from fgbaseline.data import Estimate, write_tum
 
-from . import figures, page
+from . import figures, html
 from .comparison import Result, Run
 from .job import MARK
 from .run_tables import consistency_series, write_tables
@@ -69,7 +69,7 @@ def nine_digits(table: pd.DataFrame) -> pd.DataFrame:
 
 def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.Written]) -> None:
     """`report.html`, with the figures that were drawn."""
-    (folder / "report.html").write_text(page.render(run, _as_dict(summary), drawn), encoding="utf-8")
+    (folder / "report.html").write_text(html.render(run, _as_dict(summary), drawn), encoding="utf-8")
 
 
 def _as_dict(summary: Summary) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def _ours(pages: bool) -> Iterator[Path]:
     yield from reports.glob("*.py")
     yield from (reports / "bench" / name for name in ("work.py", "costs.py"))
     if pages:
-        for part in ("figures", "page"):
+        for part in ("figures", "html", "results", "tables"):
             yield from (file for file in (reports / part).rglob("*") if file.suffix in (".py", ".html", ".css", ".js"))
 
 

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from ..figures.palette import colours_of
 from ..formatting import counted, interval
-from ..page.embedding import picture
-from ..page.rendering import environment
+from ..html.environment import environment, picture
 from .grid import main_grid
 from .progress import duration
 from .results import METRICS, Results
@@ -50,7 +49,7 @@ def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
         environment()
         .get_template("bench.html")
         .render(
-            css=Markup(files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")),
+            css=Markup(files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")),
             name=name,
             results=results,
             spent=duration(results.seconds),

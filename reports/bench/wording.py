@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from ..formatting import interval, listed, number
-from ..page.accuracy_verdict import SAME_GRAPH
+from ..html.accuracy_verdict import SAME_GRAPH
 from .figures import judge
 from .results import ANSWERED, METRICS, Metric, Results
 from .tables import consistency, overall, rankings, records

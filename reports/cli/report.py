@@ -45,7 +45,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
         told.say("diagnosing the recording")
     with shared(lambda _: job.pose_problem(kept, settings, cores()), 1, cores()) as posed:
         # Two seconds of imports: bad input is told before, and the diagnosis goes on meanwhile.
-        from .. import page
+        from .. import html
         from ..run_folder import write_run
 
         job.load_estimators(settings.estimators)
@@ -64,7 +64,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
 
             write_rerun(run, rerun_file)
     _print_table(summary)
-    for sentence in page.verdict(run):
+    for sentence in html.verdict(run):
         click.echo(sentence)
     click.echo(f"\nThe report is in {place / 'report.html'}")
     return 0 if len(run.answered) == len(run.results) else FAILED

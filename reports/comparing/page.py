@@ -9,8 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ..figures.palette import colours_of
-from ..page.embedding import picture
-from ..page.rendering import environment
+from ..html.environment import environment, picture
 from .comparison import Comparison
 from .summary import summarise
 from .tables import text_table
@@ -43,7 +42,7 @@ def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
         environment()
         .get_template("compare.html")
         .render(
-            css=Markup(files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")),
+            css=Markup(files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")),
             comparison=comparison,
             summary=summarise(comparison).model_dump(mode="json", by_alias=True),
             trust=None if trust is None else trust.verdict.name.lower(),

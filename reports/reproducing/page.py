@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from fgbaseline.data.plural import plural
 
 from ..formatting import number
-from ..page.embedding import Picture, picture
+from ..html.environment import Picture, picture
 from .claim import Claim, Verdict
 from .measures import metres, per_cent
 from .study import Study
@@ -34,7 +34,7 @@ def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str
         _environment()
         .get_template("reproduce.html")
         .render(
-            css=Markup(files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")),
+            css=Markup(files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")),
             studies=studies,
             claims=claims,
             badges=BADGES,

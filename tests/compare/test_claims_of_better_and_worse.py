@@ -15,8 +15,8 @@ from fgbaseline.reports.bench.results import METRICS
 from fgbaseline.reports.bench.wording import _winner
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.page.accuracy_verdict import claimed, nearest_sentences, truth_sentences
-from fgbaseline.reports.page.table import main_table
+from fgbaseline.reports.html.accuracy_verdict import claimed, nearest_sentences, truth_sentences
+from fgbaseline.reports.html.table import main_table
 
 from ..builders.reported import FRAMES, answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem

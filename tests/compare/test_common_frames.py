@@ -21,8 +21,8 @@ from fgbaseline.reports.comparing.paper import latex, markdown
 from fgbaseline.reports.comparing.ranking import ranking_of
 from fgbaseline.reports.comparing.summary import summarise
 from fgbaseline.reports.comparing.wording import order_in_words
-from fgbaseline.reports.page.table import main_table
-from fgbaseline.reports.page.verdict import verdict
+from fgbaseline.reports.html.table import main_table
+from fgbaseline.reports.html.verdict import verdict
 
 from ..builders.reported import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem

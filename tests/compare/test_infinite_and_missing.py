@@ -14,9 +14,9 @@ from fgbaseline import compare, ekf
 from fgbaseline.compare.statistics import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
-from fgbaseline.reports import comparison, page
+from fgbaseline.reports import comparison, html
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.page.table import main_table
+from fgbaseline.reports.html.table import main_table
 from fgbaseline.reports.summary import metrics_table, summarise
 
 from ..builders.synthetic import Scene, plain_problem
@@ -126,7 +126,7 @@ def test_summary_page_and_metrics_say_infinite_and_count_the_missing() -> None:
     assert any("4 errors are missing (NaN) and left out" in text for _, text in table.notes)
     written = metrics_table(summary).set_index(["estimator", "metric"])["value"]
     assert written["half", "ate.missing"] == 4
-    assert page.render(run, document, {})
+    assert html.render(run, document, {})
 
 
 def test_an_infinite_number_reads_so() -> None:

@@ -13,8 +13,8 @@ from fgbaseline.data.exchange import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.figures.reprojections import WRONG
+from fgbaseline.reports.html.departure import worst_second
 from fgbaseline.reports.moving_sum import moving_sum
-from fgbaseline.reports.page.departure import worst_second
 
 from ..builders.commands import fgbaseline
 from ..builders.mutated_files import good_recording, good_trajectory

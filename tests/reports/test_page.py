@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Event, Excluded, Observations, Status
-from fgbaseline.reports import figures, page
+from fgbaseline.reports import figures, html
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.palette import OWN, REFERENCE, SPARE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.page.table import COLUMNS, main_table
+from fgbaseline.reports.html.table import COLUMNS, main_table
 
 from ..builders.reported import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
@@ -26,7 +26,7 @@ SCRIPT = "<script>alert(1)</script>"
 
 
 def rendered(run: Run, *, with_figures: bool = False) -> str:
-    return page.render(run, as_dict(run), figures.draw(run) if with_figures else {})
+    return html.render(run, as_dict(run), figures.draw(run) if with_figures else {})
 
 
 @cache
@@ -248,4 +248,4 @@ def luminance(colour: str) -> float:
 
 
 def standard_style() -> str:
-    return files("fgbaseline.reports.page").joinpath("report.css").read_text(encoding="utf-8")
+    return files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")

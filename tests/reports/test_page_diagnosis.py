@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from fgbaseline.data.diagnose import Finding
-from fgbaseline.reports import page
+from fgbaseline.reports import html
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import quantity
 from fgbaseline.reports.summary import summarise
@@ -14,7 +14,7 @@ from ..builders.reported import standard_run
 
 
 def rendered(run: Run) -> str:
-    return page.render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
+    return html.render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
 
 
 def test_findings_stand_with_their_figures_and_repairs_below() -> None:
@@ -45,10 +45,10 @@ def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -
 
 def test_three_sentences_stand_above_the_table_and_the_rest_is_folded_below() -> None:
     run = standard_run()
-    sentences, html = page.verdict(run), rendered(run)
+    sentences, page = html.verdict(run), rendered(run)
     assert len(sentences) > 3
-    table = html.index('<section id="table"')
-    above, below = html[:table], html[table:]
+    table = page.index('<section id="table"')
+    above, below = page[:table], page[table:]
     assert above.count("<li>") == 3
     assert f"{len(sentences) - 3} more sentences" in below
 

@@ -8,8 +8,8 @@ from fgbaseline import compare
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.page import verdict
-from fgbaseline.reports.page.departure import departure
+from fgbaseline.reports.html import verdict
+from fgbaseline.reports.html.departure import departure
 
 from ..builders.reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

@@ -6,7 +6,7 @@ from pathlib import Path
 from fgbaseline import compare, data, smoother
 from fgbaseline.reports.comparing import compare as compared
 from fgbaseline.reports.comparison import compare_all
-from fgbaseline.reports.page import verdict
+from fgbaseline.reports.html import verdict
 
 Recordings = Callable[[str], Path]
 

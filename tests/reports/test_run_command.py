@@ -149,7 +149,7 @@ def test_elsewhere_than_on_a_terminal_progress_is_plain_lines(finished: Finished
 def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures and page cost more than all the rest."""
     monkeypatch.setattr("fgbaseline.reports.figures.draw", lambda *_: {})
-    monkeypatch.setattr("fgbaseline.reports.page.render", lambda *_: "")
+    monkeypatch.setattr("fgbaseline.reports.html.render", lambda *_: "")
 
 
 @pytest.mark.usefixtures("without_figures")

@@ -1,13 +1,22 @@
-"""Figures inside the page: each an image of its own, so that nothing in it can reach out or run."""
+"""The templates of all pages, and figures inside them, each an image of its own: nothing can reach out or run."""
 
+import re
 from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
 
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fgbaseline.reports.figures import Written, encoded
 
+from ..formatting import counted, number
+
+NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+"""content security policy of a page without a script"""
 LARGEST_SVG = 200_000
 """bytes, from which on the PNG takes its place"""
 
@@ -67,3 +76,36 @@ def picture(name: str, figure: Figure | Written) -> Picture:
         width=round(100 * width),
         height=round(100 * height),
     )
+
+
+def environment() -> Environment:
+    """Templates beside this module; everything is escaped, and an unknown name is an error."""
+    jinja = Environment(
+        loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    jinja.filters |= {"number": number, "counted": counted, "flat": flat, "anchor": anchor}
+    jinja.globals |= {"css": Markup(asset("report.css")), "policy": NO_SCRIPT}
+    return jinja
+
+
+def anchor(text: str) -> str:
+    """A title as the name of a place on the page."""
+    return re.sub(r"\W+", "-", text).strip("-").lower()
+
+
+def flat(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """The leaves of nested settings as (dotted name, text)."""
+    leaves: list[tuple[str, str]] = []
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            leaves += flat(value, f"{above}{key}.")
+        elif isinstance(value, list | tuple):
+            leaves.append((f"{above}{key}", ", ".join(map(str, value))))
+        else:
+            leaves.append((f"{above}{key}", "–" if value is None else str(value)))
+    return leaves
+
+
+def asset(name: str) -> str:
+    """A template, style sheet or script of this folder."""
+    return files("fgbaseline.reports.html").joinpath(name).read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ PIECES = ("data.js", "state.js", "drawing.js", "chart.js", "path.js", "frame.js"
 @cache
 def script() -> Markup:
     """The script as it stands between its tags."""
-    folder = files("fgbaseline.reports.page").joinpath("browser")
+    folder = files("fgbaseline.reports.html").joinpath("browser")
     text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in PIECES)
     return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
 

@@ -2,11 +2,9 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -14,11 +12,11 @@ from fgbaseline.data import Event
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures import Written
 
-from ..formatting import counted, number, per_cent
+from ..formatting import per_cent
 from .charts import TRUTH_LINE
 from .colouring import colour_rules, keys
 from .diagnosis import findings
-from .embedding import picture
+from .environment import asset, environment, picture
 from .evidence import EVIDENCE, evidence_table, folded_tables
 from .packing import embedded_json
 from .payload import payload
@@ -57,7 +55,7 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
         environment()
         .get_template("report.html")
         .render(
-            css=Markup(_text("report.css") + _text("explore.css")),
+            css=Markup(asset("report.css") + asset("explore.css")),
             colour_rules=colour_rules(run),
             script=script(),
             policy=policy(),
@@ -96,30 +94,6 @@ def _shown(run: Run) -> list[tuple[str, str]]:
     return answered if run.problem.sequence.truth is None else [*answered, (TRUTH_LINE, "truth")]
 
 
-def environment() -> Environment:
-    """Templates beside this module; everything is escaped, and an unknown name is an error."""
-    jinja = Environment(
-        loader=FunctionLoader(_text), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    jinja.filters["number"] = number
-    jinja.filters["counted"] = counted
-    jinja.filters["flat"] = flat
-    return jinja
-
-
-def flat(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
-    """The leaves of nested settings as (dotted name, text)."""
-    leaves: list[tuple[str, str]] = []
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            leaves += flat(value, f"{above}{key}.")
-        elif isinstance(value, list | tuple):
-            leaves.append((f"{above}{key}", ", ".join(map(str, value))))
-        else:
-            leaves.append((f"{above}{key}", "–" if value is None else str(value)))
-    return leaves
-
-
 def _components(summary: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Bias and spread of uL, vL, uR and vR by estimator, where an estimator has any."""
     components = {name: e.get("components") or {} for name, e in summary.get("estimators", {}).items()}
@@ -147,7 +121,3 @@ def _events(run: Run) -> list[tuple[str, list[tuple[str, int]], tuple[Event, ...
         kinds = Counter(event.kind for event in events).most_common()
         listed.append((names, kinds, events[:MOST_EVENTS], max(0, len(events) - MOST_EVENTS)))
     return listed
-
-
-def _text(name: str) -> str:
-    return files("fgbaseline.reports.page").joinpath(name).read_text(encoding="utf-8")
