@@ -1,18 +1,23 @@
 """What the increments led to is the whole graph's minimum already, nearly; the final relinearisation takes the rest."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fgbaseline import compare, smoother
+from fgbaseline import compare, data, smoother
 from fgbaseline.compare.cost import cost
 from fgbaseline.data import HuberKernel
+from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
 from fgbaseline.smoother.incremental import IncrementalSmoother
 from fgbaseline.smoother.keys import TAIL
-from fgbaseline.smoother.relinearised import compact
+from fgbaseline.smoother.relinearised import compact, relinearised
+from fgbaseline.smoother.starts import landmarks_from
+from fgbaseline.smoother.whole_graph import values_at, whole_graph
 
 from ..builders.synthetic import drive, matched
 
@@ -64,3 +69,28 @@ def error(increments: IncrementalSmoother) -> float:
         if TAIL in list(graph.at(i).keys()):  # linearised far off, and no part of the problem
             graph.remove(i)
     return float(compact(graph).error(tree.calculateEstimate()))
+
+
+def test_steps_from_far_off_end_at_the_minimum_or_say_that_they_do_not() -> None:
+    problem = matched(drive(seconds=8.0, features_per_frame=20.0, wrong=0.05))
+    batch = smoother.batch(problem)
+    graph, path = whole_graph(problem), dead_reckoned_path(problem.increment, problem.initial_pose)
+    along = landmarks_from(problem, path)
+    start = values_at(path, replace(along, position=path[-1, :3, 3] + 1.2 * (along.position - path[-1, :3, 3])))
+    lowest = cost(problem, batch, batch.used)
+    assert graph.error(start) > 100.0 * lowest
+    end = relinearised(graph, start)
+    assert not end.failure
+    assert graph.error(end.values) < (1.0 + 1e-4) * lowest
+    early = relinearised(graph, start, max_steps=2)
+    assert "still falls after 2" in early.failure
+    assert graph.error(early.values) > 2.0 * lowest
+
+
+@pytest.mark.slow
+def test_a_recording_in_wrong_axes_ends_at_the_minimum_too(recordings: Callable[[str], Path]) -> None:
+    sequence = data.read(recordings("utias/2011_09_26_drive_0009_sync_KLT.mat"))
+    problem = data.calibrated(sequence, settings=data.Calibration())
+    answer = smoother.isam2(problem)
+    batch = smoother.batch(problem, given={"isam2": answer})
+    assert cost(problem, answer, batch.used) < (1.0 + 1e-5) * cost(problem, batch, batch.used)
