@@ -18,9 +18,9 @@ from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother import elimination
-from fgbaseline.smoother.elimination import Chronology
-from fgbaseline.smoother.incremental import ISAM2Settings
-from fgbaseline.smoother.starts import restricted
+from fgbaseline.smoother.initialization.initial_values import restricted
+from fgbaseline.smoother.isam2.elimination_ordering import Chronology
+from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from .gtsam_time import INCREMENTAL, gtsam_timed
 

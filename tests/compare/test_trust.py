@@ -16,7 +16,8 @@ from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import disparity
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import whole_graph
+from fgbaseline.smoother.graph.gtsam_conversions import values_at
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
 

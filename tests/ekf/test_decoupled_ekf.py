@@ -12,9 +12,9 @@ from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, Problem, Reading, Status
 from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
+from fgbaseline.ekf.decoupled_ekf import _loss_as_printed
+from fgbaseline.ekf.landmark_mapping import map_along
 from fgbaseline.ekf.landmark_update import LandmarkBlocks
-from fgbaseline.ekf.mapping import map_along
-from fgbaseline.ekf.slam import _loss_as_printed
 from fgbaseline.geometry import FloatArray, HuberKernel, se3
 from fgbaseline.geometry.measurement import measured_rows, predict
 

@@ -12,9 +12,16 @@ from scipy.stats import chi2
 from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
-from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
-from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
-from fgbaseline.ekf.screening import screened
+from fgbaseline.ekf.joint.gating import screened
+from fgbaseline.ekf.joint.landmark_representation import (
+    chart,
+    coordinates_of,
+    generators,
+    homogeneous,
+    moved_by,
+    world_points,
+)
+from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
 from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fgbaseline import ekf
 from fgbaseline.data import Estimate, LandmarkPrior, Problem, Sequence, Status
 from fgbaseline.ekf import JointSettings
-from fgbaseline.ekf.admission import CELL, admitted
+from fgbaseline.ekf.joint.feature_selection import CELL, admitted
 from fgbaseline.geometry import FloatArray, se3
 
 from ..builders.hostile import CROWD, CROWD_FRAMES, HALF, base, crowd

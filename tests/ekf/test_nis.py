@@ -8,8 +8,8 @@ from scipy.stats import chi2
 
 from fgbaseline.data import HuberKernel
 from fgbaseline.ekf import ekf, joint_ekf
-from fgbaseline.ekf.innovation_norm import squared_norm_of_known
-from fgbaseline.ekf.joint_update import Factor, NotPositiveDefiniteError
+from fgbaseline.ekf.joint.update import Factor, NotPositiveDefiniteError
+from fgbaseline.ekf.nis import squared_norm_of_known
 from fgbaseline.geometry import se3
 
 from ..builders.synthetic import Scene, first_innovation, plain_problem

@@ -10,17 +10,18 @@ from hypothesis import strategies as st
 from fgbaseline.compare.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
 from fgbaseline.data.diagnose.window_terms import WindowData, joined, pixel_terms
-from fgbaseline.ekf.joint_settings import JointSettings
-from fgbaseline.ekf.joint_update import Innovation, StackedJacobian
+from fgbaseline.ekf.joint.gating import screened
+from fgbaseline.ekf.joint.settings import JointSettings
+from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
-from fgbaseline.ekf.screening import screened
 from fgbaseline.geometry import se3
 from fgbaseline.geometry.measurement import measured_rows, predict, squared_norm
 from fgbaseline.geometry.stereo import PRINTED
 from fgbaseline.geometry.triangulation import triangulate_tracks
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key, pose_key
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import whole_graph
+from fgbaseline.smoother.graph.factors import Factors
+from fgbaseline.smoother.graph.gtsam_conversions import values_at
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 
 from ..builders.synthetic import Scene, plain_problem, with_pixels
 

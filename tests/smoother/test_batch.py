@@ -10,11 +10,11 @@ from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray
-from fgbaseline.smoother.convention import reordered
-from fgbaseline.smoother.covariances import covariances
-from fgbaseline.smoother.keys import landmark_key, pose_key
-from fgbaseline.smoother.pieces import piecewise
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import whole_graph
+from fgbaseline.smoother.graph.gtsam_conversions import reordered, values_at
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
+from fgbaseline.smoother.graph.marginal_covariances import covariances
+from fgbaseline.smoother.initialization.windowed_initialization import piecewise
 
 from ..builders.four_rows import cost, information
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels

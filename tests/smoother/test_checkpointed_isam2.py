@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.measurement import measured_rows
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
-from fgbaseline.smoother.keys import landmark_key, pose_key
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.graph.factors import Factors
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
+from fgbaseline.smoother.isam2.checkpointed_isam2 import RestorableISAM2
 
 from ..builders.synthetic import Scene, plain_problem
 

@@ -13,8 +13,8 @@ from fgbaseline.data import NoiseSettings, Problem
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.smoother import incremental
-from fgbaseline.smoother.elimination import CROWD, FRAMES, GROUPS, Chronology
-from fgbaseline.smoother.keys import TAIL, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.graph.keys import TAIL, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.isam2.elimination_ordering import CROWD, FRAMES, GROUPS, Chronology
 
 LIFE = 3
 """frames that a landmark of these drives is seen"""

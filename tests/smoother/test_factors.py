@@ -13,9 +13,9 @@ from fgbaseline.data import HuberKernel, Problem
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
-from fgbaseline.smoother.convention import reordered
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key, pose_key
+from fgbaseline.smoother.graph.factors import Factors
+from fgbaseline.smoother.graph.gtsam_conversions import reordered
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 
 from ..builders.four_rows import State, cost
 from ..builders.synthetic import Scene, drive, plain_problem

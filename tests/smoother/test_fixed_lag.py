@@ -11,11 +11,11 @@ from fgbaseline.data import HuberKernel, Observations, Status
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.smoother import FixedLagSettings
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.incremental import ISAM2Settings
-from fgbaseline.smoother.journal import IndeterminateSystemError
-from fgbaseline.smoother.keys import distance_key, pose_key
-from fgbaseline.smoother.restorable_lag import RestorableLag
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.fixed_lag.checkpointed_fixed_lag import RestorableLag
+from fgbaseline.smoother.graph.factors import Factors
+from fgbaseline.smoother.graph.keys import distance_key, pose_key
+from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 from .test_isam2 import PROBLEMS, SCENE, flipped, truncated

@@ -10,9 +10,9 @@ from fgbaseline.compare.cost import cost
 from fgbaseline.data import HuberKernel
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.incremental import IncrementalSmoother
-from fgbaseline.smoother.keys import TAIL
-from fgbaseline.smoother.relinearised import compact
+from fgbaseline.smoother.graph.gauss_newton import compact
+from fgbaseline.smoother.graph.keys import TAIL
+from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
 
 from ..builders.synthetic import drive, matched
 

@@ -12,9 +12,9 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.track_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key
-from fgbaseline.smoother.waiting import EntryRule, WaitingLandmarks
+from fgbaseline.smoother.graph.factors import Factors
+from fgbaseline.smoother.graph.keys import landmark_key
+from fgbaseline.smoother.initialization.landmark_initialization import EntryRule, WaitingLandmarks
 
 from ..builders.four_rows import State, cost, information
 from ..builders.synthetic import Scene, drive, first_frames, matched, plain_problem, position_errors, with_pixels

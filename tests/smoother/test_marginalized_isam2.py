@@ -13,12 +13,12 @@ from fgbaseline import smoother
 from fgbaseline.data import Estimate, LandmarkPrior, Observations, Problem, Status
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.incremental import IncrementalSmoother
-from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
-from fgbaseline.smoother.keys import landmark_of
-from fgbaseline.smoother.moving_tree import MovingTree
-from fgbaseline.smoother.reach import UNSEEN_FRAMES, earliest_tracked
-from fgbaseline.smoother.starts import triangulated
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.graph.keys import landmark_of
+from fgbaseline.smoother.initialization.initial_values import triangulated
+from fgbaseline.smoother.isam2.checkpointed_isam2 import RestorableISAM2
+from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
+from fgbaseline.smoother.isam2.marginalized_isam2 import UNSEEN_FRAMES, MovingTree, earliest_tracked
 
 from ..builders.synthetic import drive, matched
 

@@ -5,9 +5,10 @@ import pytest
 
 from fgbaseline import smoother
 from fgbaseline.data import Status
-from fgbaseline.smoother.arrival import Arrival
-from fgbaseline.smoother.incremental import IncrementalSmoother, ISAM2Settings
-from fgbaseline.smoother.journal import IndeterminateSystemError
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.frame_update import Arrival
+from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
+from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from ..builders.synthetic import Scene, plain_problem
 

@@ -1,0 +1,59 @@
+"""The landmarks of the joint filter over the whole drive: when each was seen last, and what is reported of it.
+
+A filter does not know which landmark it will see again. One that no frame has seen for a while is marginalized; if it
+comes back it is a new one, because what its first estimate knew is in the pose already and would count twice.
+"""
+
+import numpy as np
+
+from fgbaseline.data.estimate import Event, EventKind, Landmarks
+from fgbaseline.data.observations import BoolArray, IntArray
+
+from .landmark_representation import WorldPoints
+
+AT_INFINITY = "its sights put it at infinity or beyond"
+FULL = "the state was full while it was seen"
+NOT_BELIEVED = "no frame that was believed saw it"
+
+
+class JointMap:
+    """What is known of m landmarks outside of the state."""
+
+    def __init__(self, m: int) -> None:
+        self.last_seen: IntArray = np.full(m, -1, dtype=np.int64)
+        """(m,) frame of the last observation so far; -1 before the first"""
+        self.initialized: BoolArray = np.zeros(m, dtype=np.bool_)
+        """(m,) which have been in the state"""
+        self.turned_away: BoolArray = np.zeros(m, dtype=np.bool_)
+        """(m,) of which some observations were not used because the state was full"""
+        self._position = np.full((m, 3), np.nan)
+        self._covariance = np.full((m, 3, 3), np.nan)
+        self._variance = np.full(m, np.inf)
+        """(m,) m^2, the trace of the covariance"""
+
+    def keep(self, row: IntArray, points: WorldPoints) -> None:
+        """Landmarks `row` (n,) as they are marginalized. Of one that was in the state several times, the estimate with
+        the smallest position variance is reported; estimates of several stays are correlated and are not fused.
+        """
+        variance = np.einsum("nii->n", points.covariance)
+        finite = points.in_sight & np.isfinite(points.position).all(axis=1) & np.isfinite(variance)
+        better = finite & (variance < self._variance[row])
+        at = row[better]
+        self._position[at], self._covariance[at] = points.position[better], points.covariance[better]
+        self._variance[at] = variance[better]
+
+    def landmarks(self, features: IntArray) -> Landmarks:
+        """Those with a position, by the problem's `features` (m,)."""
+        known = np.isfinite(self._position).all(axis=1)
+        return Landmarks(features[known], self._position[known], self._covariance[known])
+
+    def never_determined(self, features: IntArray) -> list[Event]:
+        """After the last frame: the landmarks that were seen and have no position, in the order they were last seen."""
+        row = np.flatnonzero((self.last_seen >= 0) & ~np.isfinite(self._position).all(axis=1))
+        row = row[np.argsort(self.last_seen[row], kind="stable")]
+        why = np.select([self.initialized[row], self.turned_away[row]], [AT_INFINITY, FULL], NOT_BELIEVED)
+        frames = self.last_seen[row].tolist()
+        return [
+            Event(k, EventKind.LANDMARK_NEVER_DETERMINED, str(reason), j)
+            for k, reason, j in zip(frames, why, features[row].tolist(), strict=True)
+        ]

@@ -1,0 +1,187 @@
+"""The state of the joint filter: the pose and every active landmark, with all their covariances.
+
+The error state is [delta (6), d (3), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the error
+of the gyroscope's bias (only where it is estimated), then the coordinates of each active landmark in its chart. Its
+covariance lives in one square array that grows by doubling; a landmark that leaves is overwritten by the last one, so
+that the active part is always the upper left square.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FloatArray
+
+from .landmark_representation import WorldPoints, generators, moved_by, world_points
+
+POSE, BIAS = 6, 3
+ABSENT = -1
+
+
+class JointState:
+    """Pose, gyroscope bias, active landmarks, and one covariance over all of them."""
+
+    def __init__(
+        self,
+        pose: FloatArray,
+        covariance: FloatArray,
+        n_features: int,
+        bias_covariance: FloatArray | None = None,
+        capacity: int = 64,
+    ) -> None:
+        self.pose = pose
+        self.bias = np.zeros(BIAS)
+        """(3,) rad/s; zero where it is not estimated"""
+        self.body = POSE if bias_covariance is None else POSE + BIAS
+        """where the landmarks begin in the error state"""
+        self.predicted_pose = pose
+        """(4, 4) the pose before the frame's update"""
+        self.count = 0
+        self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
+        """(m,) slot of each of the problem's features; ABSENT where it is not active"""
+        self._P = np.zeros((self.body + 3 * capacity, self.body + 3 * capacity))
+        self._P[:POSE, :POSE] = covariance
+        if bias_covariance is not None:
+            self._P[POSE : self.body, POSE : self.body] = bias_covariance
+        self._row = np.zeros(capacity, dtype=np.int64)
+        self._xi, self._first = np.zeros((capacity, 3)), np.zeros((capacity, 3))
+        self._charts = np.zeros((capacity, 4, 4))
+        self._generators = np.zeros((capacity, POSE, 4, 4))
+        self._motion = np.zeros((capacity, 3, POSE))
+
+    def _double(self) -> None:
+        P = np.zeros((2 * len(self._P), 2 * len(self._P)))
+        P[: self.size, : self.size] = self.P
+        self._P = P
+        self._row, self._xi, self._first, self._charts, self._generators, self._motion = (
+            np.concatenate([array, np.zeros_like(array)]) for array in self._of_slots()
+        )
+
+    def _of_slots(self) -> tuple[NDArray[Any], ...]:
+        """What is kept of each landmark beside its rows of P."""
+        return self._row, self._xi, self._first, self._charts, self._generators, self._motion
+
+    @property
+    def size(self) -> int:
+        """The dimension of the error state."""
+        return self.body + 3 * self.count
+
+    @property
+    def P(self) -> FloatArray:  # noqa: N802
+        """(size, size) the covariance, a view."""
+        return self._P[: self.size, : self.size]
+
+    @property
+    def row(self) -> IntArray:
+        """(count,) the feature in each slot, a view."""
+        return self._row[: self.count]
+
+    @property
+    def xi(self) -> FloatArray:
+        """(count, 3) the landmarks' coordinates in their charts, a view."""
+        return self._xi[: self.count]
+
+    @property
+    def first(self) -> FloatArray:
+        """(count, 3) the coordinates that each landmark entered with, a view."""
+        return self._first[: self.count]
+
+    @property
+    def charts(self) -> FloatArray:
+        """(count, 4, 4) the landmarks' charts, a view."""
+        return self._charts[: self.count]
+
+    def move_landmarks(self, by: FloatArray) -> FloatArray:
+        """Adds `by` (count, 3) to their coordinates, and says what that changes in how they move with the world
+        (`landmark_chart.moved_by`): (count, 3, 6).
+        """
+        self.xi[:] += by
+        before = self._motion[: self.count]
+        now = moved_by(self._generators[: self.count], self.xi)
+        change = now - before
+        before[:] = now
+        return change
+
+    def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
+        """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them.
+
+        `transition` and `noise` are (body, body): of the pose, and of the bias where it is estimated.
+        """
+        P, body = self.P, self.body
+        moved = transition @ P[:body]
+        P[:body, body:] = moved[:, body:]
+        P[body:, :body] = moved[:, body:].T
+        own = moved[:, :body] @ transition.T + noise
+        P[:body, :body] = 0.5 * (own + own.T)
+        self.pose = self.predicted_pose = self.pose @ step
+
+    def transport(self, turn: FloatArray, by_pose: FloatArray) -> None:
+        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (3 count, 6).
+
+        The bias stays as it is: its rows of `by_pose` would be zero.
+        """
+        P, G = self.P, by_pose
+        if self.body > POSE:
+            G = np.concatenate([np.zeros((self.body - POSE, POSE)), by_pose])
+        own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
+        half = G @ (cross + 0.5 * own @ G.T)
+        P[POSE:, POSE:] += half + half.T
+        P[:POSE, POSE:] = turn @ (cross + own @ G.T)
+        P[POSE:, :POSE] = P[:POSE, POSE:].T
+        turned = turn @ own @ turn.T
+        P[:POSE, :POSE] = 0.5 * (turned + turned.T)
+
+    def enter(
+        self, row: IntArray, chart: FloatArray, xi: FloatArray, by_pose: FloatArray, covariance: FloatArray
+    ) -> None:
+        """n landmarks become active in one chart (4, 4), with an error of G delta + e each.
+
+        G = `by_pose` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
+        """
+        n, old, new = len(row), self.size, self.size + 3 * len(row)
+        while self.count + n > len(self._row):
+            self._double()
+        slots = slice(self.count, self.count + n)
+        Z = np.broadcast_to(generators(chart), (n, POSE, 4, 4))
+        for array, value in zip(self._of_slots(), (row, xi, xi, chart, Z, moved_by(Z, xi)), strict=True):
+            array[slots] = value
+        self.slot_of[row] = np.arange(self.count, self.count + n)
+        P, G = self._P, by_pose.reshape(3 * n, POSE)
+        cross = G @ P[:POSE, :old]
+        P[old:new, :old] = cross
+        P[:old, old:new] = cross.T
+        own = cross[:, :POSE] @ G.T
+        each = np.arange(n)
+        own.reshape(n, 3, n, 3)[each, :, each, :] += covariance
+        P[old:new, old:new] = 0.5 * (own + own.T)
+        self.count += n
+
+    def leave(self, row: IntArray) -> None:
+        """Active landmarks are marginalised out: their rows and columns go, everything else stays as it is."""
+        leaving = self.slot_of[row]
+        left = self.count - len(leaving)
+        goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
+        goes[leaving] = True
+        holes = np.flatnonzero(goes[:left])
+        movers = left + np.flatnonzero(~goes[left:])
+        for array in self._of_slots():
+            array[holes] = array[movers]
+        to, source = self._indices(holes), self._indices(movers)
+        P = self.P
+        P[to, :] = P[source, :]
+        P[:, to] = P[:, source]
+        self.slot_of[row] = ABSENT
+        self.slot_of[self._row[holes]] = holes
+        self.count = left
+
+    def world_points(self, row: IntArray) -> WorldPoints:
+        """Active landmarks in metres, with their covariances."""
+        slot = self.slot_of[row]
+        index = self._indices(slot).reshape(-1, 3)
+        return world_points(self._charts[slot], self._xi[slot], self._P[index[:, :, None], index[:, None, :]])
+
+    def _indices(self, slot: IntArray) -> IntArray:
+        """(3n,) rows of P of the landmarks in slots (n,)."""
+        return (self.body + 3 * slot[:, None] + np.arange(3)).reshape(-1)

@@ -1,0 +1,134 @@
+"""The whole graph at once: Levenberg-Marquardt to convergence, from two starts, the lower cost counts."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
+from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..graph.cheirality import UNDONE, undone
+from ..graph.gtsam_conversions import landmarks_of, pose_covariances, poses_of
+from ..graph.keys import landmark_key, pose_key
+from ..graph.marginal_covariances import covariances
+from ..initialization.initial_values import chosen, determined_along, restricted
+from ..initialization.landmark_initialization import EntryRule
+from ..isam2.estimator import isam2
+from .full_graph import whole_graph
+from .levenberg_marquardt import Minimum, from_answer, from_path
+
+DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's answer"
+SAME_COST = 1e-4
+"""relative; two starts that end nearer than that have found the same minimum"""
+
+
+def batch(problem: Problem, progress: Progress | None = None, given: Mapping[str, Estimate] | None = None) -> Estimate:
+    """The minimum of the graph that iSAM2 ended with, found from dead reckoning and from iSAM2's answer.
+
+    The observations are those that iSAM2 used, so that costs compare; where it failed, those of the landmarks that
+    are determined along dead reckoning, and there is one start only. An event says both costs. `given` may hold the
+    answer of `isam2` to this problem; else it is found here, and `by_products` has it with `isam2-online`. The time
+    is that of the batch solution alone.
+    """
+    answer = (given or {}).get("isam2")
+    by_products: dict[str, Estimate] = {}
+    if answer is None:
+        answer = isam2(problem, progress)
+        by_products = {"isam2": answer, **answer.by_products}
+    elif progress is not None:
+        progress(problem.n_frames, problem.n_frames)
+    with threadpool_limits(limits=1, user_api="blas"):
+        return replace(_solve(problem, answer), by_products=by_products)
+
+
+def _solve(problem: Problem, answer: Estimate) -> Estimate:
+    start = time.perf_counter()
+    T, path = problem.n_frames, dead_reckoned_path(problem.increment, problem.initial_pose)
+    failed = answer.status is Status.FAILED
+    used = determined_along(problem, path, EntryRule()) if failed else answer.used
+    events: list[Event] = []
+    while used.any():
+        kept = restricted(problem, used)
+        minima = _minima(kept, path, None if failed else answer, events)
+        if not minima:
+            break
+        best = min(minima, key=lambda minimum: minimum.cost)
+        world_T_imu = poses_of(best.values, range(T))
+        gone = undone(kept, kept.observations(), world_T_imu, landmarks_of(best.values, _keys(kept)))
+        if not gone:
+            covariance, landmarks = _marginals(kept, best, events)
+            status, reason = _verdict(answer, events)
+            return Estimate(
+                name="batch",
+                world_T_imu=world_T_imu,
+                covariance=covariance,
+                landmarks=landmarks,
+                used=used,
+                status=status,
+                reason=reason,
+                seconds_total=time.perf_counter() - start,
+                events=(*events, _costs(minima, T - 1)),
+            )
+        # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
+        events += [Event(T - 1, EventKind.LANDMARK_DROPPED, UNDONE, j) for j in gone]
+        used = used & ~np.isin(problem.sequence.observations.landmark, gone)
+    return Estimate.failed("batch", "no landmark is determined, or no descent ended", T, len(used))
+
+
+def _verdict(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
+    trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
+    if answer.status is Status.FAILED:
+        trouble.insert(0, f"isam2 gave no answer to start from ({answer.reason})")
+    return (Status.RECOVERED, ", ".join(trouble)) if trouble else (Status.OK, "")
+
+
+def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: list[Event]) -> list[Minimum]:
+    """Where the descents end; one that GTSAM breaks off is an event."""
+    graph = whole_graph(kept)
+    starts: list[Callable[[], Minimum]] = [lambda: from_path(graph, kept, DEAD_RECKONING, path)]
+    if answer is not None:
+        landmarks = chosen(answer.landmarks, np.unique(kept.observations().landmark))
+        starts.append(lambda: from_answer(graph, ISAM2, answer.world_T_imu, landmarks))
+    minima = []
+    for descend in starts:
+        try:
+            minima.append(descend())
+        except RuntimeError as error:
+            events.append(Event(kept.n_frames - 1, EventKind.DESCENT_FAILED, str(error).strip().partition("\n")[0]))
+    return [minimum for minimum in minima if np.isfinite(minimum.cost)]
+
+
+def _costs(minima: list[Minimum], last: int) -> Event:
+    """What the starts came to."""
+    told = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
+    if len(minima) == 1:
+        return Event(last, EventKind.ONE_START, f"the cost is {told}: nothing says that it is the lowest")
+    low, high = sorted(minimum.cost for minimum in minima)
+    share = high / low - 1.0 if low > 0 else float("inf")
+    one, other = (poses_of(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
+    rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
+    apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
+    if share <= SAME_COST:
+        return Event(last, EventKind.SAME_COST, f"the cost is {told}: {apart}")
+    return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
+
+
+def _marginals(kept: Problem, best: Minimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
+    T, keys = kept.n_frames, _keys(kept)
+    try:
+        covariance = covariances(whole_graph(kept), best.values)
+    except RuntimeError:
+        events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
+        return np.full((T, 6, 6), np.nan), landmarks_of(best.values, keys)
+    poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
+    return poses, landmarks_of(best.values, keys, covariance)
+
+
+def _keys(problem: Problem) -> dict[int, int]:
+    return {int(j): landmark_key(int(j)) for j in np.unique(problem.observations().landmark)}

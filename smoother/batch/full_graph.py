@@ -1,0 +1,25 @@
+"""The graph of a whole problem at once: every pose, and the landmarks of the observations that take part."""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry.measurement import measured_rows
+
+from ..graph.factors import Factors
+from ..graph.keys import landmark_key
+
+
+def whole_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
+    """First pose, increments, every observation that takes part, and the priors of their landmarks."""
+    factors, graph = Factors(problem), gtsam.NonlinearFactorGraph()
+    graph.push_back(factors.first_pose())
+    for k in range(problem.n_frames - 1):
+        graph.push_back(factors.motion(k))
+    o = problem.observations()
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), rows))
+    if problem.landmark_prior is not None:
+        for j in np.unique(o.landmark).tolist():
+            graph.push_back(factors.landmark_prior(j, landmark_key(j)))
+    return graph

@@ -1,0 +1,162 @@
+"""The window of a fixed-lag smoother over the problem: what is in it, and what was known as it left."""
+
+from collections import Counter
+from collections.abc import Collection
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..errors import IndeterminateSystemError
+from ..frame_update import Arrival
+from ..graph.cheirality import UNDONE, undone
+from ..graph.gtsam_conversions import landmarks_of, pose_covariances, poses_of
+from ..graph.keys import distance_key, landmark_of, pose_key
+from ..graph_builder import Arrivals
+from ..isam2.settings import ISAM2Settings
+from .checkpointed_fixed_lag import RestorableLag
+
+
+class Window:
+    """Frames and landmarks of the last `lag` seconds; a landmark's time is that of the frame that saw it last."""
+
+    def __init__(self, problem: Problem, arrivals: Arrivals, lag: float, settings: ISAM2Settings) -> None:
+        self._problem, self._arrivals, self._baseline = problem, arrivals, problem.sequence.camera.baseline
+        self._lag = RestorableLag(lag, settings, self._baseline)
+        self._seconds = lag
+        self._seen_at: dict[int, float] = {}
+        """of each landmark in the window"""
+        self._observed: dict[int, list[int]] = {}
+        self._times_entered: Counter[int] = Counter()
+        self.key: dict[int, int] = {}
+        """of each landmark in the window; one that comes back has a new one"""
+        self.oldest = 0
+        """frame in the window"""
+        self.newest = -1
+        self.used = np.zeros(len(arrivals.observations), dtype=np.bool_)
+        self.path = np.full((problem.n_frames, 4, 4), np.nan)
+        """world_T_imu of the frames that left, with all of the data in the window then"""
+        self.covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        self.lost: list[int] = []
+        """landmarks whose geometry had come undone when they left"""
+        self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}
+
+    def add(self, arrival: Arrival, given_up: Collection[int]) -> None:
+        """See `arrival.Graph`."""
+        k, now = arrival.frame, float(self._problem.sequence.t[arrival.frame])
+        graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        values.insert(pose_key(k), gtsam.Pose3(arrival.guess))
+        graph.push_back(arrival.motion)
+        new: dict[int, int] = {}
+        for entry in arrival.entries:
+            j = entry.landmark
+            distance = float(np.linalg.norm(entry.start - arrival.guess[:3, 3])) / self._baseline
+            name = j + self._problem.sequence.n_landmarks * self._times_entered[j]
+            new[j] = distance_key(name, distance)
+            values.insert(new[j], entry.start)
+            if self._problem.landmark_prior is not None:
+                graph.push_back(self._arrivals.factors.landmark_prior(j, new[j]))
+            for i in entry.observation:
+                graph.push_back(self._arrivals.stereo(i, new[j]))
+        for j, i in arrival.seen.items():
+            graph.push_back(self._arrivals.stereo(i, self.key[j]))
+        seen = new | {j: self.key[j] for j in arrival.seen}
+        times = {pose_key(k): now} | dict.fromkeys(seen.values(), now)
+        forgotten = {self.key[j] for j in given_up if j in self.key}
+        try:
+            self._lag.update(graph, values, times, forgotten)
+        except IndeterminateSystemError:
+            if set(self.undone(self.key)) - set(given_up):
+                raise
+            # No landmark is to blame: it may be the pivots alone.
+            self._lag.update(graph, values, times, forgotten, careful=True)
+        self._note(arrival, new, now, given_up)
+
+    def _note(self, arrival: Arrival, new: dict[int, int], now: float, given_up: Collection[int]) -> None:
+        """What the update has changed."""
+        self.newest = arrival.frame
+        for j in given_up:
+            self.used[self._observed.pop(j, [])] = False
+            self._leave(j)
+        self.key |= new
+        self._times_entered.update(new.keys())
+        for entry in arrival.entries:
+            self._observed[entry.landmark] = list(entry.observation)
+        for j, i in arrival.seen.items():
+            self._observed[j].append(i)
+        for j in (*new, *arrival.seen):
+            self._seen_at[j] = now
+            self.used[self._observed[j]] = True
+        while self._problem.sequence.t[self.oldest] < now - self._seconds:
+            self.oldest += 1
+        for j in [j for j, time in self._seen_at.items() if time < now - self._seconds]:
+            self._leave(j)
+
+    def _leave(self, landmark: int) -> None:
+        for known in (self.key, self._seen_at, self._observed):
+            known.pop(landmark, None)
+
+    def suspects(self, error: IndeterminateSystemError, given_up: Collection[int]) -> dict[int, str]:
+        """See `arrival.Graph`; as in `IncrementalSmoother`."""
+        culprits = [j for j in self.undone(self.key) if j not in given_up]
+        if culprits:
+            return dict.fromkeys(culprits, UNDONE)
+        named = None if error.key is None else landmark_of(error.key)
+        if named is None or named % self._problem.sequence.n_landmarks in given_up:
+            return {}
+        return {named % self._problem.sequence.n_landmarks: "the system was indeterminate near it"}
+
+    def undone(self, landmarks: Collection[int]) -> list[int]:
+        """Those of the landmarks in the window that are no point in front of the cameras in it."""
+        if not landmarks:
+            return []
+        values = self._lag.smoother.calculateEstimate()
+        path = np.full_like(self.path, np.nan)
+        path[self.oldest : self.newest + 1] = poses_of(values, range(self.oldest, self.newest + 1))
+        o = self._arrivals.observations.select(np.sort([i for j in landmarks for i in self._observed[j]]))
+        o = o.select(o.frame >= self.oldest)
+        return undone(self._problem, o, path, landmarks_of(values, {j: self.key[j] for j in landmarks}))
+
+    def pose(self, frame: int) -> FloatArray:
+        """The world_T_imu (4, 4) of a frame in the window."""
+        return np.asarray(self._lag.smoother.calculateEstimatePose3(pose_key(frame)).matrix(), dtype=np.float64)
+
+    def position(self, landmark: int) -> FloatArray:
+        """(3,) m of a landmark in the window."""
+        return np.asarray(self._lag.smoother.calculateEstimatePoint3(self.key[landmark]), dtype=np.float64)
+
+    def keep_leaving(self, now: float, seen: Collection[int]) -> None:
+        """Keeps what is known of all that leaves the window at the time `now`, but for the landmarks `seen` then."""
+        window = range(self.oldest, self.newest + 1)
+        frames = [frame for frame in window if self._problem.sequence.t[frame] < now - self._seconds]
+        leaving = [j for j, time in self._seen_at.items() if time < now - self._seconds and j not in seen]
+        if not frames and not leaving:
+            return
+        covariance = self._covariances([*map(pose_key, frames), *(self.key[j] for j in leaving)])
+        for frame in frames:
+            self.path[frame] = self.pose(frame)
+            self.covariance[frame] = pose_covariances(self._problem, [covariance[pose_key(frame)]], frame)[0]
+        lost = self.undone(leaving)
+        self.lost += lost
+        for j in leaving:
+            if j in lost:
+                self.used[self._observed[j]] = False
+            else:
+                self._landmark[j] = (self.position(j), covariance[self.key[j]])
+
+    def _covariances(self, keys: list[int]) -> dict[int, FloatArray]:
+        """Of some variables, by their keys; NaN where Cholesky finds them indeterminate."""
+        try:
+            return self._lag.snapshot.covariances(keys)
+        except (RuntimeError, np.linalg.LinAlgError):
+            size = {key: 6 if landmark_of(key) is None else 3 for key in keys}
+            return {key: np.full((n, n), np.nan) for key, n in size.items()}
+
+    def landmarks(self) -> Landmarks:
+        """The landmarks that left, as known then; of one that came back, the last time."""
+        index = np.sort(np.fromiter(self._landmark, dtype=np.int64))
+        position, covariance = ([self._landmark[int(j)][part] for j in index] for part in (0, 1))
+        return Landmarks(index, np.array(position).reshape(-1, 3), np.array(covariance).reshape(-1, 3, 3))

@@ -1,0 +1,77 @@
+"""The edge to GTSAM: the order of tangent vectors, and the world in which an incremental solver works."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3, so3
+
+from .keys import landmark_key, pose_key
+
+ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
+"""takes [v, w] (ours) to [w, v] (GTSAM's), and back"""
+
+
+def from_first_pose(problem: Problem) -> Problem:
+    """The problem in the world of its first pose, whose answer `Estimate.moved` by that pose is that of the problem.
+
+    GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
+    depend on how the world is turned.
+    """
+    world_T_first, prior = problem.initial_pose, problem.landmark_prior
+    if np.array_equal(world_T_first, np.eye(4)):
+        return problem
+    if prior is not None:
+        first_T_world = se3.inverse(world_T_first)
+        R = first_T_world[:3, :3]
+        prior = replace(prior, mean=se3.transform(first_T_world, prior.mean), covariance=R @ prior.covariance @ R.T)
+    return replace(problem, initial_pose=np.eye(4), landmark_prior=prior)
+
+
+def pose_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
+    """Covariances (n, 6, 6) of the poses of the frames from `first` on, from GTSAM's order to ours.
+
+    That of a first pose that the problem holds is zero, and not what stands for zero in the graph.
+    """
+    matrix = reordered(covariance)
+    if first == 0 and not problem.initial_covariance.any():
+        matrix[:1] = 0.0
+    return matrix
+
+
+def reordered(covariance: Any) -> FloatArray:
+    """A covariance or information matrix (..., 6, 6) from [v, w] to [w, v], or back."""
+    matrix = np.asarray(covariance, dtype=np.float64)
+    return matrix[..., ROTATION_FIRST[:, None], ROTATION_FIRST[None, :]]
+
+
+def poses_of(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
+    """(n, 4, 4) world_T_imu of the frames, their rotations exact: GTSAM's lose that by rounding in long descents."""
+    poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
+    poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
+    return poses
+
+
+def landmarks_of(
+    values: gtsam.Values, keys: Mapping[int, int], covariance: Mapping[int, FloatArray] | None = None
+) -> Landmarks:
+    """The landmarks (index in the sequence -> key), with their covariances where there are any by key."""
+    index = sorted(keys)
+    position = np.array([values.atPoint3(keys[j]) for j in index]).reshape(-1, 3)
+    shape = None if covariance is None else np.array([covariance[keys[j]] for j in index]).reshape(-1, 3, 3)
+    return Landmarks(np.array(index, dtype=np.int64), position, shape)
+
+
+def values_at(world_T_imu: FloatArray, landmarks: Landmarks) -> gtsam.Values:
+    """A state of that graph."""
+    values = gtsam.Values()
+    for k, pose in enumerate(world_T_imu):
+        values.insert(pose_key(k), gtsam.Pose3(pose))
+    for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
+        values.insert(landmark_key(j), position)
+    return values

@@ -1,0 +1,61 @@
+"""A path that fits the images piece by piece, from dead reckoning alone.
+
+Points triangulated along a long dead-reckoned path lie so badly where it bends wrongly that a descent from there is
+caught behind cameras and far from the minimum. Over a second the bend is small. So the path is cut into short pieces,
+each is solved on its own and put back together, then longer ones along what came out, until what is left is small.
+"""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.observations import Observations
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.measurement import measured_rows
+
+from ..graph.factors import Factors
+from ..graph.gtsam_conversions import poses_of
+from ..graph.keys import landmark_key, pose_key
+from .initial_values import triangulated
+
+LENGTHS = (10, 40, 160)
+"""frames of a piece"""
+MIN_OBSERVATIONS = 2
+MAX_STEPS, RELATIVE_DECREASE = 15, 1e-3
+
+
+def piecewise(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
+    """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
+    factors, observations, T = Factors(problem), problem.observations(), problem.n_frames
+    for length in LENGTHS:
+        starts = range(0, T - 1, length)
+        pieces = [solved(factors, observations, world_T_imu, a, min(a + length, T - 1)) for a in starts]
+        steps = np.concatenate([se3.relative(piece) for piece in pieces])
+        world_T_imu = se3.compose(steps, world_T_imu[0])
+    return world_T_imu
+
+
+def solved(factors: Factors, observations: Observations, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
+    """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
+    o = observations.of_frames(first, last)
+    often = np.bincount(o.landmark) >= MIN_OBSERVATIONS
+    landmarks = triangulated(factors.problem, o.select(often[o.landmark]), world_T_imu)
+    o = o.select(np.isin(o.landmark, landmarks.index))
+    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    held = gtsam.noiseModel.Diagonal.Sigmas(factors.held_sigmas)
+    graph.push_back(gtsam.PriorFactorPose3(pose_key(first), gtsam.Pose3(world_T_imu[first]), held))
+    for k in range(first, last):
+        graph.push_back(factors.motion(k))
+    for k in range(first, last + 1):
+        values.insert(pose_key(k), gtsam.Pose3(world_T_imu[k]))
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
+        graph.push_back(factors.stereo(k, landmark_key(j), rows))
+    for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
+        values.insert(landmark_key(j), position)
+    params = gtsam.LevenbergMarquardtParams()
+    params.setMaxIterations(MAX_STEPS)
+    params.setRelativeErrorTol(RELATIVE_DECREASE)
+    try:
+        return poses_of(gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize(), range(first, last + 1))
+    except RuntimeError:
+        return world_T_imu[first : last + 1]

@@ -1,0 +1,89 @@
+"""An iSAM2 that can go back: after an exception GTSAM leaves the tree destroyed."""
+
+from collections.abc import Mapping
+from collections.abc import Sequence as Listing
+from typing import NamedTuple
+
+import gtsam
+
+from ..errors import IndeterminateSystemError, named_variable
+from ..graph.keys import pose_key
+
+INTERVAL, SHARE = 50, 0.125
+"""updates from one copy to the next: at least so many, and this share of all so far"""
+
+
+class Update(NamedTuple):
+    """The arguments of one call of `ISAM2.update`."""
+
+    factors: gtsam.NonlinearFactorGraph
+    values: gtsam.Values
+    removed: tuple[int, ...] = ()
+    groups: Mapping[int, int] | None = None
+    """of elimination, by key: the larger, the later; a key that is not named is in group 0"""
+    relinearise: bool = False
+    """at this update, whichever the next one is that would"""
+
+
+class RestorableISAM2:
+    """`gtsam.ISAM2` with updates that either succeed or change nothing.
+
+    From time to time a copy of the tree is kept; after a failure the copy is restored and the updates since then are
+    repeated, which gives the same tree and the same factor slots. A copy costs what the tree is large, so the larger
+    it is, the longer one serves; failures seldom come alone, so one is taken after each of them.
+    """
+
+    def __init__(self, params: gtsam.ISAM2Params, interval: int = INTERVAL, first: int = 0) -> None:
+        """`first` is the frame of a pose that the tree has after every update."""
+        self.tree = gtsam.ISAM2(params)
+        self._first = pose_key(first)
+        self._interval = interval
+        self._updates = 0
+        self._keep()
+
+    def _keep(self) -> None:
+        self._copy = gtsam.ISAM2(self.tree)
+        self._since_copy: list[Update] = []
+
+    def update(
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        values: gtsam.Values,
+        removed: Listing[int] = (),
+        groups: Mapping[int, int] | None = None,
+        relinearise: bool = False,
+    ) -> gtsam.ISAM2Result:
+        """One update; raises IndeterminateSystemError, the tree being restored, where GTSAM fails.
+
+        Without `groups` GTSAM eliminates all variables of the new factors last.
+        """
+        step = Update(factors, values, tuple(removed), groups, relinearise)
+        if len(self._since_copy) >= max(self._interval, int(SHARE * self._updates)):
+            self._keep()
+        try:
+            result = _apply(self.tree, step)
+            self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
+        except (RuntimeError, IndexError) as error:
+            self.tree = gtsam.ISAM2(self._copy)
+            for past in self._since_copy:
+                _apply(self.tree, past)
+            self._keep()
+            raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
+        self._since_copy.append(step)
+        self._updates += 1
+        return result
+
+
+def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
+    groups = None
+    if step.groups is not None:
+        groups = gtsam.KeyGroupMap()
+        for key, group in step.groups.items():
+            groups.insert2(key, group)
+    return tree.update(
+        step.factors,
+        step.values,
+        list(step.removed),
+        constrainedKeys=groups,
+        force_relinearize=step.relinearise,
+    )

@@ -1,0 +1,212 @@
+"""A graph that grows with the drive, and an iSAM2 whose tree is over the part of it that can still move.
+
+An update of GTSAM walks over its whole tree: which variables are above a threshold, which cliques hold one of those,
+and all that hangs on the cliques that it replaces. So it becomes dear late in a drive, though it changes no more than
+before. From time to time the tree is exchanged for one over the last frames, and what came before becomes a linear
+prior on what remains, at the same linearisation points: the answer is the same, but these frames are not relinearised
+any more. The graph keeps every factor, for the last Gauss-Newton steps over all of it, and for a landmark that comes
+back after it left: the tree is then built anew over all frames.
+"""
+
+from collections.abc import Collection, Mapping
+from collections.abc import Sequence as Listing
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.observations import Observations
+
+from ..errors import IndeterminateSystemError
+from ..graph.keys import TAIL
+from .checkpointed_isam2 import RestorableISAM2
+
+TIE = gtsam.noiseModel.Unit.Create(6)
+"""of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
+IN_PRIOR = -1
+"""stands for a factor's slot in the tree, where it is no longer one, or was removed"""
+NO_POSE = -1
+"""stands for the frame of a factor that names no pose"""
+UNSEEN_FRAMES = 2
+"""for which a track without an observation may still go on: the mask interrupts tracks for that long"""
+
+
+class MovingTree:
+    """A whole graph, its factors in slots that stay, and a tree over its end; updates succeed or change nothing."""
+
+    def __init__(self, params: gtsam.ISAM2Params) -> None:
+        self._params = params
+        self._isam = RestorableISAM2(params)
+        self._graph = gtsam.NonlinearFactorGraph()
+        self._left = gtsam.Values()
+        """of the variables that are not in the tree any more"""
+        self._place: list[int] = []
+        """the slot in the tree of the factor in each slot of the graph"""
+        self._frame: list[int] = []
+        """the first frame whose pose each of these factors names"""
+        self._prior: list[int] = []
+        """the slots in the tree of what stands for factors behind it"""
+        self._tail: int | None = None
+        """the slot in the tree of the tie to it"""
+
+    @property
+    def tree(self) -> gtsam.ISAM2:
+        """As the last update left it; another one after `shortened`."""
+        return self._isam.tree
+
+    def update(
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        frames: Listing[int],
+        values: gtsam.Values,
+        newest: int,
+        removed: Collection[int] = (),
+        groups: Mapping[int, int] | None = None,
+        relinearise: bool = False,
+    ) -> Listing[int]:
+        """An update of the tree, see `RestorableISAM2`; the slots of the new factors, in their order.
+
+        `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` is the key of the pose,
+        among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior already
+        cannot be taken out of it. Raises IndeterminateSystemError.
+        """
+        places = [self._place[slot] for slot in removed if self._place[slot] != IN_PRIOR]
+        tied = gtsam.NonlinearFactorGraph(factors)
+        tied.push_back(gtsam.BetweenFactorPose3(newest, TAIL, gtsam.Pose3(), TIE))
+        if self._tail is None:
+            values.insert(TAIL, values.atPose3(newest))
+        else:
+            places.append(self._tail)
+        result = self._isam.update(tied, values, places, groups, relinearise)
+        *new, self._tail = result.getNewFactorsIndices()
+        for slot in removed:
+            self._graph.remove(slot)
+            self._place[slot] = IN_PRIOR
+        slots = range(len(self._place), len(self._place) + len(new))
+        self._graph.push_back(factors)
+        self._place += new
+        self._frame += frames
+        return slots
+
+    def relinearised(self) -> int:
+        """Relinearises what is beyond its threshold: how many variables. Raises IndeterminateSystemError."""
+        result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
+        return int(result.getVariablesRelinearized())
+
+    def shortened(self, first: int, groups: Mapping[int, int]) -> bool:
+        """Exchanges the tree for one over the frames from `first` on; False, nothing being changed, if GTSAM fails.
+
+        Nothing new may name what leaves: poses before `first`, and landmarks that were not seen since. `groups` are of
+        elimination, as in `update`.
+        """
+        point, factors = self.tree.getLinearizationPoint(), self.tree.getFactorsUnsafe()
+        behind, ahead, place = self._split(factors, first)
+        staying = set(ahead.keyVector())
+        try:
+            prior = behind.linearize(point).marginal([key for key in behind.keyVector() if key in staying])
+            n = ahead.size()
+            for i in range(prior.size()):
+                ahead.push_back(gtsam.LinearContainerFactor(prior.at(i), point))
+            isam = RestorableISAM2(self._params, first=first)
+            isam.update(ahead, _without(point, set(point.keys()) - staying), groups=groups)
+        except (RuntimeError, IndeterminateSystemError):
+            return False
+        self._left.insert(_without(self.tree.calculateEstimate(), staying))
+        self._isam = isam
+        self._place = [place.get(there, IN_PRIOR) for there in self._place]
+        self._prior = list(range(n, ahead.size()))
+        assert self._tail is not None
+        self._tail = place[self._tail]
+        return True
+
+    def has_left(self, key: int) -> bool:
+        """Whether a variable is in the prior only."""
+        return bool(self._left.exists(key))
+
+    def restored(self, groups: Mapping[int, int]) -> bool:
+        """Exchanges the tree for one over all frames, without a prior; False, nothing being changed, if GTSAM fails.
+
+        `groups` are of elimination, as in `update`.
+        """
+        assert self._tail is not None
+        factors, place = gtsam.NonlinearFactorGraph(), list[int]()
+        for slot in range(self._graph.size()):
+            factor = self._graph.at(slot)
+            place.append(IN_PRIOR if factor is None else factors.size())
+            if factor is not None:
+                factors.push_back(factor)
+        tail = factors.size()
+        factors.push_back(self.tree.getFactorsUnsafe().at(self._tail))
+        point = gtsam.Values(self._left)
+        point.insert(self.tree.getLinearizationPoint())
+        named = set(factors.keyVector())
+        without = [key for key in point.keys() if key not in named]  # noqa: SIM118
+        isam = RestorableISAM2(self._params)
+        try:
+            isam.update(factors, _without(point, without), groups=groups, relinearise=True)
+        except IndeterminateSystemError:
+            return False
+        self._isam, self._left, self._place, self._prior, self._tail = isam, gtsam.Values(), place, [], tail
+        return True
+
+    def _split(
+        self, factors: gtsam.NonlinearFactorGraph, first: int
+    ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.NonlinearFactorGraph, dict[int, int]]:
+        """What is on poses before `first`, with the landmarks that only they saw; the rest; the slots of the rest in
+        the tree, with those that they have in it."""
+        behind, ahead, place = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph(), dict[int, int]()
+
+        def goes_ahead(there: int) -> None:
+            place[there] = ahead.size()
+            ahead.push_back(factors.at(there))
+
+        for there in self._prior:
+            behind.push_back(factors.at(there))
+        assert self._tail is not None
+        goes_ahead(self._tail)
+        without_pose = []
+        for there, frame in zip(self._place, self._frame, strict=True):
+            if there == IN_PRIOR:
+                continue
+            if frame == NO_POSE:
+                without_pose.append(there)
+            elif frame < first:
+                behind.push_back(factors.at(there))
+            else:
+                goes_ahead(there)
+        staying = set(ahead.keyVector())
+        for there in without_pose:
+            if staying.issuperset(factors.at(there).keys()):
+                goes_ahead(there)
+            else:
+                behind.push_back(factors.at(there))
+        return behind, ahead, place
+
+    def estimate(self) -> gtsam.Values:
+        """Of every variable that was ever in the tree and was not removed from it, and of the tail."""
+        values = gtsam.Values(self._left)
+        values.insert(self.tree.calculateEstimate())
+        return values
+
+    def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        """The factors in their slots, and the solution without the tail. The tree is gone, as large as it is."""
+        values = self.estimate()
+        values.erase(TAIL)
+        del self._isam
+        return self._graph, values
+
+
+def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:
+    result = gtsam.Values(values)
+    for key in keys:
+        result.erase(key)
+    return result
+
+
+def earliest_tracked(o: Observations, k: int) -> int:
+    """The first frame of all tracks that the frames up to k have seen, the last time at k - UNSEEN_FRAMES or later.
+
+    The frame after k, where there is none.
+    """
+    recent, now = np.searchsorted(o.frame, [k - UNSEEN_FRAMES, k + 1])
+    alive = np.isin(o.landmark[:now], o.landmark[recent:now])
+    return int(o.frame[:now][alive].min(initial=k + 1))
