@@ -4,15 +4,15 @@ from .dead_reckoning import dead_reckoning
 from .decoupled_ekf import ekf
 from .joint.estimators import joint_ekf, joint_ekf_bias, joint_ekf_first_estimate, joint_ekf_textbook, joint_ekf_ungated
 from .joint.gyro_bias import GyroBiasPrior
-from .joint.landmark_representation import Coordinates
-from .joint.settings import JointSettings, Linearisation
+from .joint.landmark_representation import LandmarkRepresentation
+from .joint.settings import JointSettings, Linearization
 from .landmark_mapping import landmark_mapping
 
 __all__ = [
-    "Coordinates",
     "GyroBiasPrior",
     "JointSettings",
-    "Linearisation",
+    "LandmarkRepresentation",
+    "Linearization",
     "dead_reckoning",
     "ekf",
     "joint_ekf",

@@ -10,9 +10,9 @@ from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem, Reading
 from fgbaseline.geometry import FloatArray, se3
 
-from .landmark_mapping import map_along
-from .landmark_update import LandmarkBlocks
-from .nis import over_three_rows, squared_norm_of_known
+from .landmark_mapping import map_landmarks
+from .landmark_update import IndependentLandmarks
+from .nis import decoupled_nis, three_row_nis
 from .pose_update import (
     PoseInnovation,
     pose_innovation,
@@ -47,9 +47,9 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     T = problem.n_frames
     in_turn = problem.reading is Reading.IN_TURN
     if in_turn:
-        blocks = LandmarkBlocks(problem, problem.measurement)
+        blocks = IndependentLandmarks(problem, problem.measurement)
     else:
-        blocks, _ = map_along(problem, dead_reckoned_path(problem.increment, problem.initial_pose))
+        blocks, _ = map_landmarks(problem, dead_reckoned_path(problem.increment, problem.initial_pose))
     measurement, cam_T_imu = problem.measurement, se3.affine_inverse(problem.sequence.imu_T_cam)
     steps = se3.exp(problem.increment)
     poses = np.full((T, 4, 4), np.nan)
@@ -71,7 +71,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                 innovation = pose_innovation(measurement, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
                 innovations.degrees[k] = 3 * len(innovation.residual)
                 if measurement.kernel is not None:
-                    weight[known] = measurement.kernel.weight(innovation.squared_norms(covariance))
+                    weight[known] = measurement.kernel.weight(innovation.nis_per_observation(covariance))
                 try:
                     posterior = pose_posterior(covariance, innovation, weight[known])
                 except np.linalg.LinAlgError as error:
@@ -79,15 +79,15 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                     break
                 predicted = covariance
                 innovations.nis[k] = (
-                    over_three_rows(posterior, innovation)
+                    three_row_nis(posterior, innovation)
                     if np.all(weight[known] == 1.0)
-                    else squared_norm_of_known(innovation, predicted)
+                    else decoupled_nis(innovation, predicted)
                 )
                 pose, covariance = pose @ se3.exp_one(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:
-                    lost = _loss_as_printed(predicted, innovation, weight[known])
+                    lost = _printed_form_failure(predicted, innovation, weight[known])
                     if lost:
-                        events.append(_singular(k, posterior.innovation_condition, lost))
+                        events.append(_singular_event(k, posterior.innovation_condition, lost))
         if not (np.isfinite(pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
             break
@@ -97,7 +97,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
-    status, reason = _verdict(failure, events, T)
+    status, reason = _status(failure, events, T)
     taken = np.isfinite(poses[o.frame, 0, 0])
     known = blocks.known & np.isfinite(blocks.mean).all(axis=1)
     return Estimate(
@@ -115,7 +115,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     )
 
 
-def _loss_as_printed(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
+def _printed_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
     """What (I - K H) Sigma as printed loses; empty where it stays positive definite."""
     try:
         printed = printed_covariance(covariance, innovation, weight)
@@ -125,7 +125,7 @@ def _loss_as_printed(covariance: FloatArray, innovation: PoseInnovation, weight:
     return "" if smallest > 0.0 else f"leaves (I - K H) Sigma as printed with an eigenvalue of {smallest:.1e}"
 
 
-def _singular(frame: int, condition: float, lost: str) -> Event:
+def _singular_event(frame: int, condition: float, lost: str) -> Event:
     return Event(
         frame,
         EventKind.SINGULAR_INNOVATION,
@@ -133,7 +133,7 @@ def _singular(frame: int, condition: float, lost: str) -> Event:
     )
 
 
-def _verdict(failure: str, events: list[Event], n_frames: int) -> tuple[Status, str]:
+def _status(failure: str, events: list[Event], n_frames: int) -> tuple[Status, str]:
     if failure:
         return Status.FAILED, failure
     if events:

@@ -10,14 +10,14 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from .dead_reckoning import propagated_covariance
-from .landmark_update import LandmarkBlocks
+from .landmark_update import IndependentLandmarks
 
 
 def landmark_mapping(problem: Problem, progress: Progress | None = None) -> Estimate:
     """The landmarks after one pass over all frames, the dead-reckoned path being taken as true."""
     start = time.perf_counter()
     world_T_imu = dead_reckoned_path(problem.increment, problem.initial_pose)
-    blocks, seconds = map_along(problem, world_T_imu, progress)
+    blocks, seconds = map_landmarks(problem, world_T_imu, progress)
     known = blocks.known
     return Estimate(
         name="landmark-mapping",
@@ -30,13 +30,13 @@ def landmark_mapping(problem: Problem, progress: Progress | None = None) -> Esti
     )
 
 
-def map_along(
+def map_landmarks(
     problem: Problem, world_T_imu: FloatArray, progress: Progress | None = None
-) -> tuple[LandmarkBlocks, FloatArray]:
+) -> tuple[IndependentLandmarks, FloatArray]:
     """The landmarks mapped along given poses (T, 4, 4), and the seconds (T,) each frame took."""
     o = problem.observations()
     rows = problem.feature_row(o.landmark)
-    blocks = LandmarkBlocks(problem, problem.mapping_measurement)
+    blocks = IndependentLandmarks(problem, problem.mapping_measurement)
     seconds = np.empty(problem.n_frames)
     for k, seen in enumerate(o.by_frame(problem.n_frames)):
         frame_start = time.perf_counter()

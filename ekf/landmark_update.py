@@ -17,7 +17,7 @@ from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import predict, squared_norm
 
 
-class LandmarkBlocks:
+class IndependentLandmarks:
     """The means (m, 3) and covariances (m, 3, 3) of m independent landmarks, in the world frame."""
 
     def __init__(self, problem: Problem, measurement: StereoMeasurement) -> None:
@@ -52,7 +52,7 @@ class LandmarkBlocks:
             self.known[row[fresh]] = True
         predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
         residual, rows, variance = model.documented_rows(pixel, predicted.pixel)
-        H = predicted.by_point()[:, rows, :3]
+        H = predicted.point_jacobian()[:, rows, :3]
         if weight is None:
             weight = np.ones(len(row))
             if model.kernel is not None:

@@ -19,7 +19,7 @@ class PoseInnovation(NamedTuple):
     variance: FloatArray
     """(r,) of each row, px^2"""
 
-    def squared_norms(self, covariance: FloatArray) -> FloatArray:
+    def nis_per_observation(self, covariance: FloatArray) -> FloatArray:
         """(n,) r^T (H Sigma H^T + V)^-1 r of each observation alone, for three rows and a Sigma (6, 6)."""
         H = self.jacobian
         return squared_norm(self.residual, H @ covariance @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
@@ -38,7 +38,7 @@ def pose_innovation(
     """
     predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
     residual, rows, variance = measurement.documented_rows(pixel, predicted.pixel)
-    return PoseInnovation(residual, predicted.by_pose()[:, rows], variance)
+    return PoseInnovation(residual, predicted.pose_jacobian()[:, rows], variance)
 
 
 class PosePosterior(NamedTuple):
@@ -50,7 +50,7 @@ class PosePosterior(NamedTuple):
     """(6, 6) (I - K H) Sigma"""
     innovation_condition: float
     """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
-    squared_norm: float
+    nis: float
     """(z - z~)^T (H Sigma H^T + V)^-1 (z - z~), over all rows of each observation"""
 
 

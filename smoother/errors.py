@@ -11,7 +11,7 @@ class IndeterminateSystemError(Exception):
         self.key = key
 
 
-class GivenUpError(Exception):
+class UnrecoverableError(Exception):
     """The run cannot go on: even a frame's motion alone leaves the system indeterminate."""
 
 

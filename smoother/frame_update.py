@@ -9,82 +9,82 @@ import gtsam
 from fgbaseline.data.estimate import Event, EventKind
 from fgbaseline.geometry import FloatArray
 
-from .errors import GivenUpError, IndeterminateSystemError
-from .initialization.landmark_initialization import Entry
+from .errors import IndeterminateSystemError, UnrecoverableError
+from .initialization.landmark_initialization import NewLandmark
 
-ATTEMPTS = 20
+MAX_ATTEMPTS = 20
 """at solving a frame with fewer landmarks, before its observations are given up instead"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Arrival:
+class FrameUpdate:
     """A new pose with all that ties it to the graph."""
 
     frame: int
-    guess: FloatArray
+    initial_pose: FloatArray
     """(4, 4) where the pose starts"""
-    motion: gtsam.NonlinearFactor
+    motion_factor: gtsam.NonlinearFactor
     """from the frame before, or the prior of the first pose"""
-    entries: tuple[Entry, ...]
-    seen: Mapping[int, int]
+    new_landmarks: tuple[NewLandmark, ...]
+    tracked: Mapping[int, int]
     """landmark in the graph -> its observation in this frame"""
 
-    def without(self, landmarks: Collection[int]) -> "Arrival":
+    def without(self, landmarks: Collection[int]) -> "FrameUpdate":
         """The same, but some landmarks neither enter nor are seen."""
-        entries = tuple(entry for entry in self.entries if entry.landmark not in landmarks)
-        return replace(self, entries=entries, seen={j: i for j, i in self.seen.items() if j not in landmarks})
+        new = tuple(entry for entry in self.new_landmarks if entry.landmark not in landmarks)
+        return replace(self, new_landmarks=new, tracked={j: i for j, i in self.tracked.items() if j not in landmarks})
 
-    def motion_alone(self) -> "Arrival":
+    def without_observations(self) -> "FrameUpdate":
         """The same without any observation."""
-        return replace(self, entries=(), seen={})
+        return replace(self, new_landmarks=(), tracked={})
 
 
-class Graph(Protocol):
-    """What an arrival is added to."""
+class IncrementalGraph(Protocol):
+    """What an update is added to."""
 
-    def add(self, arrival: Arrival, given_up: Collection[int]) -> None:
+    def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
         """Adds a frame and takes out what is there of some landmarks; all or nothing.
 
         Raises IndeterminateSystemError, nothing being changed, where the result has no solution.
         """
 
-    def suspects(self, error: IndeterminateSystemError, given_up: Collection[int]) -> dict[int, str]:
+    def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
         """Further landmarks that may have caused a failure, each with the reason."""
 
 
-class GivenUp(NamedTuple):
+class Recovery(NamedTuple):
     """What a frame has cost."""
 
     landmarks: frozenset[int]
     events: tuple[Event, ...]
 
 
-def add_recovering(graph: Graph, arrival: Arrival) -> GivenUp:
+def add_with_recovery(graph: IncrementalGraph, update: FrameUpdate) -> Recovery:
     """Adds a frame; where the system is indeterminate, without the suspects, or else without its observations.
 
     Raises GivenUpError.
     """
-    given_up: dict[int, str] = {}
-    for _ in range(ATTEMPTS):
+    dropped: dict[int, str] = {}
+    for _ in range(MAX_ATTEMPTS):
         try:
-            graph.add(arrival.without(given_up), given_up)
-            return _told(arrival.frame, given_up)
+            graph.add(update.without(dropped), dropped)
+            return _recovery(update.frame, dropped)
         except IndeterminateSystemError as error:
-            suspects = graph.suspects(error, given_up)
+            suspects = graph.suspect_landmarks(error, dropped)
         if not suspects:
             break
-        given_up |= suspects
+        dropped |= suspects
     try:
-        graph.add(arrival.motion_alone(), given_up)
+        graph.add(update.without_observations(), dropped)
     except IndeterminateSystemError as error:
-        text = f"the system stays indeterminate at frame {arrival.frame} even without its observations"
-        raise GivenUpError(text) from error
-    dropped, events = _told(arrival.frame, given_up)
+        text = f"the system stays indeterminate at frame {update.frame} even without its observations"
+        raise UnrecoverableError(text) from error
+    landmarks, events = _recovery(update.frame, dropped)
     reason = "its observations left the system indeterminate and were given up"
-    lost = Event(arrival.frame, EventKind.FRAME_WITHOUT_OBSERVATIONS, reason)
-    return GivenUp(dropped | {entry.landmark for entry in arrival.entries}, (*events, lost))
+    lost = Event(update.frame, EventKind.FRAME_WITHOUT_OBSERVATIONS, reason)
+    return Recovery(landmarks | {entry.landmark for entry in update.new_landmarks}, (*events, lost))
 
 
-def _told(frame: int, given_up: Mapping[int, str]) -> GivenUp:
-    events = tuple(Event(frame, EventKind.LANDMARK_DROPPED, why, landmark) for landmark, why in given_up.items())
-    return GivenUp(frozenset(given_up), events)
+def _recovery(frame: int, dropped: Mapping[int, str]) -> Recovery:
+    events = tuple(Event(frame, EventKind.LANDMARK_DROPPED, why, landmark) for landmark, why in dropped.items())
+    return Recovery(frozenset(dropped), events)

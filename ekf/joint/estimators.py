@@ -11,7 +11,7 @@ from fgbaseline.data.problem import Problem
 
 from .filter import JointFilter
 from .gyro_bias import GyroBiasPrior
-from .settings import JointSettings, Linearisation
+from .settings import JointSettings, Linearization
 from .state import BIAS, POSE
 
 BIAS_BLOCK = slice(POSE, POSE + BIAS)
@@ -45,7 +45,7 @@ def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Es
 
 def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None) -> Estimate:
     """The joint filter with first-estimate Jacobians in place of the invariant correction."""
-    settings = JointSettings(linearisation=Linearisation.FIRST_ESTIMATE)
+    settings = JointSettings(linearization=Linearization.FIRST_ESTIMATE)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
 
 
@@ -65,7 +65,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     failure = ""
     for k, seen in enumerate(problem.observations().by_frame(T)):
         frame_start = time.perf_counter()
-        joint.add_frame(k, seen)
+        joint.process_frame(k, seen)
         covariance = joint.state.P[:POSE, :POSE]
         if not (np.isfinite(joint.state.pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
@@ -77,10 +77,10 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         if progress is not None:
             progress(k + 1, T)
     if settings.gyro_bias is not None:
-        joint.events += _told(bias)
+        joint.events += _bias_events(bias)
     if not failure:
         joint.finish()
-    status, reason = _verdict(failure, joint, T)
+    status, reason = _status(failure, joint, T)
     return Estimate(
         name="joint-ekf",
         world_T_imu=poses,
@@ -97,7 +97,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     )
 
 
-def _told(bias: GyroBias) -> list[Event]:
+def _bias_events(bias: GyroBias) -> list[Event]:
     """What was found of the bias, at the last frame that has an answer."""
     answered = np.flatnonzero(np.isfinite(bias.mean).all(axis=1))
     if len(answered) == 0:
@@ -108,13 +108,13 @@ def _told(bias: GyroBias) -> list[Event]:
     return [Event(k, EventKind.GYROSCOPE_BIAS, f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
 
 
-def _verdict(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:
+def _status(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:
     if failure:
         return Status.FAILED, failure
     trouble = {
         EventKind.FRAME_DISAGREES: "most observations disagreed with the prediction, which took no part",
         EventKind.COVARIANCE_LOST: "the joint covariance was no longer positive definite",
-        EventKind.STATE_FULL: f"the state was full: {joint.waited} observations were not used",
+        EventKind.STATE_FULL: f"the state was full: {joint.n_deferred} observations were not used",
     }
     told = []
     for kind, what in trouble.items():

@@ -16,15 +16,15 @@ CELL = 64.0
 """px, edge of the square cells of the image"""
 
 
-def admitted(candidates: FloatArray, inside: FloatArray, places: int) -> BoolArray:
+def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> BoolArray:
     """(n,) which of n landmarks enter, `places` at most, by the rows uL, uR, v (n, 3) at which the frame sees them.
 
     `inside` (m, 3) are the rows of those that the frame sees and the state has already: their cells have had a turn.
     """
     n = len(candidates)
-    enters: BoolArray = np.ones(n, dtype=np.bool_)
+    selected: BoolArray = np.ones(n, dtype=np.bool_)
     if n <= max(places, 0):
-        return enters
+        return selected
     cell = _cells(np.concatenate([candidates, inside]))
     nearness = candidates[:, 0] - candidates[:, 1]
     order = np.lexsort((-nearness, cell[:n]))
@@ -32,8 +32,8 @@ def admitted(candidates: FloatArray, inside: FloatArray, places: int) -> BoolArr
     turn = np.empty(n, dtype=np.int64)
     turn[order] = np.arange(n) - np.repeat(np.cumsum(number) - number, number)
     turn += np.bincount(cell[n:], minlength=cell.max() + 1)[cell[:n]]
-    enters[np.lexsort((-nearness, turn))[max(places, 0) :]] = False
-    return enters
+    selected[np.lexsort((-nearness, turn))[max(places, 0) :]] = False
+    return selected
 
 
 def _cells(rows: FloatArray) -> IntArray:

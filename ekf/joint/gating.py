@@ -21,10 +21,10 @@ MIN_VOTES = 5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Screened:
+class GatedObservations:
     """The verdict on n observations."""
 
-    taken: BoolArray
+    accepted: BoolArray
     """(n,)"""
     weight: FloatArray
     """(n,) the kernel's, by which the inverse of each one's noise is multiplied"""
@@ -32,12 +32,14 @@ class Screened:
     """why the others are not taken"""
 
     @property
-    def plain(self) -> bool:
+    def full_weight(self) -> bool:
         """Whether all are taken with their full weight."""
-        return bool(self.taken.all() and (self.weight == 1.0).all())
+        return bool(self.accepted.all() and (self.weight == 1.0).all())
 
 
-def screened(squared_norm: FloatArray, measurement: StereoMeasurement, settings: JointSettings) -> Screened:
+def gate_observations(
+    squared_norm: FloatArray, measurement: StereoMeasurement, settings: JointSettings
+) -> GatedObservations:
     """The verdict on observations whose innovations have squared norms (n,), whitened by their own covariance.
 
     A burst of bad matches costs its frame's matches: where most of them disagree none is believed, since the few that
@@ -46,16 +48,16 @@ def screened(squared_norm: FloatArray, measurement: StereoMeasurement, settings:
     n = len(squared_norm)
     weight = measurement.weight(squared_norm)
     if settings.disagreeing_share is not None and n >= MIN_VOTES:
-        disagreeing = np.count_nonzero(~(squared_norm <= quantile(DISAGREEMENT)))
+        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(DISAGREEMENT)))
         if disagreeing > settings.disagreeing_share * n:
-            return Screened(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
+            return GatedObservations(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
     if settings.gate is not None:
-        taken = squared_norm <= quantile(settings.gate)
-        return Screened(taken, weight, None if taken.all() else EventKind.OUTSIDE_GATE)
-    return Screened(np.ones(n, dtype=np.bool_), weight)
+        accepted = squared_norm <= chi2_quantile(settings.gate)
+        return GatedObservations(accepted, weight, None if accepted.all() else EventKind.OUTSIDE_GATE)
+    return GatedObservations(np.ones(n, dtype=np.bool_), weight)
 
 
 @cache
-def quantile(probability: float) -> float:
+def chi2_quantile(probability: float) -> float:
     """The chi-square quantile with the degrees of freedom of one observation."""
     return float(chdtri(len(ROWS), 1.0 - probability))

@@ -32,7 +32,7 @@ class GyroBiasPrior:
         """(3, 3) at frame 0, (rad/s)^2."""
         return self.deviation**2 * np.eye(BIAS)
 
-    def along(
+    def augment(
         self, twist: FloatArray, dt: float, transition: FloatArray, noise: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """F (9, 9) and Q (9, 9) of the errors [delta, d] over a motion exp(twist) that takes dt seconds.

@@ -13,10 +13,10 @@ from .landmark_representation import WorldPoints
 
 AT_INFINITY = "its sights put it at infinity or beyond"
 FULL = "the state was full while it was seen"
-NOT_BELIEVED = "no frame that was believed saw it"
+NOT_INITIALIZED = "no frame that was believed saw it"
 
 
-class JointMap:
+class LandmarkMap:
     """What is known of m landmarks outside of the state."""
 
     def __init__(self, m: int) -> None:
@@ -24,19 +24,19 @@ class JointMap:
         """(m,) frame of the last observation so far; -1 before the first"""
         self.initialized: BoolArray = np.zeros(m, dtype=np.bool_)
         """(m,) which have been in the state"""
-        self.turned_away: BoolArray = np.zeros(m, dtype=np.bool_)
+        self.deferred: BoolArray = np.zeros(m, dtype=np.bool_)
         """(m,) of which some observations were not used because the state was full"""
         self._position = np.full((m, 3), np.nan)
         self._covariance = np.full((m, 3, 3), np.nan)
         self._variance = np.full(m, np.inf)
         """(m,) m^2, the trace of the covariance"""
 
-    def keep(self, row: IntArray, points: WorldPoints) -> None:
+    def store(self, row: IntArray, points: WorldPoints) -> None:
         """Landmarks `row` (n,) as they are marginalized. Of one that was in the state several times, the estimate with
         the smallest position variance is reported; estimates of several stays are correlated and are not fused.
         """
         variance = np.einsum("nii->n", points.covariance)
-        finite = points.in_sight & np.isfinite(points.position).all(axis=1) & np.isfinite(variance)
+        finite = points.in_front & np.isfinite(points.position).all(axis=1) & np.isfinite(variance)
         better = finite & (variance < self._variance[row])
         at = row[better]
         self._position[at], self._covariance[at] = points.position[better], points.covariance[better]
@@ -47,11 +47,11 @@ class JointMap:
         known = np.isfinite(self._position).all(axis=1)
         return Landmarks(features[known], self._position[known], self._covariance[known])
 
-    def never_determined(self, features: IntArray) -> list[Event]:
+    def undetermined_events(self, features: IntArray) -> list[Event]:
         """After the last frame: the landmarks that were seen and have no position, in the order they were last seen."""
         row = np.flatnonzero((self.last_seen >= 0) & ~np.isfinite(self._position).all(axis=1))
         row = row[np.argsort(self.last_seen[row], kind="stable")]
-        why = np.select([self.initialized[row], self.turned_away[row]], [AT_INFINITY, FULL], NOT_BELIEVED)
+        why = np.select([self.initialized[row], self.deferred[row]], [AT_INFINITY, FULL], NOT_INITIALIZED)
         frames = self.last_seen[row].tolist()
         return [
             Event(k, EventKind.LANDMARK_NEVER_DETERMINED, str(reason), j)

@@ -22,7 +22,7 @@ _INVERSE_DEPTH = np.eye(4)[:, [0, 1, 3, 2]]
 _SMALL_MOTIONS = se3.hat(np.eye(6))
 
 
-class Coordinates(StrEnum):
+class LandmarkRepresentation(StrEnum):
     """What the three numbers of a landmark without a prior are."""
 
     INVERSE_DEPTH = "inverse-depth"
@@ -31,9 +31,9 @@ class Coordinates(StrEnum):
     """x, y, z in m in the world"""
 
 
-def chart(coordinates: Coordinates, world_T_cam: FloatArray) -> FloatArray:
+def chart(coordinates: LandmarkRepresentation, world_T_cam: FloatArray) -> FloatArray:
     """M (4, 4) for landmarks that are first seen from a camera at `world_T_cam` (4, 4)."""
-    return np.eye(4) if coordinates is Coordinates.WORLD else world_T_cam @ _INVERSE_DEPTH
+    return np.eye(4) if coordinates is LandmarkRepresentation.WORLD else world_T_cam @ _INVERSE_DEPTH
 
 
 def homogeneous(charts: FloatArray, xi: FloatArray) -> FloatArray:
@@ -53,7 +53,7 @@ def generators(charts: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(charts)[..., None, :, :] @ _SMALL_MOTIONS @ charts[..., None, :, :])
 
 
-def moved_by(generators: FloatArray, xi: FloatArray) -> FloatArray:
+def motion_jacobian(generators: FloatArray, xi: FloatArray) -> FloatArray:
     """(n, 3, 6) how coordinates (n, 3) change when the whole world moves by exp(g), g = [v, w] small.
 
     d xi = Y_123 - xi Y_4 with Y = sum of g_i Z_i [xi; 1], Z (n, 6, 4, 4) the `generators` of the charts.
@@ -71,7 +71,7 @@ class WorldPoints(NamedTuple):
     """(n, 3) m"""
     covariance: FloatArray
     """(n, 3, 3) m^2"""
-    in_sight: BoolArray
+    in_front: BoolArray
     """(n,) whether the point is on this side of infinity"""
 
 

@@ -6,10 +6,10 @@ from enum import StrEnum
 from fgbaseline.geometry import FgbaselineError
 
 from .gyro_bias import GyroBiasPrior
-from .landmark_representation import Coordinates
+from .landmark_representation import LandmarkRepresentation
 
 
-class Linearisation(StrEnum):
+class Linearization(StrEnum):
     """What keeps the filter from learning what no observation tells: where path and map lie together in the world.
 
     Six directions of the error state, N = [Ad(T^-1); d xi / d g], move everything by one rigid motion g, and H N = 0.
@@ -31,9 +31,9 @@ class Linearisation(StrEnum):
 class JointSettings:
     """Raises FgbaselineError, naming setting and value, for what cannot be."""
 
-    coordinates: Coordinates = Coordinates.INVERSE_DEPTH
+    coordinates: LandmarkRepresentation = LandmarkRepresentation.INVERSE_DEPTH
     """of landmarks without a prior; those with one are in world coordinates, in which the prior is Gaussian"""
-    linearisation: Linearisation = Linearisation.INVARIANT
+    linearization: Linearization = Linearization.INVARIANT
     gate: float | None = 0.9999
     """chi-square probability: an observation whose innovation is beyond it is rejected, one good one in ten thousand;
     None: none is"""
@@ -62,4 +62,4 @@ class JointSettings:
     @staticmethod
     def textbook() -> "JointSettings":
         """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate, no gate."""
-        return JointSettings(Coordinates.WORLD, Linearisation.TEXTBOOK, gate=None)
+        return JointSettings(LandmarkRepresentation.WORLD, Linearization.TEXTBOOK, gate=None)

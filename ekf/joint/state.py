@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 
-from .landmark_representation import WorldPoints, generators, moved_by, world_points
+from .landmark_representation import WorldPoints, generators, motion_jacobian, world_points
 
 POSE, BIAS = 6, 3
 ABSENT = -1
@@ -34,39 +34,39 @@ class JointState:
         self.pose = pose
         self.bias = np.zeros(BIAS)
         """(3,) rad/s; zero where it is not estimated"""
-        self.body = POSE if bias_covariance is None else POSE + BIAS
+        self.n_body = POSE if bias_covariance is None else POSE + BIAS
         """where the landmarks begin in the error state"""
         self.predicted_pose = pose
         """(4, 4) the pose before the frame's update"""
         self.count = 0
         self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
         """(m,) slot of each of the problem's features; ABSENT where it is not active"""
-        self._P = np.zeros((self.body + 3 * capacity, self.body + 3 * capacity))
+        self._P = np.zeros((self.n_body + 3 * capacity, self.n_body + 3 * capacity))
         self._P[:POSE, :POSE] = covariance
         if bias_covariance is not None:
-            self._P[POSE : self.body, POSE : self.body] = bias_covariance
-        self._row = np.zeros(capacity, dtype=np.int64)
-        self._xi, self._first = np.zeros((capacity, 3)), np.zeros((capacity, 3))
+            self._P[POSE : self.n_body, POSE : self.n_body] = bias_covariance
+        self._feature = np.zeros(capacity, dtype=np.int64)
+        self._xi, self._first_estimate = np.zeros((capacity, 3)), np.zeros((capacity, 3))
         self._charts = np.zeros((capacity, 4, 4))
-        self._generators = np.zeros((capacity, POSE, 4, 4))
-        self._motion = np.zeros((capacity, 3, POSE))
+        self._slot_generators = np.zeros((capacity, POSE, 4, 4))
+        self._motion_jacobian = np.zeros((capacity, 3, POSE))
 
-    def _double(self) -> None:
+    def _grow(self) -> None:
         P = np.zeros((2 * len(self._P), 2 * len(self._P)))
         P[: self.size, : self.size] = self.P
         self._P = P
-        self._row, self._xi, self._first, self._charts, self._generators, self._motion = (
-            np.concatenate([array, np.zeros_like(array)]) for array in self._of_slots()
+        self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian = (
+            np.concatenate([array, np.zeros_like(array)]) for array in self._slot_arrays()
         )
 
-    def _of_slots(self) -> tuple[NDArray[Any], ...]:
+    def _slot_arrays(self) -> tuple[NDArray[Any], ...]:
         """What is kept of each landmark beside its rows of P."""
-        return self._row, self._xi, self._first, self._charts, self._generators, self._motion
+        return self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian
 
     @property
     def size(self) -> int:
         """The dimension of the error state."""
-        return self.body + 3 * self.count
+        return self.n_body + 3 * self.count
 
     @property
     def P(self) -> FloatArray:  # noqa: N802
@@ -74,9 +74,9 @@ class JointState:
         return self._P[: self.size, : self.size]
 
     @property
-    def row(self) -> IntArray:
+    def feature(self) -> IntArray:
         """(count,) the feature in each slot, a view."""
-        return self._row[: self.count]
+        return self._feature[: self.count]
 
     @property
     def xi(self) -> FloatArray:
@@ -84,22 +84,22 @@ class JointState:
         return self._xi[: self.count]
 
     @property
-    def first(self) -> FloatArray:
+    def first_estimate(self) -> FloatArray:
         """(count, 3) the coordinates that each landmark entered with, a view."""
-        return self._first[: self.count]
+        return self._first_estimate[: self.count]
 
     @property
     def charts(self) -> FloatArray:
         """(count, 4, 4) the landmarks' charts, a view."""
         return self._charts[: self.count]
 
-    def move_landmarks(self, by: FloatArray) -> FloatArray:
+    def correct_landmarks(self, by: FloatArray) -> FloatArray:
         """Adds `by` (count, 3) to their coordinates, and says what that changes in how they move with the world
         (`landmark_chart.moved_by`): (count, 3, 6).
         """
         self.xi[:] += by
-        before = self._motion[: self.count]
-        now = moved_by(self._generators[: self.count], self.xi)
+        before = self._motion_jacobian[: self.count]
+        now = motion_jacobian(self._slot_generators[: self.count], self.xi)
         change = now - before
         before[:] = now
         return change
@@ -109,7 +109,7 @@ class JointState:
 
         `transition` and `noise` are (body, body): of the pose, and of the bias where it is estimated.
         """
-        P, body = self.P, self.body
+        P, body = self.P, self.n_body
         moved = transition @ P[:body]
         P[:body, body:] = moved[:, body:]
         P[body:, :body] = moved[:, body:].T
@@ -117,38 +117,38 @@ class JointState:
         P[:body, :body] = 0.5 * (own + own.T)
         self.pose = self.predicted_pose = self.pose @ step
 
-    def transport(self, turn: FloatArray, by_pose: FloatArray) -> None:
-        """P <- B P B^T with B = [[turn, 0], [by_pose, I]], `turn` (6, 6) and `by_pose` (3 count, 6).
+    def transform_covariance(self, pose_block: FloatArray, pose_jacobian: FloatArray) -> None:
+        """P <- B P B^T with B = [[turn, 0], [pose_jacobian, I]], `turn` (6, 6) and `pose_jacobian` (3 count, 6).
 
-        The bias stays as it is: its rows of `by_pose` would be zero.
+        The bias stays as it is: its rows of `pose_jacobian` would be zero.
         """
-        P, G = self.P, by_pose
-        if self.body > POSE:
-            G = np.concatenate([np.zeros((self.body - POSE, POSE)), by_pose])
+        P, G = self.P, pose_jacobian
+        if self.n_body > POSE:
+            G = np.concatenate([np.zeros((self.n_body - POSE, POSE)), pose_jacobian])
         own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
         half = G @ (cross + 0.5 * own @ G.T)
         P[POSE:, POSE:] += half + half.T
-        P[:POSE, POSE:] = turn @ (cross + own @ G.T)
+        P[:POSE, POSE:] = pose_block @ (cross + own @ G.T)
         P[POSE:, :POSE] = P[:POSE, POSE:].T
-        turned = turn @ own @ turn.T
+        turned = pose_block @ own @ pose_block.T
         P[:POSE, :POSE] = 0.5 * (turned + turned.T)
 
-    def enter(
-        self, row: IntArray, chart: FloatArray, xi: FloatArray, by_pose: FloatArray, covariance: FloatArray
+    def initialize(
+        self, row: IntArray, chart: FloatArray, xi: FloatArray, pose_jacobian: FloatArray, covariance: FloatArray
     ) -> None:
         """n landmarks become active in one chart (4, 4), with an error of G delta + e each.
 
-        G = `by_pose` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
+        G = `pose_jacobian` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
         """
         n, old, new = len(row), self.size, self.size + 3 * len(row)
-        while self.count + n > len(self._row):
-            self._double()
+        while self.count + n > len(self._feature):
+            self._grow()
         slots = slice(self.count, self.count + n)
         Z = np.broadcast_to(generators(chart), (n, POSE, 4, 4))
-        for array, value in zip(self._of_slots(), (row, xi, xi, chart, Z, moved_by(Z, xi)), strict=True):
+        for array, value in zip(self._slot_arrays(), (row, xi, xi, chart, Z, motion_jacobian(Z, xi)), strict=True):
             array[slots] = value
         self.slot_of[row] = np.arange(self.count, self.count + n)
-        P, G = self._P, by_pose.reshape(3 * n, POSE)
+        P, G = self._P, pose_jacobian.reshape(3 * n, POSE)
         cross = G @ P[:POSE, :old]
         P[old:new, :old] = cross
         P[:old, old:new] = cross.T
@@ -158,22 +158,22 @@ class JointState:
         P[old:new, old:new] = 0.5 * (own + own.T)
         self.count += n
 
-    def leave(self, row: IntArray) -> None:
-        """Active landmarks are marginalised out: their rows and columns go, everything else stays as it is."""
+    def marginalize(self, row: IntArray) -> None:
+        """Active landmarks are marginalized out: their rows and columns go, everything else stays as it is."""
         leaving = self.slot_of[row]
         left = self.count - len(leaving)
         goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
         goes[leaving] = True
         holes = np.flatnonzero(goes[:left])
         movers = left + np.flatnonzero(~goes[left:])
-        for array in self._of_slots():
+        for array in self._slot_arrays():
             array[holes] = array[movers]
         to, source = self._indices(holes), self._indices(movers)
         P = self.P
         P[to, :] = P[source, :]
         P[:, to] = P[:, source]
         self.slot_of[row] = ABSENT
-        self.slot_of[self._row[holes]] = holes
+        self.slot_of[self._feature[holes]] = holes
         self.count = left
 
     def world_points(self, row: IntArray) -> WorldPoints:
@@ -184,4 +184,4 @@ class JointState:
 
     def _indices(self, slot: IntArray) -> IntArray:
         """(3n,) rows of P of the landmarks in slots (n,)."""
-        return (self.body + 3 * slot[:, None] + np.arange(3)).reshape(-1)
+        return (self.n_body + 3 * slot[:, None] + np.arange(3)).reshape(-1)

@@ -28,30 +28,32 @@ class StackedJacobian:
 
     slot: IntArray
     """(n,) of the landmark that each observation sees"""
-    by_pose: FloatArray
+    pose_jacobian: FloatArray
     """(n, 3, 6)"""
-    by_landmark: FloatArray
+    landmark_jacobian: FloatArray
     """(n, 3, 3)"""
-    body: int = POSE
+    n_body: int = POSE
     """where the landmarks begin; what is between the pose and them, an observation does not depend on"""
 
-    def times(self, matrix: FloatArray) -> FloatArray:
+    def multiply(self, matrix: FloatArray) -> FloatArray:
         """H A (3n, c) of a matrix A (size, c)."""
         n, c = len(self.slot), matrix.shape[1]
-        product = self.by_landmark @ matrix[self.body :].reshape(-1, 3, c)[self.slot]
-        product += (self.by_pose.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
+        product = self.landmark_jacobian @ matrix[self.n_body :].reshape(-1, 3, c)[self.slot]
+        product += (self.pose_jacobian.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
         return product.reshape(3 * n, c)
 
     def select(self, chosen: BoolArray) -> "StackedJacobian":
         """Only the chosen observations."""
-        return StackedJacobian(self.slot[chosen], self.by_pose[chosen], self.by_landmark[chosen], self.body)
+        return StackedJacobian(
+            self.slot[chosen], self.pose_jacobian[chosen], self.landmark_jacobian[chosen], self.n_body
+        )
 
 
 class NotPositiveDefiniteError(Exception):
     """H P H^T + R has no Cholesky factor: P is no covariance any more."""
 
 
-class Factor(NamedTuple):
+class CholeskyFactor(NamedTuple):
     """S = H P H^T + R = L L^T."""
 
     L: FloatArray
@@ -60,7 +62,7 @@ class Factor(NamedTuple):
     """(3n,) L^-1 nu"""
 
     @staticmethod
-    def of(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> "Factor":
+    def of(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> "CholeskyFactor":
         """Of H P H^T (3n, 3n), left as it is, residuals nu (n, 3) and the diagonal of R (n, 3), or (3,) for each, px^2.
 
         Raises NotPositiveDefiniteError.
@@ -71,11 +73,11 @@ class Factor(NamedTuple):
         L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
         if failed or not np.isfinite(L[-1, -1]):
             raise NotPositiveDefiniteError
-        return Factor(L, dtrsv(L, residual.reshape(-1), lower=1))
+        return CholeskyFactor(L, dtrsv(L, residual.reshape(-1), lower=1))
 
     @property
-    def squared_norm(self) -> float:
-        """nu^T S^-1 nu: the normalised innovation squared of all observations at once."""
+    def nis(self) -> float:
+        """nu^T S^-1 nu: the normalized innovation squared of all observations at once."""
         return float(self.whitened @ self.whitened)
 
 
@@ -94,21 +96,21 @@ class Innovation:
     @staticmethod
     def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
         """The innovation of residuals (n, 3) under a covariance (size, size)."""
-        HP = H.times(P)
-        return Innovation(H, residual, HP, H.times(np.ascontiguousarray(HP.T)))
+        HP = H.multiply(P)
+        return Innovation(H, residual, HP, H.multiply(np.ascontiguousarray(HP.T)))
 
     def __len__(self) -> int:
         return len(self.residual)
 
-    def squared_norms(self, variance: FloatArray) -> FloatArray:
+    def nis_per_observation(self, variance: FloatArray) -> FloatArray:
         """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,))."""
         n = np.arange(len(self))
         own = self.HPHt.reshape(len(self), 3, len(self), 3)[n, :, n]  # the blocks on the diagonal
         return squared_norm(self.residual, own + np.diag(variance))
 
-    def factorised(self, variance: FloatArray) -> Factor:
+    def factorize(self, variance: FloatArray) -> CholeskyFactor:
         """S = L L^T with R = diag(variance (n, 3)), or (3,) for each. Raises NotPositiveDefiniteError."""
-        return Factor.of(self.HPHt, self.residual, variance)
+        return CholeskyFactor.of(self.HPHt, self.residual, variance)
 
     def select(self, chosen: BoolArray) -> "Innovation":
         """Only the chosen observations."""
@@ -120,7 +122,7 @@ class Innovation:
         )
 
 
-def correct(innovation: Innovation, factor: Factor, P: FloatArray) -> FloatArray:
+def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:
     """The correction delta (size,) of the error state; P (size, size) is updated in place.
 
     `factor` is the innovation's with the R that it is to be weighted by. Uses the innovation up.

@@ -13,15 +13,15 @@ from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from ..graph.cheirality import UNDONE, undone
-from ..graph.gtsam_conversions import landmarks_of, pose_covariances, poses_of
+from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
+from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
 from ..graph.keys import landmark_key, pose_key
-from ..graph.marginal_covariances import covariances
-from ..initialization.initial_values import chosen, determined_along, restricted
-from ..initialization.landmark_initialization import EntryRule
+from ..graph.marginal_covariances import marginal_covariances
+from ..initialization.initial_values import determined_observations, restricted_problem, select_landmarks
+from ..initialization.landmark_initialization import InitializationCriterion
 from ..isam2.estimator import isam2
-from .full_graph import whole_graph
-from .levenberg_marquardt import Minimum, from_answer, from_path
+from .full_graph import full_graph
+from .levenberg_marquardt import LocalMinimum, optimize_from_estimate, optimize_from_path
 
 DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's answer"
 SAME_COST = 1e-4
@@ -51,19 +51,21 @@ def _solve(problem: Problem, answer: Estimate) -> Estimate:
     start = time.perf_counter()
     T, path = problem.n_frames, dead_reckoned_path(problem.increment, problem.initial_pose)
     failed = answer.status is Status.FAILED
-    used = determined_along(problem, path, EntryRule()) if failed else answer.used
+    used = determined_observations(problem, path, InitializationCriterion()) if failed else answer.used
     events: list[Event] = []
     while used.any():
-        kept = restricted(problem, used)
+        kept = restricted_problem(problem, used)
         minima = _minima(kept, path, None if failed else answer, events)
         if not minima:
             break
         best = min(minima, key=lambda minimum: minimum.cost)
-        world_T_imu = poses_of(best.values, range(T))
-        gone = undone(kept, kept.observations(), world_T_imu, landmarks_of(best.values, _keys(kept)))
+        world_T_imu = poses_from_values(best.values, range(T))
+        gone = cheirality_violations(
+            kept, kept.observations(), world_T_imu, landmarks_from_values(best.values, _keys(kept))
+        )
         if not gone:
             covariance, landmarks = _marginals(kept, best, events)
-            status, reason = _verdict(answer, events)
+            status, reason = _status(answer, events)
             return Estimate(
                 name="batch",
                 world_T_imu=world_T_imu,
@@ -76,25 +78,25 @@ def _solve(problem: Problem, answer: Estimate) -> Estimate:
                 events=(*events, _costs(minima, T - 1)),
             )
         # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
-        events += [Event(T - 1, EventKind.LANDMARK_DROPPED, UNDONE, j) for j in gone]
+        events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in gone]
         used = used & ~np.isin(problem.sequence.observations.landmark, gone)
     return Estimate.failed("batch", "no landmark is determined, or no descent ended", T, len(used))
 
 
-def _verdict(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
+def _status(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
     if answer.status is Status.FAILED:
         trouble.insert(0, f"isam2 gave no answer to start from ({answer.reason})")
     return (Status.RECOVERED, ", ".join(trouble)) if trouble else (Status.OK, "")
 
 
-def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: list[Event]) -> list[Minimum]:
+def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: list[Event]) -> list[LocalMinimum]:
     """Where the descents end; one that GTSAM breaks off is an event."""
-    graph = whole_graph(kept)
-    starts: list[Callable[[], Minimum]] = [lambda: from_path(graph, kept, DEAD_RECKONING, path)]
+    graph = full_graph(kept)
+    starts: list[Callable[[], LocalMinimum]] = [lambda: optimize_from_path(graph, kept, DEAD_RECKONING, path)]
     if answer is not None:
-        landmarks = chosen(answer.landmarks, np.unique(kept.observations().landmark))
-        starts.append(lambda: from_answer(graph, ISAM2, answer.world_T_imu, landmarks))
+        landmarks = select_landmarks(answer.landmarks, np.unique(kept.observations().landmark))
+        starts.append(lambda: optimize_from_estimate(graph, ISAM2, answer.world_T_imu, landmarks))
     minima = []
     for descend in starts:
         try:
@@ -104,14 +106,14 @@ def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: li
     return [minimum for minimum in minima if np.isfinite(minimum.cost)]
 
 
-def _costs(minima: list[Minimum], last: int) -> Event:
+def _costs(minima: list[LocalMinimum], last: int) -> Event:
     """What the starts came to."""
     told = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
     if len(minima) == 1:
         return Event(last, EventKind.ONE_START, f"the cost is {told}: nothing says that it is the lowest")
     low, high = sorted(minimum.cost for minimum in minima)
     share = high / low - 1.0 if low > 0 else float("inf")
-    one, other = (poses_of(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
+    one, other = (poses_from_values(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
     rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
     apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
     if share <= SAME_COST:
@@ -119,15 +121,15 @@ def _costs(minima: list[Minimum], last: int) -> Event:
     return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
 
 
-def _marginals(kept: Problem, best: Minimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
+def _marginals(kept: Problem, best: LocalMinimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
     T, keys = kept.n_frames, _keys(kept)
     try:
-        covariance = covariances(whole_graph(kept), best.values)
+        covariance = marginal_covariances(full_graph(kept), best.values)
     except RuntimeError:
         events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
-        return np.full((T, 6, 6), np.nan), landmarks_of(best.values, keys)
+        return np.full((T, 6, 6), np.nan), landmarks_from_values(best.values, keys)
     poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
-    return poses, landmarks_of(best.values, keys, covariance)
+    return poses, landmarks_from_values(best.values, keys, covariance)
 
 
 def _keys(problem: Problem) -> dict[int, int]:

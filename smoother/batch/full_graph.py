@@ -6,16 +6,16 @@ import numpy as np
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry.measurement import measured_rows
 
-from ..graph.factors import Factors
+from ..graph.factors import FactorBuilder
 from ..graph.keys import landmark_key
 
 
-def whole_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
+def full_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
     """First pose, increments, every observation that takes part, and the priors of their landmarks."""
-    factors, graph = Factors(problem), gtsam.NonlinearFactorGraph()
-    graph.push_back(factors.first_pose())
+    factors, graph = FactorBuilder(problem), gtsam.NonlinearFactorGraph()
+    graph.push_back(factors.pose_prior())
     for k in range(problem.n_frames - 1):
-        graph.push_back(factors.motion(k))
+        graph.push_back(factors.between(k))
     o = problem.observations()
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
         graph.push_back(factors.stereo(k, landmark_key(j), rows))

@@ -10,13 +10,13 @@ from threadpoolctl import threadpool_limits
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Progress, Status
 from fgbaseline.data.problem import Problem
 
-from ..errors import GivenUpError
-from ..frame_update import add_recovering
-from ..graph.cheirality import UNDONE
-from ..graph.gtsam_conversions import from_first_pose
-from ..graph_builder import Arrivals
+from ..errors import UnrecoverableError
+from ..frame_update import add_with_recovery
+from ..graph.cheirality import CHEIRALITY_VIOLATION
+from ..graph.gtsam_conversions import in_first_pose_frame
+from ..graph_builder import GraphBuilder
 from ..isam2.settings import ISAM2Settings
-from .window import Window
+from .window import FixedLagWindow
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,36 +37,36 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     costs `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        answer = _solve(from_first_pose(problem), progress, settings or FixedLagSettings())
+        answer = _solve(in_first_pose_frame(problem), progress, settings or FixedLagSettings())
         return answer.moved(problem.initial_pose)
 
 
 def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:
     start, T = time.perf_counter(), problem.n_frames
-    arrivals = Arrivals(problem, settings.isam2.entry)
-    if len(arrivals.observations) == 0:
+    builder = GraphBuilder(problem, settings.isam2.initialization)
+    if len(builder.observations) == 0:
         return Estimate.failed("fixed-lag", "no observations", T, len(problem.excluded))
-    window = Window(problem, arrivals, settings.lag, settings.isam2)
+    window = FixedLagWindow(problem, builder, settings.lag, settings.isam2)
     seconds, dropped, events = np.zeros(T), set[int](), list[Event]()
-    for k, observed in enumerate(arrivals.observations.by_frame(T)):
+    for k, observed in enumerate(builder.observations.by_frame(T)):
         begin = time.perf_counter()
-        arrival = arrivals.next(k, range(observed.start, observed.stop), window.key, dropped, window.oldest)
-        window.keep_leaving(float(problem.sequence.t[k]), arrival.seen.keys())
+        update = builder.frame_update(k, range(observed.start, observed.stop), window.key, dropped, window.oldest)
+        window.store_marginalized(float(problem.sequence.t[k]), update.tracked.keys())
         try:
-            cost = add_recovering(window, arrival)
-        except GivenUpError as error:
+            cost = add_with_recovery(window, update)
+        except UnrecoverableError as error:
             return Estimate.failed("fixed-lag", str(error), T, len(problem.excluded))
         dropped |= cost.landmarks
         events += cost.events
-        arrivals.path[k] = window.pose(k)
-        for j in arrivals.observations.landmark[observed].tolist():
+        builder.online_poses[k] = window.pose(k)
+        for j in builder.observations.landmark[observed].tolist():
             if j in window.key:
-                arrivals.position[j] = window.position(j)
+                builder.landmark_position[j] = window.position(j)
         seconds[k] = time.perf_counter() - begin
         if progress is not None:
             progress(k + 1, T)
-    window.keep_leaving(np.inf, ())
-    events += [Event(T - 1, EventKind.LANDMARK_DROPPED, UNDONE, j) for j in window.lost]
+    window.store_marginalized(np.inf, ())
+    events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in window.lost]
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
     return Estimate(
         name="fixed-lag",

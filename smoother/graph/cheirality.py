@@ -10,16 +10,18 @@ from fgbaseline.geometry import FloatArray, StereoCamera
 MIN_DISPARITY = 0.05
 """px; a landmark so far away that no step along its ray changes what the camera sees makes a system indeterminate, as
 does one at the plane of a camera that saw it, or behind it, whose Jacobian is unbounded, or zero"""
-UNDONE = "it came to lie behind a camera that saw it, at its plane or at infinity"
+CHEIRALITY_VIOLATION = "it came to lie behind a camera that saw it, at its plane or at infinity"
 
 
-def undone(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> list[int]:
+def cheirality_violations(
+    problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks
+) -> list[int]:
     """The landmarks that are no point in front of every camera that saw them; each observation is of one of them."""
-    seen = seen_well(problem, o, world_T_imu, landmarks)
+    seen = satisfies_cheirality(problem, o, world_T_imu, landmarks)
     return [int(j) for j in np.unique(o.landmark[~seen])]
 
 
-def seen_well(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> BoolArray:
+def satisfies_cheirality(problem: Problem, o: Observations, world_T_imu: FloatArray, landmarks: Landmarks) -> BoolArray:
     """(n,) whether each observation's landmark is in front of its camera, and not at infinity."""
     world_T_cam = (world_T_imu @ problem.sequence.imu_T_cam)[o.frame]
     points = landmarks.position[np.searchsorted(landmarks.index, o.landmark)]

@@ -9,14 +9,14 @@ import numpy as np
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
-from .gtsam_conversions import reordered
+from .gtsam_conversions import reorder_tangent
 from .keys import pose_key
 
-HELD_SIGMA = 1e-6
+FIXED_POSE_SIGMA = 1e-6
 """baselines and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
 
 
-class Factors:
+class FactorBuilder:
     """Makes the factors of one problem."""
 
     def __init__(self, problem: Problem) -> None:
@@ -26,20 +26,20 @@ class Factors:
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
         self.stereo_noise = stereo_noise(problem)
         self.steps = se3.exp(problem.increment)
-        self.step_covariance = reordered(problem.increment_covariance)
+        self.step_covariance = reorder_tangent(problem.increment_covariance)
 
     @property
-    def held_sigmas(self) -> FloatArray:
+    def fixed_pose_sigmas(self) -> FloatArray:
         """(6,) rad and m: the standard deviations of a pose that is held."""
-        return HELD_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
+        return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
 
-    def first_pose(self) -> gtsam.PriorFactorPose3:
+    def pose_prior(self) -> gtsam.PriorFactorPose3:
         """The prior on the pose of frame 0."""
-        covariance = reordered(self.problem.initial_covariance) + np.diag(self.held_sigmas**2)
+        covariance = reorder_tangent(self.problem.initial_covariance) + np.diag(self.fixed_pose_sigmas**2)
         noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
         return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(self.problem.initial_pose), noise)
 
-    def motion(self, frame: int) -> gtsam.BetweenFactorPose3:
+    def between(self, frame: int) -> gtsam.BetweenFactorPose3:
         """The increment from `frame` to the next."""
         noise = gtsam.noiseModel.Gaussian.Covariance(self.step_covariance[frame])
         step = gtsam.Pose3(self.steps[frame])

@@ -1,4 +1,4 @@
-"""The final relinearisation: Gauss-Newton over the whole graph from where the increments led."""
+"""The final relinearization: Gauss-Newton over the whole graph from where the increments led."""
 
 from typing import NamedTuple
 
@@ -7,11 +7,11 @@ import gtsam
 MAX_STEPS = 10
 RELATIVE_DECREASE = 1e-7
 """of the cost, at which it stops"""
-LONGEST = 64.0
+MAX_STEP_SCALE = 64.0
 """times the step"""
 
 
-def compact(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
+def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
     """The factors of a graph without the empty slots that removals leave."""
     if graph.nrFactors() == graph.size():
         return gtsam.NonlinearFactorGraph(graph)
@@ -23,22 +23,22 @@ def compact(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
     return result
 
 
-class Relinearised(NamedTuple):
+class GaussNewtonResult(NamedTuple):
     """Where the steps led, and why they ended before their time, if they did."""
 
     values: gtsam.Values
     failure: str = ""
 
 
-def relinearised(
+def gauss_newton(
     graph: gtsam.NonlinearFactorGraph,
     values: gtsam.Values,
     max_steps: int = MAX_STEPS,
     relative_decrease: float = RELATIVE_DECREASE,
-) -> Relinearised:
+) -> GaussNewtonResult:
     """The values after Gauss-Newton steps, as long as each lowers the cost.
 
-    Every linearisation point of an incremental run is off by up to its threshold; this takes that away. Under a kernel
+    Every linearization point of an incremental run is off by up to its threshold; this takes that away. Under a kernel
     the steps are too short along weak directions, so each is doubled as long as that lowers the cost further. Where
     the system is indeterminate the values at which it is are given, with GTSAM's words.
     """
@@ -48,23 +48,23 @@ def relinearised(
         try:
             step = graph.linearize(values).optimize(ordering)
         except RuntimeError as error:
-            return Relinearised(values, str(error).strip().partition("\n")[0])
-        longer, longer_cost = _longest(graph, values, step, cost)
+            return GaussNewtonResult(values, str(error).strip().partition("\n")[0])
+        longer, longer_cost = _line_search(graph, values, step, cost)
         if not longer_cost < cost:
             break
         decrease = (cost - longer_cost) / cost
         values, cost = longer, longer_cost
         if decrease < relative_decrease:
             break
-    return Relinearised(values)
+    return GaussNewtonResult(values)
 
 
-def _longest(
+def _line_search(
     graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, step: gtsam.VectorValues, cost: float
 ) -> tuple[gtsam.Values, float]:
     """The values and their cost after the step, or that many times it that doubling still pays."""
     times, best = 1.0, values
-    while times <= LONGEST:
+    while times <= MAX_STEP_SCALE:
         trial = values.retract(step.scale(times))
         trial_cost = graph.error(trial)
         if not trial_cost < cost:

@@ -17,7 +17,7 @@ ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """takes [v, w] (ours) to [w, v] (GTSAM's), and back"""
 
 
-def from_first_pose(problem: Problem) -> Problem:
+def in_first_pose_frame(problem: Problem) -> Problem:
     """The problem in the world of its first pose, whose answer `Estimate.moved` by that pose is that of the problem.
 
     GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
@@ -38,26 +38,26 @@ def pose_covariances(problem: Problem, covariance: Any, first: int = 0) -> Float
 
     That of a first pose that the problem holds is zero, and not what stands for zero in the graph.
     """
-    matrix = reordered(covariance)
+    matrix = reorder_tangent(covariance)
     if first == 0 and not problem.initial_covariance.any():
         matrix[:1] = 0.0
     return matrix
 
 
-def reordered(covariance: Any) -> FloatArray:
+def reorder_tangent(covariance: Any) -> FloatArray:
     """A covariance or information matrix (..., 6, 6) from [v, w] to [w, v], or back."""
     matrix = np.asarray(covariance, dtype=np.float64)
     return matrix[..., ROTATION_FIRST[:, None], ROTATION_FIRST[None, :]]
 
 
-def poses_of(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
+def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
     """(n, 4, 4) world_T_imu of the frames, their rotations exact: GTSAM's lose that by rounding in long descents."""
     poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
     poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
     return poses
 
 
-def landmarks_of(
+def landmarks_from_values(
     values: gtsam.Values, keys: Mapping[int, int], covariance: Mapping[int, FloatArray] | None = None
 ) -> Landmarks:
     """The landmarks (index in the sequence -> key), with their covariances where there are any by key."""
@@ -67,7 +67,7 @@ def landmarks_of(
     return Landmarks(np.array(index, dtype=np.int64), position, shape)
 
 
-def values_at(world_T_imu: FloatArray, landmarks: Landmarks) -> gtsam.Values:
+def values_from_state(world_T_imu: FloatArray, landmarks: Landmarks) -> gtsam.Values:
     """A state of that graph."""
     values = gtsam.Values()
     for k, pose in enumerate(world_T_imu):

@@ -1,8 +1,8 @@
-"""Keys in GTSAM; those of landmarks are sorted by distance so that each class has its own relinearisation threshold.
+"""Keys in GTSAM; those of landmarks are sorted by distance so that each class has its own relinearization threshold.
 
-What matters to the linearisation of a landmark is by how much it moved as a share of its distance: one at 100 m that
+What matters to the linearization of a landmark is by how much it moved as a share of its distance: one at 100 m that
 moves by 10 cm looks the same as one at 5 m that moves by 5 mm. GTSAM knows thresholds by the letter of a key only, so
-the letter tells the distance. With one threshold for all, far landmarks are relinearised at every step, with all that
+the letter tells the distance. With one threshold for all, far landmarks are relinearized at every step, with all that
 hangs on them.
 """
 
@@ -23,7 +23,7 @@ _LETTER_AT = 56
 """the bit of a key from which on it holds its letter, as in `gtsam.symbol`, which costs ten times as much"""
 _POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
 
-TAIL = ord("z") << _LETTER_AT
+AUXILIARY_POSE = ord("z") << _LETTER_AT
 """the key of a pose that hangs on the newest one alone and is eliminated after it.
 
 It tells nothing, but makes a root of two poses, where the covariance of the newest one is at hand. Without it GTSAM
@@ -49,14 +49,14 @@ def distance_key(landmark: int, distance: float) -> int:
 
 def landmark_of(key: int) -> int | None:
     """The landmark that a key stands for; None for a pose."""
-    return None if key == TAIL or key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
+    return None if key == AUXILIARY_POSE or key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
 
 
 def thresholds(position: float, rotation: float, landmark: float, baseline: float) -> gtsam.ISAM2ThresholdMap:
-    """Relinearisation thresholds: of poses in baselines (m) and rad, of landmarks as a share of their distance."""
+    """Relinearization thresholds: of poses in baselines (m) and rad, of landmarks as a share of their distance."""
     by_letter = gtsam.ISAM2ThresholdMap()
     by_letter.insert((POSE, np.array([rotation] * 3 + [position * baseline] * 3)))
-    by_letter.insert((chr(TAIL >> _LETTER_AT), np.full(6, np.inf)))
+    by_letter.insert((chr(AUXILIARY_POSE >> _LETTER_AT), np.full(6, np.inf)))
     for i, letter in enumerate(LETTERS):
         by_letter.insert((letter, np.full(3, landmark * baseline * NEAREST * RATIO**i)))
     return by_letter

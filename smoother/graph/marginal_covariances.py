@@ -51,29 +51,29 @@ class _Conditional(NamedTuple):
         return self.inverse @ self.density.S()
 
 
-def covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
-    """The covariance (d, d) of every variable, by its key, in GTSAM's tangent order, linearised at `values`.
+def marginal_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
+    """The covariance (d, d) of every variable, by its key, in GTSAM's tangent order, linearized at `values`.
 
     Raises RuntimeError where the system is indeterminate.
     """
     conditionals = _conditionals(graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD))
     position = {conditional.key: i for i, conditional in enumerate(conditionals)}
     children: dict[int, list[int]] = defaultdict(list)
-    waiting: list[tuple[int, _Joint]] = []
+    pending: list[tuple[int, _Joint]] = []
     for i, conditional in enumerate(conditionals):
         if conditional.later:
             children[min(map(position.__getitem__, conditional.later))].append(i)
         else:
-            waiting.append((i, _Joint({}, np.empty((0, 0)))))
+            pending.append((i, _Joint({}, np.empty((0, 0)))))
     found: dict[int, FloatArray] = {}
-    while waiting:
+    while pending:
         # Depth first: only the joint covariances on the way to the root are held.
-        i, parent = waiting.pop()
+        i, parent = pending.pop()
         joint = _joint(conditionals[i], parent)
         d = len(conditionals[i].inverse)
         found[conditionals[i].key] = joint.covariance[:d, :d].copy()  # a view would hold the whole
         inner = [child for child in children[i] if child in children]
-        waiting.extend((child, joint) for child in inner)
+        pending.extend((child, joint) for child in inner)
         found |= _leaves([conditionals[child] for child in children[i] if child not in children], joint)
     return found
 

@@ -11,26 +11,26 @@ from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
-from ..graph.cheirality import seen_well
-from .landmark_initialization import EntryRule
+from ..graph.cheirality import satisfies_cheirality
+from .landmark_initialization import InitializationCriterion
 
 
-def restricted(problem: Problem, used: BoolArray) -> Problem:
+def restricted_problem(problem: Problem, used: BoolArray) -> Problem:
     """The problem with only the observations `used` (n,) of its sequence's."""
     excluded = np.where(used, Excluded.NO, np.maximum(problem.excluded, Excluded.GEOMETRY)).astype(np.uint8)
     return replace(problem, excluded=excluded)
 
 
-def landmarks_from(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
+def initial_landmarks(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
     """Where the landmarks of a problem start along a path (T, 4, 4): triangulated, or at their prior."""
     o = problem.observations()
     if problem.landmark_prior is not None:
         index = np.unique(o.landmark)
         return Landmarks(index, problem.landmark_prior.mean[problem.feature_row(index)])
-    return triangulated(problem, o, world_T_imu)
+    return triangulate_along(problem, o, world_T_imu)
 
 
-def triangulated(problem: Problem, o: Observations, world_T_imu: FloatArray) -> Landmarks:
+def triangulate_along(problem: Problem, o: Observations, world_T_imu: FloatArray) -> Landmarks:
     """Where observations have their landmarks along a path (T, 4, 4), well determined or not.
 
     Those without a single positive disparity are left out.
@@ -42,13 +42,13 @@ def triangulated(problem: Problem, o: Observations, world_T_imu: FloatArray) -> 
     return Landmarks(index[placed], position[placed])
 
 
-def chosen(landmarks: Landmarks, index: IntArray) -> Landmarks:
+def select_landmarks(landmarks: Landmarks, index: IntArray) -> Landmarks:
     """Those of the landmarks that are among `index`."""
     among = np.isin(landmarks.index, index)
     return Landmarks(landmarks.index[among], landmarks.position[among])
 
 
-def determined_along(problem: Problem, world_T_imu: FloatArray, rule: EntryRule) -> BoolArray:
+def determined_observations(problem: Problem, world_T_imu: FloatArray, criterion: InitializationCriterion) -> BoolArray:
     """(n,) the observations of the sequence whose landmark is determined along a path by `rule`, and seen by all.
 
     The choice where no incremental run has made it.
@@ -63,6 +63,6 @@ def determined_along(problem: Problem, world_T_imu: FloatArray, rule: EntryRule)
     at = found.position[np.searchsorted(found.index, o.landmark[taken])]
     np.minimum.at(distance, o.landmark[taken], np.linalg.norm(at - world_T_imu[o.frame[taken], :3, 3], axis=1))
     weakest = np.sqrt(np.linalg.eigvalsh(found.covariance)[:, -1])
-    good = (count >= rule.min_observations) & (weakest < rule.max_relative_deviation * distance[found.index])
-    lost = o.select(taken).landmark[~seen_well(problem, o.select(taken), world_T_imu, found)]
+    good = (count >= criterion.min_observations) & (weakest < criterion.max_relative_deviation * distance[found.index])
+    lost = o.select(taken).landmark[~satisfies_cheirality(problem, o.select(taken), world_T_imu, found)]
     return problem.spread(np.isin(o.landmark, np.setdiff1d(found.index[good], lost)))

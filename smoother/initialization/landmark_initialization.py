@@ -16,7 +16,7 @@ START_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class EntryRule:
+class InitializationCriterion:
     """When the geometry of a landmark counts as determined."""
 
     min_observations: int = 3
@@ -25,23 +25,23 @@ class EntryRule:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Entry:
+class NewLandmark:
     """A landmark that enters the graph: where it starts, and all its observations so far."""
 
     landmark: int
-    start: FloatArray
+    position: FloatArray
     """(3,) m, in the world frame"""
-    observation: list[int]
+    observations: list[int]
     """indices into the problem's observations"""
 
 
-class WaitingLandmarks:
+class UninitializedLandmarks:
     """Collects the observations of landmarks that are not in the graph, and tells which may enter."""
 
-    def __init__(self, problem: Problem, observations: Observations, rule: EntryRule) -> None:
+    def __init__(self, problem: Problem, observations: Observations, criterion: InitializationCriterion) -> None:
         self._problem = problem
         self._observations = observations
-        self._rule = rule
+        self._criterion = criterion
         self._observed: dict[int, list[int]] = {}
 
     def __len__(self) -> int:
@@ -63,16 +63,16 @@ class WaitingLandmarks:
                 self._observed[j] = [i for i in self._observed[j] if self._observations.frame[i] >= since]
         if self._problem.landmark_prior is not None:
             return seen
-        return [j for j in seen if len(self._observed[j]) >= self._rule.min_observations]
+        return [j for j in seen if len(self._observed[j]) >= self._criterion.min_observations]
 
-    def enter(self, candidates: list[int], world_T_imu: FloatArray) -> list[Entry]:
+    def initialize(self, candidates: list[int], world_T_imu: FloatArray) -> list[NewLandmark]:
         """Those of the candidates that are determined along the poses (T, 4, 4); they wait no more.
 
         With the poses held, the triangulated landmark must be in front of every camera that saw it, and no direction
         may have a larger standard deviation than the rule allows.
         """
         if self._problem.landmark_prior is not None:
-            return [self._enter_at_prior(landmark) for landmark in candidates]
+            return [self._initialize_at_prior(landmark) for landmark in candidates]
         if not candidates:
             return []
         lengths = np.array([len(self._observed[j]) for j in candidates])
@@ -84,14 +84,16 @@ class WaitingLandmarks:
             in_front(self._problem.sequence.camera, world_T_cam, position[row]), np.cumsum(lengths) - lengths
         )
         distance = np.linalg.norm(position - world_T_cam[np.cumsum(lengths) - 1, :3, 3], axis=1)
-        determined = front & (deviation < self._rule.max_relative_deviation * distance)
-        return [Entry(j, position[i], self._observed.pop(j)) for i, j in enumerate(candidates) if bool(determined[i])]
+        determined = front & (deviation < self._criterion.max_relative_deviation * distance)
+        return [
+            NewLandmark(j, position[i], self._observed.pop(j)) for i, j in enumerate(candidates) if bool(determined[i])
+        ]
 
-    def _enter_at_prior(self, landmark: int) -> Entry:
+    def _initialize_at_prior(self, landmark: int) -> NewLandmark:
         prior = self._problem.landmark_prior
         assert prior is not None
         row = int(np.searchsorted(self._problem.features, landmark))
-        return Entry(landmark, prior.mean[row], self._observed.pop(landmark))
+        return NewLandmark(landmark, prior.mean[row], self._observed.pop(landmark))
 
     def _triangulate(
         self, index: IntArray, row: IntArray, world_T_cam: FloatArray, n: int

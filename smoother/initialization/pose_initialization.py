@@ -1,7 +1,7 @@
 """Where a new frame's pose is likely to be: its prediction, corrected by what the frame sees of known landmarks.
 
-A factor under a kernel gets its weight where it is first linearised. At the predicted pose good observations look
-wrong and are weighted down, until the pose is relinearised; so the first linearisation is done nearer to the answer.
+A factor under a kernel gets its weight where it is first linearized. At the predicted pose good observations look
+wrong and are weighted down, until the pose is relinearized; so the first linearization is done nearer to the answer.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ SMALL_STEP = 0.1
 """standard deviations: a correction after which the weights no longer matter"""
 
 
-def corrected(
+def refine_predicted_pose(
     problem: Problem, information: FloatArray, pose: FloatArray, points: FloatArray, pixel: FloatArray
 ) -> FloatArray:
     """The pose (4, 4) of a frame that its prediction and n observations (n, 4) of points (n, 3) agree on.
@@ -24,13 +24,13 @@ def corrected(
     of the two together does not move one against the other. `information` (6, 6) is the increment's, order [v, w].
     Only a start.
     """
-    observed = _Observed(problem, points, pixel)
+    observed = _KnownLandmarks(problem, points, pixel)
     guess, correction = pose, np.zeros(6)
     for _ in range(MAX_STEPS):
-        linearised = observed.linearised(guess)
-        if linearised is None:
+        linearized = observed.linearize(guess)
+        if linearized is None:
             return pose
-        J, residual = linearised
+        J, residual = linearized
         A = J.T @ J + information
         delta = np.linalg.solve(A, J.T @ residual - information @ correction)
         guess = guess @ se3.exp(delta)
@@ -40,7 +40,7 @@ def corrected(
     return guess
 
 
-class _Observed:
+class _KnownLandmarks:
     """What one frame sees of known points."""
 
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
@@ -48,13 +48,13 @@ class _Observed:
         self._cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
         self._measured = measured_rows(pixel)
 
-    def linearised(self, pose: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def linearize(self, pose: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Jacobian (3m, 6) for a perturbation of the pose and residuals (3m,), whitened and weighted by the kernel, of
         the m points that are in front of the camera; None if none is."""
         model = self._model
         with np.errstate(divide="ignore", invalid="ignore"):  # at the camera's plane
             predicted = predict(model.camera, self._cam_T_imu, pose, self._points)
-            J = predicted.by_pose()
+            J = predicted.pose_jacobian()
         front = predicted.depth > model.camera.min_depth
         if not front.any():
             return None

@@ -13,39 +13,41 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
 
-from ..graph.factors import Factors
-from ..graph.gtsam_conversions import poses_of
+from ..graph.factors import FactorBuilder
+from ..graph.gtsam_conversions import poses_from_values
 from ..graph.keys import landmark_key, pose_key
-from .initial_values import triangulated
+from .initial_values import triangulate_along
 
-LENGTHS = (10, 40, 160)
+WINDOW_LENGTHS = (10, 40, 160)
 """frames of a piece"""
 MIN_OBSERVATIONS = 2
 MAX_STEPS, RELATIVE_DECREASE = 15, 1e-3
 
 
-def piecewise(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
+def optimize_in_windows(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
     """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
-    factors, observations, T = Factors(problem), problem.observations(), problem.n_frames
-    for length in LENGTHS:
+    factors, observations, T = FactorBuilder(problem), problem.observations(), problem.n_frames
+    for length in WINDOW_LENGTHS:
         starts = range(0, T - 1, length)
-        pieces = [solved(factors, observations, world_T_imu, a, min(a + length, T - 1)) for a in starts]
+        pieces = [optimize_window(factors, observations, world_T_imu, a, min(a + length, T - 1)) for a in starts]
         steps = np.concatenate([se3.relative(piece) for piece in pieces])
         world_T_imu = se3.compose(steps, world_T_imu[0])
     return world_T_imu
 
 
-def solved(factors: Factors, observations: Observations, world_T_imu: FloatArray, first: int, last: int) -> FloatArray:
+def optimize_window(
+    factors: FactorBuilder, observations: Observations, world_T_imu: FloatArray, first: int, last: int
+) -> FloatArray:
     """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
     o = observations.of_frames(first, last)
     often = np.bincount(o.landmark) >= MIN_OBSERVATIONS
-    landmarks = triangulated(factors.problem, o.select(often[o.landmark]), world_T_imu)
+    landmarks = triangulate_along(factors.problem, o.select(often[o.landmark]), world_T_imu)
     o = o.select(np.isin(o.landmark, landmarks.index))
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    held = gtsam.noiseModel.Diagonal.Sigmas(factors.held_sigmas)
+    held = gtsam.noiseModel.Diagonal.Sigmas(factors.fixed_pose_sigmas)
     graph.push_back(gtsam.PriorFactorPose3(pose_key(first), gtsam.Pose3(world_T_imu[first]), held))
     for k in range(first, last):
-        graph.push_back(factors.motion(k))
+        graph.push_back(factors.between(k))
     for k in range(first, last + 1):
         values.insert(pose_key(k), gtsam.Pose3(world_T_imu[k]))
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
@@ -56,6 +58,8 @@ def solved(factors: Factors, observations: Observations, world_T_imu: FloatArray
     params.setMaxIterations(MAX_STEPS)
     params.setRelativeErrorTol(RELATIVE_DECREASE)
     try:
-        return poses_of(gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize(), range(first, last + 1))
+        return poses_from_values(
+            gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize(), range(first, last + 1)
+        )
     except RuntimeError:
         return world_T_imu[first : last + 1]

@@ -9,7 +9,7 @@ import gtsam
 from ..errors import IndeterminateSystemError, named_variable
 from ..graph.keys import pose_key
 
-INTERVAL, SHARE = 50, 0.125
+CHECKPOINT_INTERVAL, CHECKPOINT_SHARE = 50, 0.125
 """updates from one copy to the next: at least so many, and this share of all so far"""
 
 
@@ -21,11 +21,11 @@ class Update(NamedTuple):
     removed: tuple[int, ...] = ()
     groups: Mapping[int, int] | None = None
     """of elimination, by key: the larger, the later; a key that is not named is in group 0"""
-    relinearise: bool = False
+    relinearize: bool = False
     """at this update, whichever the next one is that would"""
 
 
-class RestorableISAM2:
+class CheckpointedISAM2:
     """`gtsam.ISAM2` with updates that either succeed or change nothing.
 
     From time to time a copy of the tree is kept; after a failure the copy is restored and the updates since then are
@@ -33,17 +33,17 @@ class RestorableISAM2:
     it is, the longer one serves; failures seldom come alone, so one is taken after each of them.
     """
 
-    def __init__(self, params: gtsam.ISAM2Params, interval: int = INTERVAL, first: int = 0) -> None:
+    def __init__(self, params: gtsam.ISAM2Params, interval: int = CHECKPOINT_INTERVAL, first: int = 0) -> None:
         """`first` is the frame of a pose that the tree has after every update."""
         self.tree = gtsam.ISAM2(params)
         self._first = pose_key(first)
         self._interval = interval
         self._updates = 0
-        self._keep()
+        self._take_checkpoint()
 
-    def _keep(self) -> None:
-        self._copy = gtsam.ISAM2(self.tree)
-        self._since_copy: list[Update] = []
+    def _take_checkpoint(self) -> None:
+        self._checkpoint = gtsam.ISAM2(self.tree)
+        self._since_checkpoint: list[Update] = []
 
     def update(
         self,
@@ -51,25 +51,25 @@ class RestorableISAM2:
         values: gtsam.Values,
         removed: Listing[int] = (),
         groups: Mapping[int, int] | None = None,
-        relinearise: bool = False,
+        relinearize: bool = False,
     ) -> gtsam.ISAM2Result:
         """One update; raises IndeterminateSystemError, the tree being restored, where GTSAM fails.
 
         Without `groups` GTSAM eliminates all variables of the new factors last.
         """
-        step = Update(factors, values, tuple(removed), groups, relinearise)
-        if len(self._since_copy) >= max(self._interval, int(SHARE * self._updates)):
-            self._keep()
+        step = Update(factors, values, tuple(removed), groups, relinearize)
+        if len(self._since_checkpoint) >= max(self._interval, int(CHECKPOINT_SHARE * self._updates)):
+            self._take_checkpoint()
         try:
             result = _apply(self.tree, step)
             self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
         except (RuntimeError, IndexError) as error:
-            self.tree = gtsam.ISAM2(self._copy)
-            for past in self._since_copy:
+            self.tree = gtsam.ISAM2(self._checkpoint)
+            for past in self._since_checkpoint:
                 _apply(self.tree, past)
-            self._keep()
+            self._take_checkpoint()
             raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
-        self._since_copy.append(step)
+        self._since_checkpoint.append(step)
         self._updates += 1
         return result
 
@@ -85,5 +85,5 @@ def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
         step.values,
         list(step.removed),
         constrainedKeys=groups,
-        force_relinearize=step.relinearise,
+        force_relinearize=step.relinearize,
     )

@@ -9,32 +9,34 @@ chooses. The solution is the same.
 
 from collections.abc import Collection
 
-from ..graph.keys import TAIL, pose_key
+from ..graph.keys import AUXILIARY_POSE, pose_key
 
-FRAMES, GROUPS = 20, 6
+GROUP_FRAMES, N_GROUPS = 20, 6
 """of a group, and how many there are beside the last one; what is older is in the first of them.
 
 Longer groups leave the choice to COLAMD, more of them cost a call for each key. What an update touches seldom reaches
 back further than the life of a track, which is a few dozen frames.
 """
-CROWD = 200
+MANY_LANDMARKS = 200
 """landmarks of a frame, above which they are eliminated before its pose. As a rule all that a frame sees is kept for
 the end, which costs the next frame least, as long as so many dense columns do not cost more themselves"""
 
 
-class Chronology:
+class EliminationOrdering:
     """When poses and landmarks were seen last, and the groups that follow from it."""
 
     def __init__(self) -> None:
         self._seen: dict[int, int] = {}
         """key of a landmark -> frame that saw it last; those seen last are at the end"""
 
-    def forget(self, landmarks: Collection[int]) -> None:
+    def remove(self, landmarks: Collection[int]) -> None:
         """These (keys) leave the graph: GTSAM takes no group of a variable that it does not have."""
         for key in landmarks:
             self._seen.pop(key, None)
 
-    def groups(self, frame: int, landmarks: Collection[int], *, first: int = 0, fresh: bool = False) -> dict[int, int]:
+    def groups(
+        self, frame: int, landmarks: Collection[int], *, first: int = 0, all_new: bool = False
+    ) -> dict[int, int]:
         """Key -> group of elimination, for the update that brings a frame and sees some landmarks (keys), in a tree
         that has no pose before `first`.
 
@@ -48,15 +50,17 @@ class Chronology:
             seen[key] = frame
         # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
         most = len(landmarks) + (frame > 0)
-        if len(landmarks) > CROWD:
-            return {pose_key(frame): 1, TAIL: 2}
-        if fresh:
+        if len(landmarks) > MANY_LANDMARKS:
+            return {pose_key(frame): 1, AUXILIARY_POSE: 2}
+        if all_new:
             last, first = min(1, most), max(first, frame - 1)
-            return dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last) | {TAIL: last + 1}
-        last = min(GROUPS, most)
-        groups = dict.fromkeys([pose_key(frame), *landmarks], last) | {TAIL: last + 1}
-        oldest = max(first, frame - FRAMES * (last - 1))
-        of_frame = [last - 1 - (frame - 1 - k) // FRAMES for k in range(oldest, frame)]
+            return dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last) | {
+                AUXILIARY_POSE: last + 1
+            }
+        last = min(N_GROUPS, most)
+        groups = dict.fromkeys([pose_key(frame), *landmarks], last) | {AUXILIARY_POSE: last + 1}
+        oldest = max(first, frame - GROUP_FRAMES * (last - 1))
+        of_frame = [last - 1 - (frame - 1 - k) // GROUP_FRAMES for k in range(oldest, frame)]
         groups |= {pose_key(k): group for k, group in enumerate(of_frame, oldest)}
         for key in reversed(seen):
             if seen[key] < oldest:
@@ -65,13 +69,13 @@ class Chronology:
                 groups[key] = of_frame[seen[key] - oldest]
         return groups
 
-    def anew(self, first: int, frame: int) -> dict[int, int]:
+    def batch_groups(self, first: int, frame: int) -> dict[int, int]:
         """Key -> group of elimination, for a tree that is built at once over the frames `first` to `frame`, the last
         one that `groups` has heard of; without the landmarks that were seen before only."""
-        last = 1 + (frame - first) // FRAMES
-        groups = {pose_key(k): (k - first) // FRAMES for k in range(first, frame)} | {pose_key(frame): last}
+        last = 1 + (frame - first) // GROUP_FRAMES
+        groups = {pose_key(k): (k - first) // GROUP_FRAMES for k in range(first, frame)} | {pose_key(frame): last}
         for key in reversed(self._seen):
             if self._seen[key] < first:
                 break
-            groups[key] = last if self._seen[key] == frame else (self._seen[key] - first) // FRAMES
-        return groups | {TAIL: last + 1}
+            groups[key] = last if self._seen[key] == frame else (self._seen[key] - first) // GROUP_FRAMES
+        return groups | {AUXILIARY_POSE: last + 1}

@@ -12,11 +12,11 @@ from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Prog
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from ..errors import GivenUpError, IndeterminateSystemError
-from ..graph.gauss_newton import Relinearised, compact, relinearised
-from ..graph.gtsam_conversions import from_first_pose, landmarks_of, pose_covariances, poses_of
+from ..errors import IndeterminateSystemError, UnrecoverableError
+from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
+from ..graph.gtsam_conversions import in_first_pose_frame, landmarks_from_values, pose_covariances, poses_from_values
 from ..graph.keys import pose_key
-from ..graph.marginal_covariances import covariances
+from ..graph.marginal_covariances import marginal_covariances
 from .incremental_smoother import FrameLostError, IncrementalSmoother
 from .settings import ISAM2Settings
 
@@ -31,7 +31,7 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
     `recovered`. `by_products["isam2-online"]` is pose k as known from data up to k.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        answer = _solve(from_first_pose(problem), progress, settings or ISAM2Settings())
+        answer = _solve(in_first_pose_frame(problem), progress, settings or ISAM2Settings())
         return answer.moved(problem.initial_pose)
 
 
@@ -55,16 +55,16 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     try:
         smoother = _run(problem, settings, seconds, progress)
         smoother.settle()
-        graph, values = _final(smoother, settings.relinearise_at_end)
-    except (GivenUpError, IndeterminateSystemError) as error:
+        graph, values = _final_solution(smoother, settings.relinearize_at_end)
+    except (UnrecoverableError, IndeterminateSystemError) as error:
         return Estimate.failed("isam2", str(error), T, len(problem.excluded))
     poses, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
-    status, reason = _verdict(events)
+    status, reason = _status(events)
     used = problem.spread(smoother.used())
     online = Estimate(
         name="isam2-online",
-        world_T_imu=smoother.arrivals.path,
+        world_T_imu=smoother.builder.online_poses,
         covariance=smoother.online_covariance,
         landmarks=smoother.online_landmarks(),
         used=used,
@@ -76,7 +76,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     )
     final = Estimate(
         name="isam2",
-        world_T_imu=poses_of(values, range(T)),
+        world_T_imu=poses_from_values(values, range(T)),
         covariance=poses,
         landmarks=landmarks,
         used=used,
@@ -97,14 +97,14 @@ def _run(
     try:
         quick.run(seconds, progress)
         return quick
-    except (FrameLostError, GivenUpError):
-        if settings.careful or problem.landmark_prior is not None:
+    except (FrameLostError, UnrecoverableError):
+        if settings.qr or problem.landmark_prior is not None:
             raise
     where = quick.n_frames
-    smoother = IncrementalSmoother(problem, replace(settings, careful=True))
+    smoother = IncrementalSmoother(problem, replace(settings, qr=True))
     smoother.run(seconds, progress)
     # Online, the frames before the failure were known by Cholesky.
-    smoother.arrivals.path[:where] = quick.arrivals.path[:where]
+    smoother.builder.online_poses[:where] = quick.builder.online_poses[:where]
     smoother.online_covariance[:where] = quick.online_covariance[:where]
     smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
     return smoother
@@ -114,13 +114,15 @@ def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
     return replace(estimate, by_products={other.name: replace(other, by_products={})})
 
 
-def _final(smoother: IncrementalSmoother, relinearise: bool) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-    """The whole graph and its solution, relinearised or not, without the landmarks whose geometry came undone."""
-    slots, values = smoother.released()
+def _final_solution(
+    smoother: IncrementalSmoother, relinearize: bool
+) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """The whole graph and its solution, relinearized or not, without the landmarks whose geometry came undone."""
+    slots, values = smoother.release()
     while True:
-        graph = compact(slots)
-        values, failure = relinearised(graph, values) if relinearise else Relinearised(values)
-        if not smoother.drop_undone(slots, values):
+        graph = compact_graph(slots)
+        values, failure = gauss_newton(graph, values) if relinearize else GaussNewtonResult(values)
+        if not smoother.drop_cheirality_violations(slots, values):
             break
     if failure:
         last = smoother.problem.n_frames - 1
@@ -134,20 +136,20 @@ def _marginals(
     """Covariances (T, 6, 6) of the poses, order [v, w], NaN where there are none; the landmarks with theirs."""
     T = smoother.problem.n_frames
     try:
-        covariance = covariances(graph, values)
+        covariance = marginal_covariances(graph, values)
     except RuntimeError:
         smoother.events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
-        return np.full((T, 6, 6), np.nan), landmarks_of(values, smoother.key)
+        return np.full((T, 6, 6), np.nan), landmarks_from_values(values, smoother.key)
     poses = pose_covariances(smoother.problem, [covariance[pose_key(k)] for k in range(T)])
-    return poses, landmarks_of(values, smoother.key, covariance)
+    return poses, landmarks_from_values(values, smoother.key, covariance)
 
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
     kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never fixed its position well enough"
-    return [Event(frame, kind, why, landmark) for landmark, frame in smoother.arrivals.waiting.last_seen()]
+    return [Event(frame, kind, why, landmark) for landmark, frame in smoother.builder.uninitialized.last_seen()]
 
 
-def _verdict(events: tuple[Event, ...]) -> tuple[Status, str]:
+def _status(events: tuple[Event, ...]) -> tuple[Status, str]:
     harmless = (EventKind.LANDMARK_NEVER_DETERMINED, EventKind.SOLVED_BY_QR)
     trouble = Counter(event.kind for event in events if event.kind not in harmless)
     if not trouble:

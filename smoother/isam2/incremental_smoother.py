@@ -12,19 +12,19 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from ..errors import IndeterminateSystemError
-from ..frame_update import Arrival, add_recovering
-from ..graph.cheirality import UNDONE, undone
-from ..graph.gtsam_conversions import landmarks_of, pose_covariances, poses_of
+from ..frame_update import FrameUpdate, add_with_recovery
+from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
+from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
 from ..graph.keys import distance_key, landmark_of, pose_key
-from ..graph_builder import Arrivals
-from .elimination_ordering import Chronology
-from .marginalized_isam2 import NO_POSE, MovingTree, earliest_tracked
+from ..graph_builder import GraphBuilder
+from .elimination_ordering import EliminationOrdering
+from .marginalized_isam2 import NO_POSE, MarginalizedISAM2, marginalization_horizon
 from .settings import ISAM2Settings
 
 PRIOR = -1
 """stands for an observation where a factor is the landmark's prior"""
-UNSETTLED = 4
-"""updates that all relinearise, from one on whose landmarks are all new: they and the last poses start far off"""
+SETTLING_FRAMES = 4
+"""updates that all relinearize, from one on whose landmarks are all new: they and the last poses start far off"""
 SETTLING_UPDATES = 8
 """at most; three to five are usual"""
 
@@ -41,11 +41,11 @@ class IncrementalSmoother:
     """Builds and solves the graph frame by frame, and keeps what was given up on the way."""
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
-        self.solver = MovingTree(settings.params(problem.sequence.camera.baseline))
+        self.solver = MarginalizedISAM2(settings.params(problem.sequence.camera.baseline))
         self._settings = settings
         self.problem = problem
-        self._may_lose_frames = settings.careful or problem.landmark_prior is not None
-        self.arrivals = Arrivals(problem, settings.entry)
+        self._may_lose_frames = settings.qr or problem.landmark_prior is not None
+        self.builder = GraphBuilder(problem, settings.initialization)
         self.online_covariance = np.full((problem.n_frames, 6, 6), np.nan)
         self.key: dict[int, int] = {}
         """of each landmark in the graph"""
@@ -54,12 +54,12 @@ class IncrementalSmoother:
         self._dropped: set[int] = set()
         self.n_frames = 0
         """in the graph"""
-        self._unsettled = 0
-        """frames for which every update relinearises"""
-        self._chronology = Chronology()
+        self._settling_frames = 0
+        """frames for which every update relinearizes"""
+        self._ordering = EliminationOrdering()
         self._first = 0
         """frame in the tree"""
-        self._shorten_at = settings.tree_frames
+        self._marginalize_at = settings.tree_frames
         """frame"""
         self.events: list[Event] = []
 
@@ -67,9 +67,9 @@ class IncrementalSmoother:
         """All frames; `seconds` (T,) is filled. Raises GivenUpError, and FrameLostError unless by QR already (or under
         landmark priors, whose graph QR has not been seen to rescue)."""
         T = self.problem.n_frames
-        for k, observed in enumerate(self.arrivals.observations.by_frame(T)):
+        for k, observed in enumerate(self.builder.observations.by_frame(T)):
             start = time.perf_counter()
-            self._frame(k, range(observed.start, observed.stop))
+            self._process_frame(k, range(observed.start, observed.stop))
             seconds[k] = time.perf_counter() - start
             if progress is not None:
                 progress(k + 1, T)
@@ -78,149 +78,156 @@ class IncrementalSmoother:
         """After the last frame: updates without anything new, until every variable is within its threshold."""
         for _ in range(SETTLING_UPDATES):
             try:
-                if self.solver.relinearised() == 0:
+                if self.solver.relinearize() == 0:
                     return
             except IndeterminateSystemError:  # the tree is as it was, and so good enough
                 return
 
-    def _frame(self, k: int, observed: range) -> None:
-        arrival = self._reached(self.arrivals.next(k, observed, self.key, self._dropped))
-        landmarks, events = add_recovering(self, arrival)
+    def _process_frame(self, k: int, observed: range) -> None:
+        update = self._with_restored_tree(self.builder.frame_update(k, observed, self.key, self._dropped))
+        landmarks, events = add_with_recovery(self, update)
         if not self._may_lose_frames and any(event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS for event in events):
             raise FrameLostError(k)
         self.n_frames = k + 1
         self._dropped |= landmarks
         self.events += events
         tree = self.solver.tree
-        self.arrivals.path[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
+        self.builder.online_poses[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
         self.online_covariance[k] = pose_covariances(self.problem, [tree.marginalCovariance(pose_key(k))], k)[0]
-        for j in self.arrivals.landmarks_seen(observed).tolist():
+        for j in self.builder.observed_landmarks(observed).tolist():
             if j in self.key and j not in self._dropped:
-                self.arrivals.position[j] = tree.calculateEstimatePoint3(self.key[j])
-        if k >= self._shorten_at:
-            self._shorten(k)
+                self.builder.landmark_position[j] = tree.calculateEstimatePoint3(self.key[j])
+        if k >= self._marginalize_at:
+            self._marginalize_old_frames(k)
 
-    def _shorten(self, k: int) -> None:
+    def _marginalize_old_frames(self, k: int) -> None:
         """After frame k: what is far behind leaves the tree, unless a track that is alive hangs on it."""
         kept = self._settings.kept_frames
-        first = min(k + 1 - kept, earliest_tracked(self.arrivals.observations, k))
-        self._shorten_at = k + kept
+        first = min(k + 1 - kept, marginalization_horizon(self.builder.observations, k))
+        self._marginalize_at = k + kept
         if first < self._first + kept:
             return
-        if self.solver.shortened(first, self._chronology.anew(first, k)):
+        if self.solver.marginalize_before(first, self._ordering.batch_groups(first, k)):
             self._first = first
-            self._shorten_at = first + self._settings.tree_frames
+            self._marginalize_at = first + self._settings.tree_frames
 
-    def _reached(self, arrival: Arrival) -> Arrival:
-        """The arrival, after the tree has gone back to frame 0 where it names what left the tree: that could not be
-        known when the tree was exchanged. Where GTSAM fails, the arrival without the landmarks that reach back."""
-        frame, back = self.arrivals.frame, {j for j in arrival.seen if self.solver.has_left(self.key[j])}
-        back |= {e.landmark for e in arrival.entries if frame[e.observation[0]] < self._first}
+    def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
+        """The update, after the tree has gone back to frame 0 where it names what left the tree: that could not be
+        known when the tree was exchanged. Where GTSAM fails, the update without the landmarks that reach back."""
+        frame, back = self.builder.frame, {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
+        back |= {e.landmark for e in update.new_landmarks if frame[e.observations[0]] < self._first}
         if not back:
-            return arrival
-        k, new = arrival.frame, back - self._dropped
-        if new and self.solver.restored(self._chronology.anew(0, k - 1)):
+            return update
+        k, new = update.frame, back - self._dropped
+        if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
             self._first = 0
-            self._shorten_at = max(self._shorten_at, 2 * k)  # so that all of these together cost no more than one
-            return arrival
+            self._marginalize_at = max(
+                self._marginalize_at, 2 * k
+            )  # so that all of these together cost no more than one
+            return update
         self.events += [
             Event(k, EventKind.LANDMARK_DROPPED, "it came back, and the tree cannot go back", j) for j in sorted(new)
         ]
         self._dropped |= new
-        return arrival.without(back)
+        return update.without(back)
 
-    def add(self, arrival: Arrival, given_up: Collection[int]) -> None:
-        """See `arrival.Graph`."""
-        k, factors = arrival.frame, self.arrivals.factors
+    def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
+        """See `update.Graph`."""
+        k, factors = update.frame, self.builder.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        values.insert(pose_key(k), gtsam.Pose3(arrival.guess))
-        graph.push_back(arrival.motion)
+        values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
+        graph.push_back(update.motion_factor)
         owner: list[tuple[int, int]] = []
-        new = {e.landmark: distance_key(e.landmark, self._baselines(e.start, arrival.guess)) for e in arrival.entries}
-        for entry in arrival.entries:
+        new = {
+            e.landmark: distance_key(e.landmark, self._baselines(e.position, update.initial_pose))
+            for e in update.new_landmarks
+        }
+        for entry in update.new_landmarks:
             j, key = entry.landmark, new[entry.landmark]
-            values.insert(key, entry.start)
+            values.insert(key, entry.position)
             if self.problem.landmark_prior is not None:
                 graph.push_back(factors.landmark_prior(j, key))
                 owner.append((j, PRIOR))
-            for i in entry.observation:
-                graph.push_back(self.arrivals.stereo(i, key))
+            for i in entry.observations:
+                graph.push_back(self.builder.stereo(i, key))
                 owner.append((j, i))
-        for j, i in arrival.seen.items():
-            graph.push_back(self.arrivals.stereo(i, self.key[j]))
+        for j, i in update.tracked.items():
+            graph.push_back(self.builder.stereo(i, self.key[j]))
             owner.append((j, i))
-        if arrival.entries and not arrival.seen:
-            self._unsettled = UNSETTLED
-        sighted = [*new.values(), *(self.key[j] for j in arrival.seen)]
-        there = [j for j in given_up if j in self.key]
+        if update.new_landmarks and not update.tracked:
+            self._settling_frames = SETTLING_FRAMES
+        sighted = [*new.values(), *(self.key[j] for j in update.tracked)]
+        there = [j for j in dropped if j in self.key]
         removed = [slot for j in there for slot in self._slots[j].values()]
-        self._chronology.forget([self.key[j] for j in there])
-        groups = self._chronology.groups(k, sighted, first=self._first, fresh=self._unsettled > 0)
-        frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.arrivals.frame[i] for _, i in owner)]
+        self._ordering.remove([self.key[j] for j in there])
+        groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._settling_frames > 0)
+        frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
         try:
-            slots = self.solver.update(graph, frames, values, pose_key(k), removed, groups, self._unsettled > 0)
+            slots = self.solver.update(graph, frames, values, pose_key(k), removed, groups, self._settling_frames > 0)
         except IndeterminateSystemError:
-            self._chronology.forget(new.values())
+            self._ordering.remove(new.values())
             raise
-        self._unsettled = max(0, self._unsettled - 1)
+        self._settling_frames = max(0, self._settling_frames - 1)
         for j in there:
             del self.key[j], self._slots[j]
         self.key |= new
         for (j, i), slot in zip(owner, slots[1:], strict=True):
             self._slots.setdefault(j, {})[i] = slot
 
-    def suspects(self, error: IndeterminateSystemError, given_up: Collection[int]) -> dict[int, str]:
-        """See `arrival.Graph`.
+    def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
+        """See `update.Graph`.
 
         GTSAM names a variable near the trouble, seldom the culprit. That is a landmark which the last solution sent
         behind a camera or onto its plane; only where there is none, the named one is taken.
         """
-        culprits = [j for j in self._undone(self.solver.estimate()) if j not in given_up]
+        culprits = [j for j in self._cheirality_violations(self.solver.estimate()) if j not in dropped]
         if culprits:
-            return dict.fromkeys(culprits, UNDONE)
+            return dict.fromkeys(culprits, CHEIRALITY_VIOLATION)
         named = None if error.key is None else landmark_of(error.key)
-        if named is None or named in given_up or named in self._dropped:
+        if named is None or named in dropped or named in self._dropped:
             return {}
         return {named: "the system was indeterminate near it"}
 
-    def _undone(self, values: gtsam.Values) -> list[int]:
+    def _cheirality_violations(self, values: gtsam.Values) -> list[int]:
         if not self.key:
             return []
-        o = self.arrivals.observations.select(self.used())
-        return undone(self.problem, o, poses_of(values, range(self.n_frames)), landmarks_of(values, self.key))
+        o = self.builder.observations.select(self.used())
+        return cheirality_violations(
+            self.problem, o, poses_from_values(values, range(self.n_frames)), landmarks_from_values(values, self.key)
+        )
 
-    def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         """After the last frame: the factors in their slots, and the solution. The tree is gone, as large as it is."""
-        graph, values = self.solver.released()
+        graph, values = self.solver.release()
         there = set(self.key.values())
         for key in values.keys():  # noqa: SIM118
             if landmark_of(key) is not None and key not in there:  # given up, and still in the prior
                 values.erase(key)
         return graph, values
 
-    def drop_undone(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:
-        """Takes every landmark whose geometry came undone out of what `released` gave; False if there is none.
+    def drop_cheirality_violations(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:
+        """Takes every landmark whose geometry came undone out of what `release` gave; False if there is none.
 
         Such a landmark pulls at nothing (its Jacobian is zero) and its residual means nothing.
         """
-        given_up = self._undone(values)
-        for j in given_up:
+        dropped = self._cheirality_violations(values)
+        for j in dropped:
             for slot in self._slots.pop(j).values():
                 graph.remove(slot)
             values.erase(self.key.pop(j))
         last = self.problem.n_frames - 1
-        self.events += [Event(last, EventKind.LANDMARK_DROPPED, UNDONE, landmark) for landmark in given_up]
-        return bool(given_up)
+        self.events += [Event(last, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, landmark) for landmark in dropped]
+        return bool(dropped)
 
     def used(self) -> BoolArray:
         """Which of the problem's observations are in the graph."""
-        used = np.zeros(len(self.arrivals.observations), dtype=np.bool_)
+        used = np.zeros(len(self.builder.observations), dtype=np.bool_)
         used[[i for slots in self._slots.values() for i in slots if i != PRIOR]] = True
         return used
 
     def online_landmarks(self) -> Landmarks:
         """Every landmark as known at the frame that saw it last."""
-        position = self.arrivals.position
+        position = self.builder.landmark_position
         index = np.sort(np.fromiter(position, dtype=np.int64))
         return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))
 

@@ -3,7 +3,7 @@
 An update of GTSAM walks over its whole tree: which variables are above a threshold, which cliques hold one of those,
 and all that hangs on the cliques that it replaces. So it becomes dear late in a drive, though it changes no more than
 before. From time to time the tree is exchanged for one over the last frames, and what came before becomes a linear
-prior on what remains, at the same linearisation points: the answer is the same, but these frames are not relinearised
+prior on what remains, at the same linearization points: the answer is the same, but these frames are not relinearized
 any more. The graph keeps every factor, for the last Gauss-Newton steps over all of it, and for a landmark that comes
 back after it left: the tree is then built anew over all frames.
 """
@@ -17,10 +17,10 @@ import numpy as np
 from fgbaseline.data.observations import Observations
 
 from ..errors import IndeterminateSystemError
-from ..graph.keys import TAIL
-from .checkpointed_isam2 import RestorableISAM2
+from ..graph.keys import AUXILIARY_POSE
+from .checkpointed_isam2 import CheckpointedISAM2
 
-TIE = gtsam.noiseModel.Unit.Create(6)
+AUXILIARY_NOISE = gtsam.noiseModel.Unit.Create(6)
 """of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
 IN_PRIOR = -1
 """stands for a factor's slot in the tree, where it is no longer one, or was removed"""
@@ -30,27 +30,27 @@ UNSEEN_FRAMES = 2
 """for which a track without an observation may still go on: the mask interrupts tracks for that long"""
 
 
-class MovingTree:
+class MarginalizedISAM2:
     """A whole graph, its factors in slots that stay, and a tree over its end; updates succeed or change nothing."""
 
     def __init__(self, params: gtsam.ISAM2Params) -> None:
         self._params = params
-        self._isam = RestorableISAM2(params)
+        self._isam = CheckpointedISAM2(params)
         self._graph = gtsam.NonlinearFactorGraph()
-        self._left = gtsam.Values()
+        self._marginalized = gtsam.Values()
         """of the variables that are not in the tree any more"""
-        self._place: list[int] = []
+        self._tree_slot: list[int] = []
         """the slot in the tree of the factor in each slot of the graph"""
         self._frame: list[int] = []
         """the first frame whose pose each of these factors names"""
         self._prior: list[int] = []
         """the slots in the tree of what stands for factors behind it"""
-        self._tail: int | None = None
+        self._auxiliary_slot: int | None = None
         """the slot in the tree of the tie to it"""
 
     @property
     def tree(self) -> gtsam.ISAM2:
-        """As the last update left it; another one after `shortened`."""
+        """As the last update left it; another one after `marginalize_before`."""
         return self._isam.tree
 
     def update(
@@ -61,7 +61,7 @@ class MovingTree:
         newest: int,
         removed: Collection[int] = (),
         groups: Mapping[int, int] | None = None,
-        relinearise: bool = False,
+        relinearize: bool = False,
     ) -> Listing[int]:
         """An update of the tree, see `RestorableISAM2`; the slots of the new factors, in their order.
 
@@ -69,30 +69,30 @@ class MovingTree:
         among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior already
         cannot be taken out of it. Raises IndeterminateSystemError.
         """
-        places = [self._place[slot] for slot in removed if self._place[slot] != IN_PRIOR]
+        places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
         tied = gtsam.NonlinearFactorGraph(factors)
-        tied.push_back(gtsam.BetweenFactorPose3(newest, TAIL, gtsam.Pose3(), TIE))
-        if self._tail is None:
-            values.insert(TAIL, values.atPose3(newest))
+        tied.push_back(gtsam.BetweenFactorPose3(newest, AUXILIARY_POSE, gtsam.Pose3(), AUXILIARY_NOISE))
+        if self._auxiliary_slot is None:
+            values.insert(AUXILIARY_POSE, values.atPose3(newest))
         else:
-            places.append(self._tail)
-        result = self._isam.update(tied, values, places, groups, relinearise)
-        *new, self._tail = result.getNewFactorsIndices()
+            places.append(self._auxiliary_slot)
+        result = self._isam.update(tied, values, places, groups, relinearize)
+        *new, self._auxiliary_slot = result.getNewFactorsIndices()
         for slot in removed:
             self._graph.remove(slot)
-            self._place[slot] = IN_PRIOR
-        slots = range(len(self._place), len(self._place) + len(new))
+            self._tree_slot[slot] = IN_PRIOR
+        slots = range(len(self._tree_slot), len(self._tree_slot) + len(new))
         self._graph.push_back(factors)
-        self._place += new
+        self._tree_slot += new
         self._frame += frames
         return slots
 
-    def relinearised(self) -> int:
+    def relinearize(self) -> int:
         """Relinearises what is beyond its threshold: how many variables. Raises IndeterminateSystemError."""
-        result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearise=True)
+        result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearize=True)
         return int(result.getVariablesRelinearized())
 
-    def shortened(self, first: int, groups: Mapping[int, int]) -> bool:
+    def marginalize_before(self, first: int, groups: Mapping[int, int]) -> bool:
         """Exchanges the tree for one over the frames from `first` on; False, nothing being changed, if GTSAM fails.
 
         Nothing new may name what leaves: poses before `first`, and landmarks that were not seen since. `groups` are of
@@ -106,28 +106,28 @@ class MovingTree:
             n = ahead.size()
             for i in range(prior.size()):
                 ahead.push_back(gtsam.LinearContainerFactor(prior.at(i), point))
-            isam = RestorableISAM2(self._params, first=first)
+            isam = CheckpointedISAM2(self._params, first=first)
             isam.update(ahead, _without(point, set(point.keys()) - staying), groups=groups)
         except (RuntimeError, IndeterminateSystemError):
             return False
-        self._left.insert(_without(self.tree.calculateEstimate(), staying))
+        self._marginalized.insert(_without(self.tree.calculateEstimate(), staying))
         self._isam = isam
-        self._place = [place.get(there, IN_PRIOR) for there in self._place]
+        self._tree_slot = [place.get(there, IN_PRIOR) for there in self._tree_slot]
         self._prior = list(range(n, ahead.size()))
-        assert self._tail is not None
-        self._tail = place[self._tail]
+        assert self._auxiliary_slot is not None
+        self._auxiliary_slot = place[self._auxiliary_slot]
         return True
 
-    def has_left(self, key: int) -> bool:
+    def is_marginalized(self, key: int) -> bool:
         """Whether a variable is in the prior only."""
-        return bool(self._left.exists(key))
+        return bool(self._marginalized.exists(key))
 
-    def restored(self, groups: Mapping[int, int]) -> bool:
+    def restore_all(self, groups: Mapping[int, int]) -> bool:
         """Exchanges the tree for one over all frames, without a prior; False, nothing being changed, if GTSAM fails.
 
         `groups` are of elimination, as in `update`.
         """
-        assert self._tail is not None
+        assert self._auxiliary_slot is not None
         factors, place = gtsam.NonlinearFactorGraph(), list[int]()
         for slot in range(self._graph.size()):
             factor = self._graph.at(slot)
@@ -135,17 +135,23 @@ class MovingTree:
             if factor is not None:
                 factors.push_back(factor)
         tail = factors.size()
-        factors.push_back(self.tree.getFactorsUnsafe().at(self._tail))
-        point = gtsam.Values(self._left)
+        factors.push_back(self.tree.getFactorsUnsafe().at(self._auxiliary_slot))
+        point = gtsam.Values(self._marginalized)
         point.insert(self.tree.getLinearizationPoint())
         named = set(factors.keyVector())
         without = [key for key in point.keys() if key not in named]  # noqa: SIM118
-        isam = RestorableISAM2(self._params)
+        isam = CheckpointedISAM2(self._params)
         try:
-            isam.update(factors, _without(point, without), groups=groups, relinearise=True)
+            isam.update(factors, _without(point, without), groups=groups, relinearize=True)
         except IndeterminateSystemError:
             return False
-        self._isam, self._left, self._place, self._prior, self._tail = isam, gtsam.Values(), place, [], tail
+        self._isam, self._marginalized, self._tree_slot, self._prior, self._auxiliary_slot = (
+            isam,
+            gtsam.Values(),
+            place,
+            [],
+            tail,
+        )
         return True
 
     def _split(
@@ -161,10 +167,10 @@ class MovingTree:
 
         for there in self._prior:
             behind.push_back(factors.at(there))
-        assert self._tail is not None
-        goes_ahead(self._tail)
+        assert self._auxiliary_slot is not None
+        goes_ahead(self._auxiliary_slot)
         without_pose = []
-        for there, frame in zip(self._place, self._frame, strict=True):
+        for there, frame in zip(self._tree_slot, self._frame, strict=True):
             if there == IN_PRIOR:
                 continue
             if frame == NO_POSE:
@@ -183,14 +189,14 @@ class MovingTree:
 
     def estimate(self) -> gtsam.Values:
         """Of every variable that was ever in the tree and was not removed from it, and of the tail."""
-        values = gtsam.Values(self._left)
+        values = gtsam.Values(self._marginalized)
         values.insert(self.tree.calculateEstimate())
         return values
 
-    def released(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         """The factors in their slots, and the solution without the tail. The tree is gone, as large as it is."""
         values = self.estimate()
-        values.erase(TAIL)
+        values.erase(AUXILIARY_POSE)
         del self._isam
         return self._graph, values
 
@@ -202,7 +208,7 @@ def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:
     return result
 
 
-def earliest_tracked(o: Observations, k: int) -> int:
+def marginalization_horizon(o: Observations, k: int) -> int:
     """The first frame of all tracks that the frames up to k have seen, the last time at k - UNSEEN_FRAMES or later.
 
     The frame after k, where there is none.

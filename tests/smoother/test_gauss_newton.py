@@ -1,4 +1,4 @@
-"""What the increments led to is the whole graph's minimum already, nearly; the final relinearisation takes the rest."""
+"""What the increments led to is the whole graph's minimum already, nearly; the final relinearization takes the rest."""
 
 from dataclasses import replace
 
@@ -10,8 +10,8 @@ from fgbaseline.compare.cost import cost
 from fgbaseline.data import HuberKernel
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.graph.gauss_newton import compact
-from fgbaseline.smoother.graph.keys import TAIL
+from fgbaseline.smoother.graph.gauss_newton import compact_graph
+from fgbaseline.smoother.graph.keys import AUXILIARY_POSE
 from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
 
 from ..builders.synthetic import drive, matched
@@ -23,7 +23,7 @@ def test_isam2_is_at_the_minimum_of_batch_before_and_after(
     path: PathName, kernel: HuberKernel | None, tolerance: float
 ) -> None:
     problem = replace(matched(drive(path, seconds=8.0, features_per_frame=20.0, wrong=0.05)), kernel=kernel)
-    before = smoother.isam2(problem, settings=ISAM2Settings(relinearise_at_end=False))
+    before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": after})
     np.testing.assert_array_equal(before.used, after.used)
@@ -37,7 +37,7 @@ def test_isam2_is_at_the_minimum_of_batch_before_and_after(
 
 def test_without_it_the_answer_is_another_and_what_was_known_online_the_same() -> None:
     problem = matched(drive(seconds=5.0, features_per_frame=15.0))
-    before = smoother.isam2(problem, settings=ISAM2Settings(relinearise_at_end=False))
+    before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     assert np.abs(before.world_T_imu - after.world_T_imu).max() > 1e-9
     online = [estimate.by_products["isam2-online"].world_T_imu for estimate in (before, after)]
@@ -52,15 +52,15 @@ def test_settling_ends_where_every_variable_is_within_its_threshold() -> None:
     increments.settle()
     costs.append(error(increments))
     assert costs[1] < costs[0]
-    assert increments.solver.relinearised() == 0
+    assert increments.solver.relinearize() == 0
     batch = smoother.batch(problem)
     assert costs[1] < (1.0 + 5e-5) * cost(problem, batch, batch.used)
 
 
 def error(increments: IncrementalSmoother) -> float:
     tree = increments.solver.tree
-    graph = compact(tree.getFactorsUnsafe())
+    graph = compact_graph(tree.getFactorsUnsafe())
     for i in range(graph.size()):
-        if TAIL in list(graph.at(i).keys()):  # linearised far off, and no part of the problem
+        if AUXILIARY_POSE in list(graph.at(i).keys()):  # linearized far off, and no part of the problem
             graph.remove(i)
-    return float(compact(graph).error(tree.calculateEstimate()))
+    return float(compact_graph(graph).error(tree.calculateEstimate()))
