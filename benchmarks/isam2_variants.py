@@ -17,8 +17,8 @@ import numpy as np
 from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.geometry import FloatArray
-from fgbaseline.smoother import elimination
 from fgbaseline.smoother.initialization.initial_values import restricted_problem
+from fgbaseline.smoother.isam2 import elimination_ordering
 from fgbaseline.smoother.isam2.elimination_ordering import EliminationOrdering
 from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
@@ -60,11 +60,11 @@ def keyframes(problem: Problem) -> Estimate:
 
 @contextmanager
 def crowds_above(landmarks: int) -> Iterator[None]:
-    before, elimination.CROWD = elimination.CROWD, landmarks
+    before, elimination_ordering.MANY_LANDMARKS = elimination_ordering.MANY_LANDMARKS, landmarks
     try:
         yield
     finally:
-        elimination.CROWD = before
+        elimination_ordering.MANY_LANDMARKS = before
 
 
 def by_colamd(problem: Problem) -> Estimate:
@@ -72,7 +72,7 @@ def by_colamd(problem: Problem) -> Estimate:
     before = EliminationOrdering.groups
 
     def latest_last(self: EliminationOrdering, frame: int, landmarks: Collection[int], **_: int) -> dict[int, int]:
-        return before(self, frame, landmarks, fresh=True)
+        return before(self, frame, landmarks, all_new=True)
 
     EliminationOrdering.groups = latest_last  # type: ignore[method-assign]
     try:

@@ -1,4 +1,4 @@
-"""The documented visual-inertial SLAM (part c of the report): equations 9, 11, 12 and 13 in turn."""
+"""Decoupled EKF: the documented visual-inertial SLAM (part c of the report), equations 9, 11, 12 and 13."""
 
 import time
 
@@ -22,17 +22,17 @@ from .pose_update import (
 )
 
 SUSPECT_CONDITION = 1.0 / np.sqrt(np.finfo(np.float64).eps)
-"""of the innovation covariance: beyond it the rounding of (I - K H) Sigma, eps times the condition, may outweigh the
-smallest eigenvalue, which is one over the condition"""
+"""Condition number of the innovation covariance beyond which the rounding of (I - K H) Sigma may exceed its smallest
+eigenvalue: eps times the condition against one over the condition."""
 
 
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The documented filter: pose and landmarks with separate covariances.
+    """Documented filter: pose and landmarks with separate covariances.
 
     At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9), update the pose with
     the landmarks as they stand (13), update the landmarks with the updated pose (11, 12; skipped where the problem's
     reading holds them at the mapping's). Frames where the covariance as printed is no longer positive definite (a
-    numerically singular innovation covariance) are told as events, and the status is then `recovered`.
+    numerically singular innovation covariance) become events, and the status is then `recovered`.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("ekf", "no observations", problem.n_frames, len(problem.excluded))
@@ -116,7 +116,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
 
 
 def _printed_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
-    """What (I - K H) Sigma as printed loses; empty where it stays positive definite."""
+    """Failure of (I - K H) Sigma in the printed form; empty where it stays positive definite."""
     try:
         printed = printed_covariance(covariance, innovation, weight)
         smallest = float(np.linalg.eigvalsh(0.5 * (printed + printed.T))[0])

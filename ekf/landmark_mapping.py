@@ -1,4 +1,4 @@
-"""Landmark mapping (part b of the report): landmarks by equations 11 and 12 along the dead-reckoned path."""
+"""Landmark mapping along the dead-reckoned path (part b of the report, equations 11 and 12)."""
 
 import time
 
@@ -14,7 +14,7 @@ from .landmark_update import IndependentLandmarks
 
 
 def landmark_mapping(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The landmarks after one pass over all frames, the dead-reckoned path being taken as true."""
+    """Landmarks after one pass over all frames, along the dead-reckoned path taken as known."""
     start = time.perf_counter()
     world_T_imu = dead_reckoned_path(problem.increment, problem.initial_pose)
     blocks, seconds = map_landmarks(problem, world_T_imu, progress)
@@ -33,7 +33,7 @@ def landmark_mapping(problem: Problem, progress: Progress | None = None) -> Esti
 def map_landmarks(
     problem: Problem, world_T_imu: FloatArray, progress: Progress | None = None
 ) -> tuple[IndependentLandmarks, FloatArray]:
-    """The landmarks mapped along given poses (T, 4, 4), and the seconds (T,) each frame took."""
+    """Landmarks mapped along given poses (T, 4, 4), and the seconds (T,) of each frame."""
     o = problem.observations()
     rows = problem.feature_row(o.landmark)
     blocks = IndependentLandmarks(problem, problem.mapping_measurement)

@@ -1,4 +1,4 @@
-"""The landmark half of the filter (equations 11 and 12), on independent 3x3 blocks.
+"""Landmark update (equations 11 and 12) on independent 3x3 blocks, for known poses.
 
 With the poses given, landmarks are conditionally independent: the report's 3M x 3M covariance is exactly block
 diagonal, and its update equals, block by block,
@@ -18,7 +18,7 @@ from fgbaseline.geometry.measurement import predict, squared_norm
 
 
 class IndependentLandmarks:
-    """The means (m, 3) and covariances (m, 3, 3) of m independent landmarks, in the world frame."""
+    """Means (m, 3), m, and covariances (m, 3, 3), m^2, of m independent landmarks in the world frame."""
 
     def __init__(self, problem: Problem, measurement: StereoMeasurement) -> None:
         m = len(problem.features)
@@ -38,7 +38,7 @@ class IndependentLandmarks:
     def update(
         self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray | None = None
     ) -> None:
-        """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
+        """Update landmarks `row` (n,) with pixels (n, 4) observed from a pose (4, 4) (equations 11 and 12).
 
         `weight` (n,) multiplies V^-1 of each observation; without it the kernel decides, of innovations whitened by
         H Sigma H^T + V. Landmarks that are not yet known start at their back-projection, with the information that
@@ -75,7 +75,7 @@ class IndependentLandmarks:
         return squared_norm(residual, S)
 
     def covariance(self) -> FloatArray:
-        """(m, 3, 3) m^2; NaN for landmarks that were never seen."""
+        """Covariances (m, 3, 3), m^2; NaN for landmarks without an observation."""
         covariance = np.full_like(self.root_information, np.nan)
         half = np.linalg.inv(self.root_information[self.known])
         covariance[self.known] = half @ np.swapaxes(half, 1, 2)

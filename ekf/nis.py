@@ -1,8 +1,8 @@
-"""The normalized innovation squared of a frame: how large what it saw was beside what the filter expected.
+"""Normalized innovation squared (NIS) of a frame, for the consistency of a filter.
 
-nu^T S^-1 nu over the three rows (uL, uR, (vL + vR) / 2) of all observations at once, with their correlations: for a
-filter that knows its errors it is chi-square with 3n degrees of freedom (Bar-Shalom, Li and Kirubarajan 2001, section
-5.4). Neither kernel nor gate takes part: an innovation that the filter throws away is evidence all the same.
+nu^T S^-1 nu is taken over the three rows (uL, uR, (vL + vR) / 2) of all observations at once, with their correlations.
+For a consistent filter it is chi-square with 3n degrees of freedom (Bar-Shalom, Li and Kirubarajan 2001, section 5.4).
+It is computed before kernel and gate: rejected innovations are evidence as well.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 
 
 def decoupled_nis(innovation: PoseInnovation, covariance: FloatArray) -> float:
-    """The same of landmarks that count as known, as in the documented filter: S = H Sigma H^T + R, Sigma the pose's.
+    """NIS of the decoupled filter, which takes landmarks as known: S = H Sigma H^T + R with the pose covariance Sigma.
 
     NaN where it is not finite.
     """
@@ -26,9 +26,9 @@ def decoupled_nis(innovation: PoseInnovation, covariance: FloatArray) -> float:
 
 
 def three_row_nis(posterior: PosePosterior, innovation: PoseInnovation) -> float:
-    """That of a pose update in which every observation had its full weight.
+    """NIS over the three rows, from a pose update in which every observation had weight 1.
 
-    Of the printed four rows' squared norm, (vL - vR)^2 / (2 V) is the same whatever the state.
+    The squared norm of the printed four rows is larger by (vL - vR)^2 / (2 V), which no state changes.
     """
     if innovation.residual.shape[1] == len(ROWS):
         return posterior.nis

@@ -1,10 +1,10 @@
-"""Failures of a graph's solution, and what GTSAM's messages say of them."""
+"""Failures of the solution of a graph, and the variable named in messages of GTSAM."""
 
 import re
 
 
 class IndeterminateSystemError(Exception):
-    """An update failed; the tree is as it was before it. `key` is the variable that GTSAM named, if any."""
+    """A failed update, which left the solver unchanged. `key` is the variable named by GTSAM, if any."""
 
     def __init__(self, key: int | None, text: str) -> None:
         super().__init__(text)
@@ -12,10 +12,10 @@ class IndeterminateSystemError(Exception):
 
 
 class UnrecoverableError(Exception):
-    """The run cannot go on: even a frame's motion alone leaves the system indeterminate."""
+    """The run cannot continue: even a frame's motion alone leaves the system indeterminate."""
 
 
 def named_variable(text: str) -> int | None:
-    """The key of the variable that a message of GTSAM names."""
+    """Key of the variable named in a message of GTSAM."""
     match = re.search(r"variable\s+(\d+)", text)
     return int(match.group(1)) if match else None

@@ -1,4 +1,4 @@
-"""What a frame brings to the graph, and how it is added so that a failure costs as little as possible."""
+"""Update of the factor graph by one frame, with recovery from an indeterminate system."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -13,56 +13,56 @@ from .errors import IndeterminateSystemError, UnrecoverableError
 from .initialization.landmark_initialization import NewLandmark
 
 MAX_ATTEMPTS = 20
-"""at solving a frame with fewer landmarks, before its observations are given up instead"""
+"""Attempts to solve a frame with fewer landmarks before all its observations are dropped."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FrameUpdate:
-    """A new pose with all that ties it to the graph."""
+    """New pose with its factors: motion, new landmarks and observations."""
 
     frame: int
     initial_pose: FloatArray
-    """(4, 4) where the pose starts"""
+    """(4, 4) world_T_imu, initial value"""
     motion_factor: gtsam.NonlinearFactor
-    """from the frame before, or the prior of the first pose"""
+    """between factor from the previous frame, or the prior of the first pose"""
     new_landmarks: tuple[NewLandmark, ...]
     tracked: Mapping[int, int]
-    """landmark in the graph -> its observation in this frame"""
+    """landmark of the graph -> its observation in this frame"""
 
     def without(self, landmarks: Collection[int]) -> "FrameUpdate":
-        """The same, but some landmarks neither enter nor are seen."""
+        """Update without the new landmarks and observations of some landmarks."""
         new = tuple(entry for entry in self.new_landmarks if entry.landmark not in landmarks)
         return replace(self, new_landmarks=new, tracked={j: i for j, i in self.tracked.items() if j not in landmarks})
 
     def without_observations(self) -> "FrameUpdate":
-        """The same without any observation."""
+        """Update by the motion alone."""
         return replace(self, new_landmarks=(), tracked={})
 
 
 class IncrementalGraph(Protocol):
-    """What an update is added to."""
+    """Incremental solver that frame updates are added to."""
 
     def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
-        """Adds a frame and takes out what is there of some landmarks; all or nothing.
+        """Add a frame and remove the factors of the `dropped` landmarks, atomically.
 
-        Raises IndeterminateSystemError, nothing being changed, where the result has no solution.
+        Raises IndeterminateSystemError, with the graph unchanged, where the result is indeterminate.
         """
 
     def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
-        """Further landmarks that may have caused a failure, each with the reason."""
+        """Further landmarks that may have caused a failure -> reason."""
 
 
 class Recovery(NamedTuple):
-    """What a frame has cost."""
+    """Landmarks dropped by a frame update, with the events."""
 
     landmarks: frozenset[int]
     events: tuple[Event, ...]
 
 
 def add_with_recovery(graph: IncrementalGraph, update: FrameUpdate) -> Recovery:
-    """Adds a frame; where the system is indeterminate, without the suspects, or else without its observations.
+    """Add a frame; where the system is indeterminate, without suspect landmarks, then without observations.
 
-    Raises GivenUpError.
+    Raises UnrecoverableError.
     """
     dropped: dict[int, str] = {}
     for _ in range(MAX_ATTEMPTS):

@@ -1,4 +1,4 @@
-"""Frame after frame: which observations go to the graph, which wait, and where the new pose starts."""
+"""Graph builder: turns the observations of each frame into a frame update for an incremental solver."""
 
 from collections.abc import Collection
 
@@ -17,25 +17,25 @@ from .initialization.pose_initialization import refine_predicted_pose
 from .initialization.windowed_initialization import optimize_window
 
 WINDOW_FRAMES = 2
-"""before the one that sees nothing known: three sights are what a landmark needs to enter"""
+"""Frames before one without a known landmark that are optimized with it: initialization takes three observations."""
 
 
 class GraphBuilder:
-    """Turns a problem into builder, given what is known online."""
+    """Builds frame updates of a problem from the online estimates of poses and landmarks."""
 
     def __init__(self, problem: Problem, criterion: InitializationCriterion) -> None:
         self.problem = problem
         self.observations = problem.observations()
         self.frame: list[int] = self.observations.frame.tolist()
-        """of each observation"""
+        """frame of each observation"""
         self._rows = list(measured_rows(self.observations.pixel))
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
         self._information = np.linalg.inv(problem.increment_covariance)
         self.online_poses = np.full((problem.n_frames, 4, 4), np.nan)
-        """world_T_imu as known online; whoever solves fills it, and `position`"""
+        """(T, 4, 4) world_T_imu as estimated online; filled by the solver, as is `landmark_position`"""
         self.landmark_position: dict[int, FloatArray] = {}
-        """of each landmark that ever was in the graph, at the frame that saw it last"""
+        """landmark -> position (3,), m, as estimated at its latest observation"""
 
     def frame_update(
         self, k: int, observed: range, known: Collection[int], dropped: Collection[int], first_frame: int = 0
@@ -66,11 +66,10 @@ class GraphBuilder:
         return refine_predicted_pose(self.problem, self._information[k - 1], pose, points, pixel)
 
     def _windowed_path(self, k: int, first_frame: int) -> FloatArray:
-        """The path (T, 4, 4) where frame k sees no landmark that is known and some may enter: its last frames fitted to
-        the images alone.
+        """Path (T, 4, 4), its last frames optimized on the images, where frame k observes no known landmark.
 
-        At the start, or after a gap, nothing corrects where the velocities lead. Landmarks triangulated along it would
-        start so far off, all at once, that the first step throws some behind the cameras and bends the path.
+        At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would be
+        so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.
         """
         first = max(k - WINDOW_FRAMES, first_frame)
         if self.problem.landmark_prior is not None or k - first < WINDOW_FRAMES:
@@ -80,9 +79,9 @@ class GraphBuilder:
         return path
 
     def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
-        """The factor of one observation of the landmark `key`."""
+        """Stereo factor of one observation of the landmark `key`."""
         return self.factors.stereo(self.frame[observation], key, self._rows[observation])
 
     def observed_landmarks(self, observed: range) -> IntArray:
-        """The landmarks of a frame's observations."""
+        """Landmarks of a frame's observations."""
         return self.observations.landmark[observed.start : observed.stop]

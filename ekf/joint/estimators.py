@@ -1,4 +1,4 @@
-"""The joint filter as an estimator: EKF-SLAM with one state, and every covariance in it."""
+"""EKF-SLAM estimators with one joint state: `joint_ekf` and its named variants."""
 
 import time
 from dataclasses import replace
@@ -18,13 +18,12 @@ BIAS_BLOCK = slice(POSE, POSE + BIAS)
 
 
 def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
-    """One state: the pose, the gyroscope's bias where the settings ask for it, and every landmark, with all
-    cross-covariances.
+    """EKF-SLAM with one joint state: pose, optional gyroscope bias and landmarks, with all cross-covariances.
 
     A landmark is initialized at its first observation (or at the problem's prior) and marginalized once
-    `JointSettings.unseen_frames` frames in a row have not seen it. For tracks without longer gaps the poses are exactly
-    those of the filter that keeps every landmark. A landmark that comes back later is a new one. Marginalized landmarks
-    keep the value and covariance of that moment.
+    `JointSettings.unseen_frames` consecutive frames have not observed it. For tracks without longer gaps the poses
+    equal those of the filter that keeps every landmark. A landmark observed again later is initialized as a new one.
+    Marginalized landmarks keep their estimate and covariance.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
@@ -33,24 +32,24 @@ def joint_ekf(problem: Problem, progress: Progress | None = None, settings: Join
 
 
 def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The joint filter with the gyroscope's bias in its state, `Estimate.gyro_bias`."""
+    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`."""
     settings = JointSettings(gyro_bias=GyroBiasPrior())
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-bias")
 
 
 def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """EKF-SLAM as textbooks print it: points in the world, Jacobians at the newest estimate, no gate."""
+    """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate."""
     return replace(joint_ekf(problem, progress, JointSettings.textbook()), name="joint-ekf-textbook")
 
 
 def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The joint filter with first-estimate Jacobians in place of the invariant correction."""
+    """Joint filter with first-estimate Jacobians in place of the invariant correction."""
     settings = JointSettings(linearization=Linearization.FIRST_ESTIMATE)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
 
 
 def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The joint filter without a gate: a wrong observation counts with the weight that the kernel leaves it."""
+    """Joint filter without a gate: outliers are only down-weighted by the kernel."""
     return replace(joint_ekf(problem, progress, JointSettings(gate=None)), name="joint-ekf-ungated")
 
 
@@ -98,7 +97,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
 
 
 def _bias_events(bias: GyroBias) -> list[Event]:
-    """What was found of the bias, at the last frame that has an answer."""
+    """Event with the bias estimate (rad/s, 1-sigma) of the last frame that has one."""
     answered = np.flatnonzero(np.isfinite(bias.mean).all(axis=1))
     if len(answered) == 0:
         return []
@@ -116,9 +115,9 @@ def _status(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, st
         EventKind.COVARIANCE_LOST: "the joint covariance was no longer positive definite",
         EventKind.STATE_FULL: f"the state was full: {joint.n_deferred} observations were not used",
     }
-    told = []
+    remarks = []
     for kind, what in trouble.items():
         frames = sorted({event.frame for event in joint.events if event.kind == kind})
         if frames:
-            told.append(f"at {len(frames)} of {n_frames} frames, first at frame {frames[0]}, {what}")
-    return (Status.RECOVERED, "; ".join(told)) if told else (Status.OK, "")
+            remarks.append(f"at {len(frames)} of {n_frames} frames, first at frame {frames[0]}, {what}")
+    return (Status.RECOVERED, "; ".join(remarks)) if remarks else (Status.OK, "")

@@ -1,10 +1,8 @@
-"""Which landmarks enter the joint filter's state where there are more than it has places for.
+"""Feature selection for a full joint state: bucketing over the image, largest disparity of each cell first.
 
-The cost of a frame grows with the third power of the landmarks in the state, its memory with the second, so there is an
-end to them. A filter does not know how long a landmark will be seen. What it knows is where each one is in the image
-and how near: sights spread over the image tell turning from moving sideways, and of those in one place the nearest
-tells most of the motion. So places go round the image, cell by cell, the largest disparity of each cell first
-(Geiger, Ziegler and Stiller 2011 bucket the features of their odometry in this way).
+The cost of a frame grows with the cube of the number of landmarks in the state, its memory with the square. Features
+spread over the image separate rotation from sideways translation, and the nearest of a cell constrain translation
+best. Places are therefore assigned cell by cell in turns (Geiger, Ziegler and Stiller, 2011).
 """
 
 import numpy as np
@@ -13,13 +11,13 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 
 CELL = 64.0
-"""px, edge of the square cells of the image"""
+"""Edge of the square image cells, px."""
 
 
 def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> BoolArray:
-    """(n,) which of n landmarks enter, `places` at most, by the rows uL, uR, v (n, 3) at which the frame sees them.
+    """Mask (n,) of at most `places` selected landmarks, from their measured rows uL, uR, v (n, 3), px.
 
-    `inside` (m, 3) are the rows of those that the frame sees and the state has already: their cells have had a turn.
+    `inside` (m, 3) holds the rows of observed landmarks already in the state: each counts as a turn of its cell.
     """
     n = len(candidates)
     selected: BoolArray = np.ones(n, dtype=np.bool_)
@@ -37,6 +35,6 @@ def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> 
 
 
 def _cells(rows: FloatArray) -> IntArray:
-    """(n,) a number for the cell of the left image in which each of the rows (n, 3) lies, counted from 0."""
+    """Index (n,) of the left-image cell of each of the rows (n, 3), counted from 0."""
     corner = np.floor(rows[:, [0, 2]] / CELL)
     return np.unique(corner, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)

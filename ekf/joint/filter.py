@@ -1,4 +1,4 @@
-"""The joint filter, frame by frame: predict, update pose and landmarks at once, initialize and marginalize them."""
+"""EKF-SLAM frame by frame: prediction, joint update of pose and landmarks, initialization and marginalization."""
 
 from typing import NamedTuple
 
@@ -19,24 +19,24 @@ from .state import ABSENT, POSE, JointState
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 
 MIN_COSINE = 0.05
-"""of the angle between the optical axis and the ray to a landmark: beyond it (87 degrees) it counts as behind the
-camera; at its plane the Jacobian is without bound"""
+"""Smallest cosine between optical axis and ray (87 degrees): below it a landmark counts as behind the camera. At the
+camera plane the Jacobian is unbounded."""
 
 
 class _LinearizedObservations(NamedTuple):
-    """n observations of active landmarks, linearized."""
+    """Linearized observations of n active landmarks."""
 
     observed: IntArray
-    """(n,) into the problem's observations"""
+    """(n,) indices into the problem's observations"""
     H: StackedJacobian
     residual: FloatArray
-    """(n, 3)"""
+    """(n, 3) innovations in uL, uR, v, px"""
     cosine: FloatArray
-    """(n,)"""
+    """(n,) cosines of the angle between optical axis and ray"""
 
 
 class JointFilter:
-    """One run of the filter over one problem: its state, what left it, and what was rejected."""
+    """One run of EKF-SLAM over a problem: joint state, map of marginalized landmarks, NIS and events."""
 
     def __init__(self, problem: Problem, settings: JointSettings) -> None:
         m, o = len(problem.features), problem.observations()
@@ -58,12 +58,12 @@ class JointFilter:
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.map = LandmarkMap(m)
         self.n_deferred = 0
-        """how many observations were not used because the state was full"""
+        """number of observations not used because the state was full"""
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
     def process_frame(self, k: int, seen: slice) -> None:
-        """Frame k with its observations (a slice of the problem's)."""
+        """Process frame k with the observations `seen`, a slice of the problem's."""
         index = np.arange(seen.start, seen.stop)
         row = self.feature[index]
         self.map.last_seen[row] = k
@@ -85,12 +85,12 @@ class JointFilter:
             self._initialize_from_observation(index[selected])
 
     def finish(self) -> None:
-        """After the last frame: what the state still has goes to the map."""
+        """Marginalize all remaining landmarks into the map after the last frame."""
         self._marginalize(self.state.feature.copy())
         self.events += self.map.undetermined_events(self.problem.features)
 
     def _select(self, k: int, index: IntArray, wanted: BoolArray) -> BoolArray:
-        """Those of the observations `index` (n,) with `wanted` (n,) whose landmarks the state has places for."""
+        """Mask (n,) of the `wanted` observations `index` (n,) whose landmarks fit into the state."""
         if np.count_nonzero(wanted) > self.settings.max_landmarks - self.state.count:
             self._marginalize_unseen(k)
         places = self.settings.max_landmarks - self.state.count
@@ -120,7 +120,7 @@ class JointFilter:
         state.predict(step, F, Q)
 
     def _update(self, k: int, index: IntArray) -> bool:
-        """Observations `index` (n,) of active landmarks; False where the frame as a whole is not believed."""
+        """Update with observations `index` (n,) of active landmarks; False where the whole frame is rejected."""
         if len(index) == 0:
             return True
         seen = self._reject_behind_camera(k, self._linearize(index))
@@ -149,7 +149,7 @@ class JointFilter:
         return True
 
     def _record_nis(self, k: int, innovation: Innovation) -> CholeskyFactor | None:
-        """Notes how large the innovation is beside what was expected; S as it is before kernel and gates."""
+        """Record the NIS of the frame, before kernel and gate, and return the factor of S."""
         self.innovations.degrees[k] = innovation.residual.size
         try:
             factor = innovation.factorize(self.row_variance)
@@ -179,7 +179,7 @@ class JointFilter:
         )
 
     def _apply_correction(self, delta: FloatArray) -> None:
-        """Moves the state by delta (size,), and P along with it where the settings say so.
+        """Apply the correction delta (size,) to the state, and transform P where the linearization is invariant.
 
         N = [Ad(T^-1); nu], nu being `moved_by` of the landmarks. With - before and + after the move, B takes N- to N+:
         [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]]. A bias is not changed by a rigid motion: its rows of N are 0.
@@ -204,9 +204,9 @@ class JointFilter:
         self.map.initialized[row] = True
 
     def _initialize_from_observation(self, index: IntArray) -> None:
-        """Landmarks start where one observation each puts them, seen from the pose as it is known now.
+        """Initialize landmarks from one observation each, back-projected from the current pose estimate.
 
-        That is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
+        This is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
         pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n.
         """
         n, state = len(index), self.state
@@ -224,7 +224,7 @@ class JointFilter:
         self.used[index] = True
 
     def _marginalize_unseen(self, since: int) -> None:
-        """The landmarks that no frame has seen from frame `since` on."""
+        """Marginalize the landmarks without an observation from frame `since` on."""
         active = self.state.feature
         self._marginalize(active[self.map.last_seen[active] < since])
 

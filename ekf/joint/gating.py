@@ -1,4 +1,4 @@
-"""Which of a frame's observations the joint filter believes, and how much."""
+"""Chi-square gating of innovations: rejected frames, rejected observations and robust weights of the joint filter."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -14,36 +14,36 @@ from fgbaseline.geometry.measurement import ROWS
 from .settings import JointSettings
 
 DISAGREEMENT = 1.0 - 1e-6
-"""chi-square probability (5.5 sigma) beyond which an observation disagrees, when it is asked whether a whole frame
-does: so far out that noise assumed too small by half does not silence the filter, and matches that are wrong do"""
+"""Chi-square probability (5.5 sigma) beyond which an observation votes for rejecting the whole frame. Noise assumed too
+small by half stays below it; wrong matches do not."""
 MIN_VOTES = 5
-"""observations below which a frame has no majority"""
+"""Smallest number of observations for which a frame can be rejected as a whole."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GatedObservations:
-    """The verdict on n observations."""
+    """Result of gating n observations."""
 
     accepted: BoolArray
-    """(n,)"""
+    """(n,) mask of the observations to use"""
     weight: FloatArray
-    """(n,) the kernel's, by which the inverse of each one's noise is multiplied"""
+    """(n,) kernel weights: factors on the inverse of each observation's noise"""
     rejection: EventKind | None = None
-    """why the others are not taken"""
+    """reason for which the others are rejected"""
 
     @property
     def full_weight(self) -> bool:
-        """Whether all are taken with their full weight."""
+        """True where every observation is accepted with weight 1."""
         return bool(self.accepted.all() and (self.weight == 1.0).all())
 
 
 def gate_observations(
     squared_norm: FloatArray, measurement: StereoMeasurement, settings: JointSettings
 ) -> GatedObservations:
-    """The verdict on observations whose innovations have squared norms (n,), whitened by their own covariance.
+    """Gate observations by their NIS (n,), each innovation whitened by its own covariance.
 
-    A burst of bad matches costs its frame's matches: where most of them disagree none is believed, since the few that
-    agree do so by chance.
+    Where more than `disagreeing_share` of a frame's observations are outliers, all are rejected: the few inliers agree
+    by chance.
     """
     n = len(squared_norm)
     weight = measurement.weight(squared_norm)
@@ -59,5 +59,5 @@ def gate_observations(
 
 @cache
 def chi2_quantile(probability: float) -> float:
-    """The chi-square quantile with the degrees of freedom of one observation."""
+    """Chi-square quantile with the 3 degrees of freedom of one observation."""
     return float(chdtri(len(ROWS), 1.0 - probability))

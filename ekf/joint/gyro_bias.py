@@ -1,4 +1,4 @@
-"""A gyroscope bias in the joint filter's state: a random walk that is taken off the angular velocities.
+"""Gyroscope bias in the joint state: a random walk subtracted from the angular velocities.
 
 The motion over dt from a frame to the next is exp(xi), xi = increment - dt [0; b]. With an error d of the bias it is
 exp(xi) exp(-dt J_r(xi) [0; d]) to first order, J_r being the right Jacobian of SE(3).
@@ -15,12 +15,12 @@ from .state import BIAS, POSE
 
 @dataclass(frozen=True, slots=True)
 class GyroBiasPrior:
-    """What is known of the bias beforehand. Raises FgbaselineError, naming setting and value, for what cannot be."""
+    """Prior and random walk of the bias. Raises FgbaselineError, naming setting and value, for an invalid one."""
 
     deviation: float = 0.02
-    """rad/s, of each component about zero at frame 0"""
+    """rad/s, standard deviation of each component about zero at frame 0"""
     walk: float = 1e-4
-    """rad/s per square root of a second, by which each component wanders"""
+    """rad/s/sqrt(s), random walk of each component"""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.deviation < np.inf:
@@ -29,13 +29,13 @@ class GyroBiasPrior:
             raise FgbaselineError(f"gyro_bias.walk: expected a number from 0 on, got {self.walk!r}")
 
     def covariance(self) -> FloatArray:
-        """(3, 3) at frame 0, (rad/s)^2."""
+        """Covariance (3, 3) at frame 0, (rad/s)^2."""
         return self.deviation**2 * np.eye(BIAS)
 
     def augment(
         self, twist: FloatArray, dt: float, transition: FloatArray, noise: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """F (9, 9) and Q (9, 9) of the errors [delta, d] over a motion exp(twist) that takes dt seconds.
+        """Transition F (9, 9) and noise Q (9, 9) of the errors [delta, d] over a motion exp(twist) of dt seconds.
 
         `transition` (6, 6) and `noise` (6, 6) are those of the pose alone.
         """

@@ -1,7 +1,7 @@
-"""The landmarks of the joint filter over the whole drive: when each was seen last, and what is reported of it.
+"""Map of the joint filter: last observation and reported estimate of every landmark of the drive.
 
-A filter does not know which landmark it will see again. One that no frame has seen for a while is marginalized; if it
-comes back it is a new one, because what its first estimate knew is in the pose already and would count twice.
+The filter is causal: a landmark without an observation for some frames is marginalized. If it is observed again it is
+initialized as a new one, because the pose already contains the information of its first estimate.
 """
 
 import numpy as np
@@ -17,23 +17,25 @@ NOT_INITIALIZED = "no frame that was believed saw it"
 
 
 class LandmarkMap:
-    """What is known of m landmarks outside of the state."""
+    """Bookkeeping and marginalized estimates of m landmarks."""
 
     def __init__(self, m: int) -> None:
         self.last_seen: IntArray = np.full(m, -1, dtype=np.int64)
-        """(m,) frame of the last observation so far; -1 before the first"""
+        """(m,) frame of the latest observation; -1 before the first"""
         self.initialized: BoolArray = np.zeros(m, dtype=np.bool_)
-        """(m,) which have been in the state"""
+        """(m,) mask of landmarks that have been in the state"""
         self.deferred: BoolArray = np.zeros(m, dtype=np.bool_)
-        """(m,) of which some observations were not used because the state was full"""
+        """(m,) mask of landmarks with observations that were not used because the state was full"""
         self._position = np.full((m, 3), np.nan)
         self._covariance = np.full((m, 3, 3), np.nan)
         self._variance = np.full(m, np.inf)
         """(m,) m^2, the trace of the covariance"""
 
     def store(self, row: IntArray, points: WorldPoints) -> None:
-        """Landmarks `row` (n,) as they are marginalized. Of one that was in the state several times, the estimate with
-        the smallest position variance is reported; estimates of several stays are correlated and are not fused.
+        """Store landmarks `row` (n,) as they are marginalized.
+
+        Of a landmark initialized several times, the estimate with the smallest position variance is reported. Its
+        estimates are correlated and are not fused.
         """
         variance = np.einsum("nii->n", points.covariance)
         finite = points.in_front & np.isfinite(points.position).all(axis=1) & np.isfinite(variance)
@@ -43,12 +45,12 @@ class LandmarkMap:
         self._variance[at] = variance[better]
 
     def landmarks(self, features: IntArray) -> Landmarks:
-        """Those with a position, by the problem's `features` (m,)."""
+        """Landmarks with a finite position, indexed by the problem's `features` (m,)."""
         known = np.isfinite(self._position).all(axis=1)
         return Landmarks(features[known], self._position[known], self._covariance[known])
 
     def undetermined_events(self, features: IntArray) -> list[Event]:
-        """After the last frame: the landmarks that were seen and have no position, in the order they were last seen."""
+        """Events for the observed landmarks without a position, ordered by the frame of their last observation."""
         row = np.flatnonzero((self.last_seen >= 0) & ~np.isfinite(self._position).all(axis=1))
         row = row[np.argsort(self.last_seen[row], kind="stable")]
         why = np.select([self.initialized[row], self.deferred[row]], [AT_INFINITY, FULL], NOT_INITIALIZED)

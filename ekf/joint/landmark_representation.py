@@ -1,4 +1,4 @@
-"""Coordinates of a landmark in the joint filter: three numbers in a fixed projective chart of the world.
+"""Landmark representation of the joint filter: world point or inverse depth, as three coordinates in a fixed chart.
 
 A landmark's homogeneous world point is X = M [xi; 1] with a constant 4x4 matrix M, its chart:
 
@@ -6,8 +6,8 @@ A landmark's homogeneous world point is X = M [xi; 1] with a constant 4x4 matrix
 - M = C Pi, with C = world_T_cam as estimated when the landmark was first seen and Pi [a, b, r, 1] = [a, b, 1, r]:
   xi = (x/z, y/z, 1/z) as that camera saw it. What stereo measures (uL, uR, v) is linear in these three, so that their
   error is as Gaussian as that of the pixels however far the point is, infinity included (Civera, Davison and Montiel,
-  IEEE T-RO 2008). There the camera of the first sight is part of the state; here C is a number, the choice of a map,
-  so that a landmark stays a point of the world with three coordinates.
+  IEEE T-RO 2008). There the anchor camera is part of the state; here C is constant, so that a landmark remains a
+  world point with three coordinates.
 """
 
 from enum import StrEnum
@@ -23,16 +23,16 @@ _SMALL_MOTIONS = se3.hat(np.eye(6))
 
 
 class LandmarkRepresentation(StrEnum):
-    """What the three numbers of a landmark without a prior are."""
+    """Coordinates in which a landmark without a prior is estimated."""
 
     INVERSE_DEPTH = "inverse-depth"
-    """(x/z, y/z, 1/z) in the camera as estimated at the first sight"""
+    """(x/z, y/z, 1/z) in the camera as estimated at its first observation"""
     WORLD = "world"
     """x, y, z in m in the world"""
 
 
 def chart(coordinates: LandmarkRepresentation, world_T_cam: FloatArray) -> FloatArray:
-    """M (4, 4) for landmarks that are first seen from a camera at `world_T_cam` (4, 4)."""
+    """Chart M (4, 4) for landmarks first observed from a camera at `world_T_cam` (4, 4)."""
     return np.eye(4) if coordinates is LandmarkRepresentation.WORLD else world_T_cam @ _INVERSE_DEPTH
 
 
@@ -42,19 +42,19 @@ def homogeneous(charts: FloatArray, xi: FloatArray) -> FloatArray:
 
 
 def coordinates_of(charts: FloatArray, points: FloatArray) -> FloatArray:
-    """The coordinates xi (n, 3) in charts M (n, 4, 4), or in one (4, 4), of homogeneous world points (n, 4)."""
+    """Coordinates xi (n, 3) in charts M, (n, 4, 4) or (4, 4), of homogeneous world points (n, 4)."""
     inverse = np.linalg.inv(charts)
     xi = points @ inverse.T if inverse.ndim == 2 else (inverse @ points[:, :, None])[:, :, 0]
     return np.asarray(xi[:, :3] / xi[:, 3:], dtype=np.float64)
 
 
 def generators(charts: FloatArray) -> FloatArray:
-    """Z (..., 6, 4, 4) = M^-1 hat(e_i) M: the six small motions of the world as charts M (..., 4, 4) have them."""
+    """Generators Z (..., 6, 4, 4) = M^-1 hat(e_i) M of the rigid motions of the world, in charts M (..., 4, 4)."""
     return np.asarray(np.linalg.inv(charts)[..., None, :, :] @ _SMALL_MOTIONS @ charts[..., None, :, :])
 
 
 def motion_jacobian(generators: FloatArray, xi: FloatArray) -> FloatArray:
-    """(n, 3, 6) how coordinates (n, 3) change when the whole world moves by exp(g), g = [v, w] small.
+    """Jacobian (n, 3, 6) of coordinates (n, 3) by a small rigid motion exp(g) of the world, g = [v, w].
 
     d xi = Y_123 - xi Y_4 with Y = sum of g_i Z_i [xi; 1], Z (n, 6, 4, 4) the `generators` of the charts.
     """
@@ -65,18 +65,18 @@ def motion_jacobian(generators: FloatArray, xi: FloatArray) -> FloatArray:
 
 
 class WorldPoints(NamedTuple):
-    """Landmarks in metres."""
+    """World positions of landmarks with their covariances."""
 
     position: FloatArray
     """(n, 3) m"""
     covariance: FloatArray
     """(n, 3, 3) m^2"""
     in_front: BoolArray
-    """(n,) whether the point is on this side of infinity"""
+    """(n,) mask of points at a finite positive depth"""
 
 
 def world_points(charts: FloatArray, xi: FloatArray, covariance: FloatArray) -> WorldPoints:
-    """Positions, and to first order their covariances, of coordinates (n, 3) with covariances (n, 3, 3).
+    """World positions and first-order covariances of coordinates (n, 3) with covariances (n, 3, 3).
 
     Not finite at infinity, of which numpy warns.
     """

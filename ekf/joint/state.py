@@ -1,9 +1,9 @@
-"""The state of the joint filter: the pose and every active landmark, with all their covariances.
+"""Joint state of EKF-SLAM: pose, optional gyroscope bias and active landmarks, with their full covariance.
 
 The error state is [delta (6), d (3), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the error
-of the gyroscope's bias (only where it is estimated), then the coordinates of each active landmark in its chart. Its
-covariance lives in one square array that grows by doubling; a landmark that leaves is overwritten by the last one, so
-that the active part is always the upper left square.
+of the gyroscope bias (only if estimated), then the coordinates of each active landmark in its chart. The covariance
+lives in one square array that grows by doubling. A marginalized landmark is overwritten by the last one, so the active
+part is always the upper left square.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ ABSENT = -1
 
 
 class JointState:
-    """Pose, gyroscope bias, active landmarks, and one covariance over all of them."""
+    """Pose, gyroscope bias and active landmarks, with one joint covariance."""
 
     def __init__(
         self,
@@ -35,9 +35,9 @@ class JointState:
         self.bias = np.zeros(BIAS)
         """(3,) rad/s; zero where it is not estimated"""
         self.n_body = POSE if bias_covariance is None else POSE + BIAS
-        """where the landmarks begin in the error state"""
+        """dimension of pose and bias: offset of the landmarks in the error state"""
         self.predicted_pose = pose
-        """(4, 4) the pose before the frame's update"""
+        """(4, 4) pose before the update of the current frame"""
         self.count = 0
         self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
         """(m,) slot of each of the problem's features; ABSENT where it is not active"""
@@ -60,43 +60,41 @@ class JointState:
         )
 
     def _slot_arrays(self) -> tuple[NDArray[Any], ...]:
-        """What is kept of each landmark beside its rows of P."""
+        """Arrays with one entry per landmark slot."""
         return self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian
 
     @property
     def size(self) -> int:
-        """The dimension of the error state."""
+        """Dimension of the error state."""
         return self.n_body + 3 * self.count
 
     @property
     def P(self) -> FloatArray:  # noqa: N802
-        """(size, size) the covariance, a view."""
+        """Covariance (size, size), a view."""
         return self._P[: self.size, : self.size]
 
     @property
     def feature(self) -> IntArray:
-        """(count,) the feature in each slot, a view."""
+        """Feature (count,) of each slot, a view."""
         return self._feature[: self.count]
 
     @property
     def xi(self) -> FloatArray:
-        """(count, 3) the landmarks' coordinates in their charts, a view."""
+        """Landmark coordinates (count, 3) in their charts, a view."""
         return self._xi[: self.count]
 
     @property
     def first_estimate(self) -> FloatArray:
-        """(count, 3) the coordinates that each landmark entered with, a view."""
+        """Landmark coordinates (count, 3) at initialization, a view."""
         return self._first_estimate[: self.count]
 
     @property
     def charts(self) -> FloatArray:
-        """(count, 4, 4) the landmarks' charts, a view."""
+        """Landmark charts (count, 4, 4), a view."""
         return self._charts[: self.count]
 
     def correct_landmarks(self, by: FloatArray) -> FloatArray:
-        """Adds `by` (count, 3) to their coordinates, and says what that changes in how they move with the world
-        (`landmark_chart.moved_by`): (count, 3, 6).
-        """
+        """Add `by` (count, 3) to the landmark coordinates; return the change (count, 3, 6) of `motion_jacobian`."""
         self.xi[:] += by
         before = self._motion_jacobian[: self.count]
         now = motion_jacobian(self._slot_generators[: self.count], self.xi)
@@ -105,9 +103,9 @@ class JointState:
         return change
 
     def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
-        """Equation 9: the pose moves by `step` (4, 4); Sigma <- F Sigma F^T + W, cross-covariances <- F times them.
+        """Predict (equation 9): move the pose by `step` (4, 4), Sigma <- F Sigma F^T + W.
 
-        `transition` and `noise` are (body, body): of the pose, and of the bias where it is estimated.
+        `transition` F and `noise` W are (n_body, n_body): of the pose, and of the bias if estimated.
         """
         P, body = self.P, self.n_body
         moved = transition @ P[:body]
@@ -118,9 +116,9 @@ class JointState:
         self.pose = self.predicted_pose = self.pose @ step
 
     def transform_covariance(self, pose_block: FloatArray, pose_jacobian: FloatArray) -> None:
-        """P <- B P B^T with B = [[turn, 0], [pose_jacobian, I]], `turn` (6, 6) and `pose_jacobian` (3 count, 6).
+        """P <- B P B^T, B = [[pose_block, 0], [pose_jacobian, I]] with blocks (6, 6) and (3 count, 6).
 
-        The bias stays as it is: its rows of `pose_jacobian` would be zero.
+        The bias is unchanged: its rows of `pose_jacobian` would be zero.
         """
         P, G = self.P, pose_jacobian
         if self.n_body > POSE:
@@ -136,9 +134,9 @@ class JointState:
     def initialize(
         self, row: IntArray, chart: FloatArray, xi: FloatArray, pose_jacobian: FloatArray, covariance: FloatArray
     ) -> None:
-        """n landmarks become active in one chart (4, 4), with an error of G delta + e each.
+        """Initialize n landmarks in one chart (4, 4), with the error G delta + e each.
 
-        G = `pose_jacobian` (n, 3, 6) is what they inherit from the pose's error delta, `covariance` (n, 3, 3) that of e.
+        G = `pose_jacobian` (n, 3, 6) maps the pose error delta, `covariance` (n, 3, 3) is that of e.
         """
         n, old, new = len(row), self.size, self.size + 3 * len(row)
         while self.count + n > len(self._feature):
@@ -159,7 +157,7 @@ class JointState:
         self.count += n
 
     def marginalize(self, row: IntArray) -> None:
-        """Active landmarks are marginalized out: their rows and columns go, everything else stays as it is."""
+        """Marginalize active landmarks `row` (n,): drop their rows and columns of P."""
         leaving = self.slot_of[row]
         left = self.count - len(leaving)
         goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
@@ -177,11 +175,11 @@ class JointState:
         self.count = left
 
     def world_points(self, row: IntArray) -> WorldPoints:
-        """Active landmarks in metres, with their covariances."""
+        """World positions (m) of active landmarks, with covariances (m^2)."""
         slot = self.slot_of[row]
         index = self._indices(slot).reshape(-1, 3)
         return world_points(self._charts[slot], self._xi[slot], self._P[index[:, :, None], index[:, None, :]])
 
     def _indices(self, slot: IntArray) -> IntArray:
-        """(3n,) rows of P of the landmarks in slots (n,)."""
+        """Rows (3n,) of P of the landmarks in slots (n,)."""
         return (self.n_body + 3 * slot[:, None] + np.arange(3)).reshape(-1)

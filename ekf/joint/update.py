@@ -1,11 +1,11 @@
-"""The joint update: what a frame's observations say of the pose and every active landmark.
+"""Joint measurement update of the pose and every active landmark.
 
 H has, for an observation, the six columns of the pose and the three of its landmark; nothing else is stored. With
 S = H P H^T + R = L L^T and W = L^-1 H P the update is
 
     delta = W^T L^-1 r    and    P <- P - W^T W,
 
-which is K = P H^T S^-1 and (I - K H) P with every product formed once, symmetric to the last bit.
+which equals K = P H^T S^-1 and (I - K H) P with every product formed once, and is symmetric to the last bit.
 """
 
 from dataclasses import dataclass
@@ -24,37 +24,37 @@ from .state import POSE
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StackedJacobian:
-    """H of n observations: (3n, size), with nine columns that are not zero in each block of three rows."""
+    """Measurement Jacobian H (3n, size) of n observations, with nine nonzero columns in each block of three rows."""
 
     slot: IntArray
-    """(n,) of the landmark that each observation sees"""
+    """(n,) slot of the observed landmark"""
     pose_jacobian: FloatArray
     """(n, 3, 6)"""
     landmark_jacobian: FloatArray
     """(n, 3, 3)"""
     n_body: int = POSE
-    """where the landmarks begin; what is between the pose and them, an observation does not depend on"""
+    """offset of the landmarks; columns between pose and landmarks (the bias) are zero"""
 
     def multiply(self, matrix: FloatArray) -> FloatArray:
-        """H A (3n, c) of a matrix A (size, c)."""
+        """Product H A (3n, c) with a matrix A (size, c)."""
         n, c = len(self.slot), matrix.shape[1]
         product = self.landmark_jacobian @ matrix[self.n_body :].reshape(-1, 3, c)[self.slot]
         product += (self.pose_jacobian.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
         return product.reshape(3 * n, c)
 
     def select(self, chosen: BoolArray) -> "StackedJacobian":
-        """Only the chosen observations."""
+        """Rows of the chosen observations (n,)."""
         return StackedJacobian(
             self.slot[chosen], self.pose_jacobian[chosen], self.landmark_jacobian[chosen], self.n_body
         )
 
 
 class NotPositiveDefiniteError(Exception):
-    """H P H^T + R has no Cholesky factor: P is no covariance any more."""
+    """H P H^T + R has no Cholesky factor: P is not positive semidefinite."""
 
 
 class CholeskyFactor(NamedTuple):
-    """S = H P H^T + R = L L^T."""
+    """Cholesky factor of the innovation covariance, S = H P H^T + R = L L^T."""
 
     L: FloatArray
     """(3n, 3n), lower"""
@@ -63,7 +63,7 @@ class CholeskyFactor(NamedTuple):
 
     @staticmethod
     def of(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> "CholeskyFactor":
-        """Of H P H^T (3n, 3n), left as it is, residuals nu (n, 3) and the diagonal of R (n, 3), or (3,) for each, px^2.
+        """Factorize H P H^T (3n, 3n), not modified, plus R of diagonal (n, 3) or (3,), px^2; whiten nu (n, 3), px.
 
         Raises NotPositiveDefiniteError.
         """
@@ -77,13 +77,13 @@ class CholeskyFactor(NamedTuple):
 
     @property
     def nis(self) -> float:
-        """nu^T S^-1 nu: the normalized innovation squared of all observations at once."""
+        """Normalized innovation squared nu^T S^-1 nu of all observations at once."""
         return float(self.whitened @ self.whitened)
 
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """What n observations say beyond the prediction, and how sure the prediction was of them."""
+    """Innovation of n observations with the covariance of its prediction."""
 
     H: StackedJacobian
     residual: FloatArray
@@ -95,7 +95,7 @@ class Innovation:
 
     @staticmethod
     def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
-        """The innovation of residuals (n, 3) under a covariance (size, size)."""
+        """Innovation of residuals (n, 3), px, under the state covariance P (size, size)."""
         HP = H.multiply(P)
         return Innovation(H, residual, HP, H.multiply(np.ascontiguousarray(HP.T)))
 
@@ -103,17 +103,17 @@ class Innovation:
         return len(self.residual)
 
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
-        """(n,) r^T (H P H^T + R)^-1 r of each observation alone, R = diag(variance (3,))."""
+        """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance (3,))."""
         n = np.arange(len(self))
         own = self.HPHt.reshape(len(self), 3, len(self), 3)[n, :, n]  # the blocks on the diagonal
         return squared_norm(self.residual, own + np.diag(variance))
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
-        """S = L L^T with R = diag(variance (n, 3)), or (3,) for each. Raises NotPositiveDefiniteError."""
+        """Factor of S for R = diag(variance), (n, 3) or (3,), px^2. Raises NotPositiveDefiniteError."""
         return CholeskyFactor.of(self.HPHt, self.residual, variance)
 
     def select(self, chosen: BoolArray) -> "Innovation":
-        """Only the chosen observations."""
+        """Innovation of the chosen observations (n,)."""
         if chosen.all():
             return self
         rows = np.repeat(chosen, 3)
@@ -123,9 +123,9 @@ class Innovation:
 
 
 def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:
-    """The correction delta (size,) of the error state; P (size, size) is updated in place.
+    """Kalman update: returns the correction delta (size,) of the error state; P (size, size) is updated in place.
 
-    `factor` is the innovation's with the R that it is to be weighted by. Uses the innovation up.
+    `factor` is that of S with the weighted R. The arrays of `innovation` are overwritten.
     """
     W_transposed = dtrsm(1.0, factor.L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
     delta: FloatArray = W_transposed @ factor.whitened

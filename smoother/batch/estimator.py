@@ -1,4 +1,4 @@
-"""The whole graph at once: Levenberg-Marquardt to convergence, from two starts, the lower cost counts."""
+"""Estimator `batch`: Levenberg-Marquardt on the full graph from two initial values; the lower cost is used."""
 
 import time
 from collections import Counter

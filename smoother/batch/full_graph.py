@@ -1,4 +1,4 @@
-"""The graph of a whole problem at once: every pose, and the landmarks of the observations that take part."""
+"""Full graph of a problem: all poses, and the landmarks of all unmasked observations."""
 
 import gtsam
 import numpy as np
@@ -11,7 +11,7 @@ from ..graph.keys import landmark_key
 
 
 def full_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
-    """First pose, increments, every observation that takes part, and the priors of their landmarks."""
+    """Graph with the first pose, increments, unmasked observations and landmark priors."""
     factors, graph = FactorBuilder(problem), gtsam.NonlinearFactorGraph()
     graph.push_back(factors.pose_prior())
     for k in range(problem.n_frames - 1):

@@ -1,4 +1,4 @@
-"""The minimum of a whole graph by Levenberg-Marquardt, to convergence."""
+"""Levenberg-Marquardt to convergence on the full graph, with final Gauss-Newton steps."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ NEAR, FAR = 1e-9, 1e-5
 
 
 class LocalMinimum(NamedTuple):
-    """Where the descent from one start ended."""
+    """Result of the optimization from one initial value."""
 
     start: str
     values: gtsam.Values
@@ -33,14 +33,14 @@ class LocalMinimum(NamedTuple):
 def optimize_from_estimate(
     graph: gtsam.NonlinearFactorGraph, start: str, world_T_imu: FloatArray, landmarks: Landmarks
 ) -> LocalMinimum:
-    """From another smoother's answer."""
+    """Optimize from the estimate of another smoother."""
     return _levenberg_marquardt(graph, start, values_from_state(world_T_imu, landmarks), NEAR)
 
 
 def optimize_from_path(
     graph: gtsam.NonlinearFactorGraph, problem: Problem, start: str, world_T_imu: FloatArray
 ) -> LocalMinimum:
-    """From a path alone, solved in pieces first; the graph is that of `problem`."""
+    """Optimize from a path alone, after windowed initialization; `graph` is that of `problem`."""
     path = optimize_in_windows(problem, world_T_imu)
     return _levenberg_marquardt(graph, start, values_from_state(path, initial_landmarks(problem, path)), FAR)
 

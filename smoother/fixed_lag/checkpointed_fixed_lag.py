@@ -1,4 +1,4 @@
-"""A fixed-lag smoother that can go back: after an exception GTSAM leaves it destroyed, and it cannot be copied."""
+"""Fixed-lag smoother with checkpoints: an exception of GTSAM leaves it destroyed, and it cannot be copied."""
 
 from collections.abc import Collection, Mapping
 from typing import NamedTuple, SupportsFloat, SupportsIndex, SupportsInt
@@ -16,14 +16,12 @@ from ..isam2.settings import ISAM2Settings
 
 LOOSE_SIGMA = 2e3
 """baselines; keeps a landmark determined that marginals still speak of, but no observation"""
-
-
 QR_UPDATES = 30
 """by QR after a failure, before Cholesky is tried again: it is three times faster"""
 
 
 class Checkpoint(NamedTuple):
-    """All that a smoother knows: one that is built from it is equal to it, to rounding."""
+    """State from which an equal smoother, to rounding, can be rebuilt."""
 
     factors: gtsam.NonlinearFactorGraph
     """marginals among them: linear, at the linearization point, which GTSAM keeps fixed for them; with empty slots"""
@@ -31,7 +29,7 @@ class Checkpoint(NamedTuple):
     times: dict[int, float]
 
     def covariances(self, keys: Collection[int]) -> dict[int, FloatArray]:
-        """The covariance of some variables, by their keys: all others are eliminated first."""
+        """Covariances of some variables by key: all others are eliminated first."""
         if len(keys) == len(self.times):
             return marginal_covariances(self.factors, self.linearization_point)
         marginal = self.factors.linearize(self.linearization_point).marginal(list(keys))
@@ -45,7 +43,7 @@ class Checkpoint(NamedTuple):
 
 
 class CheckpointedFixedLag:
-    """`gtsam.IncrementalFixedLagSmoother` with updates that either succeed or change nothing.
+    """`gtsam.IncrementalFixedLagSmoother` with atomic updates.
 
     GTSAM's Cholesky takes pivots of very unequal size for a failure, as they come about where pixels are sharp and the
     path is long. QR does not; after an update by QR it is kept for some frames.
@@ -68,9 +66,9 @@ class CheckpointedFixedLag:
         *,
         qr: bool = False,
     ) -> None:
-        """One update, first taking out the factors of the landmarks `forgotten` (keys).
+        """Update the window, first removing the factors of the landmarks `forgotten` (keys).
 
-        What has left the window since with such a landmark stays in the marginals. A `careful` update is by QR, which
+        What has left the window since with such a landmark stays in the marginals. An update with `qr` is by QR, which
         does not notice a landmark that nothing determines. Raises IndeterminateSystemError, nothing being changed,
         where GTSAM fails.
         """
@@ -102,7 +100,7 @@ class CheckpointedFixedLag:
         raise UnrecoverableError("what the window knew cannot be restored after a failure")
 
     def _return_to_cholesky(self) -> None:
-        """Back to Cholesky, once QR has done its updates."""
+        """Return to Cholesky after `QR_UPDATES` updates with QR."""
         if self._qr_updates == 1:
             self._qr_updates = 0
             self._restore()

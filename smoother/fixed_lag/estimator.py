@@ -1,4 +1,4 @@
-"""A fixed-lag smoother: what is known of a pose when the next few seconds have been seen, at a bounded cost a frame."""
+"""Estimator `fixed-lag`: each pose from the data up to a few seconds after it, at a bounded cost per frame."""
 
 import time
 from collections import Counter
@@ -21,7 +21,7 @@ from .window import FixedLagWindow
 
 @dataclass(frozen=True, slots=True)
 class FixedLagSettings:
-    """How long the window is, and how it is solved."""
+    """Length of the window and settings of its solver."""
 
     lag: float = 5.0
     """s"""
@@ -29,12 +29,11 @@ class FixedLagSettings:
 
 
 def fixed_lag(problem: Problem, progress: Progress | None = None, settings: FixedLagSettings | None = None) -> Estimate:
-    """Smoothing over a window that moves along; what leaves it becomes a linear prior on what stays.
+    """Fixed-lag smoothing: variables leaving the window are marginalized into a linear prior.
 
-    Pose k, its covariance and each landmark are as known at the last frame that had them in the window: from the data
-    of up to `lag` seconds after them. Landmarks enter by the same rule as in `isam2`, with their observations in the
-    window; one that comes back after it left is a new one to the graph. An indeterminate system costs what it
-    costs `isam2`.
+    Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks are
+    initialized as in `isam2`, with their observations in the window; a marginalized one that is observed again is new
+    to the graph. Indeterminate systems are handled as in `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         answer = _solve(in_first_pose_frame(problem), progress, settings or FixedLagSettings())

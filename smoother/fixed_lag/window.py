@@ -1,4 +1,4 @@
-"""The window of a fixed-lag smoother over the problem: what is in it, and what was known as it left."""
+"""Sliding window of the fixed-lag smoother over a problem, and the estimates marginalized from it."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -38,14 +38,14 @@ class FixedLagWindow:
         self.newest = -1
         self.used = np.zeros(len(builder.observations), dtype=np.bool_)
         self.path = np.full((problem.n_frames, 4, 4), np.nan)
-        """world_T_imu of the frames that left, with all of the data in the window then"""
+        """(T, 4, 4) world_T_imu of marginalized frames, from all data in the window then"""
         self.covariance = np.full((problem.n_frames, 6, 6), np.nan)
         self.lost: list[int] = []
-        """landmarks whose geometry had come undone when they left"""
+        """landmarks that violated cheirality when they were marginalized"""
         self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}
 
     def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
-        """See `update.Graph`."""
+        """See `IncrementalGraph.add`."""
         k, now = update.frame, float(self._problem.sequence.t[update.frame])
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
@@ -76,7 +76,7 @@ class FixedLagWindow:
         self._record(update, new, now, dropped)
 
     def _record(self, update: FrameUpdate, new: dict[int, int], now: float, dropped: Collection[int]) -> None:
-        """What the update has changed."""
+        """Record the landmarks and observations of a successful update."""
         self.newest = update.frame
         for j in dropped:
             self.used[self._observed.pop(j, [])] = False
@@ -100,7 +100,7 @@ class FixedLagWindow:
             known.pop(landmark, None)
 
     def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
-        """See `update.Graph`; as in `IncrementalSmoother`."""
+        """See `IncrementalGraph.suspect_landmarks`; as in `IncrementalSmoother`."""
         culprits = [j for j in self.cheirality_violations(self.key) if j not in dropped]
         if culprits:
             return dict.fromkeys(culprits, CHEIRALITY_VIOLATION)
@@ -110,7 +110,7 @@ class FixedLagWindow:
         return {named % self._problem.sequence.n_landmarks: "the system was indeterminate near it"}
 
     def cheirality_violations(self, landmarks: Collection[int]) -> list[int]:
-        """Those of the landmarks in the window that are no point in front of the cameras in it."""
+        """Landmarks of the window that violate cheirality in its frames."""
         if not landmarks:
             return []
         values = self._lag.smoother.calculateEstimate()
@@ -123,15 +123,15 @@ class FixedLagWindow:
         )
 
     def pose(self, frame: int) -> FloatArray:
-        """The world_T_imu (4, 4) of a frame in the window."""
+        """Pose world_T_imu (4, 4) of a frame in the window."""
         return np.asarray(self._lag.smoother.calculateEstimatePose3(pose_key(frame)).matrix(), dtype=np.float64)
 
     def position(self, landmark: int) -> FloatArray:
-        """(3,) m of a landmark in the window."""
+        """Position (3,), m, of a landmark in the window."""
         return np.asarray(self._lag.smoother.calculateEstimatePoint3(self.key[landmark]), dtype=np.float64)
 
     def store_marginalized(self, now: float, seen: Collection[int]) -> None:
-        """Keeps what is known of all that leaves the window at the time `now`, but for the landmarks `seen` then."""
+        """Store the estimates of variables that leave the window at `now` (s), except landmarks `seen` then."""
         window = range(self.oldest, self.newest + 1)
         frames = [frame for frame in window if self._problem.sequence.t[frame] < now - self._seconds]
         leaving = [j for j, time in self._last_seen.items() if time < now - self._seconds and j not in seen]
@@ -150,7 +150,7 @@ class FixedLagWindow:
                 self._landmark[j] = (self.position(j), covariance[self.key[j]])
 
     def _covariances(self, keys: list[int]) -> dict[int, FloatArray]:
-        """Of some variables, by their keys; NaN where Cholesky finds them indeterminate."""
+        """Covariances of variables by key; NaN where they are indeterminate."""
         try:
             return self._lag.checkpoint.covariances(keys)
         except (RuntimeError, np.linalg.LinAlgError):
@@ -158,7 +158,7 @@ class FixedLagWindow:
             return {key: np.full((n, n), np.nan) for key, n in size.items()}
 
     def landmarks(self) -> Landmarks:
-        """The landmarks that left, as known then; of one that came back, the last time."""
+        """Marginalized landmarks as estimated then; the latest estimate of one initialized several times."""
         index = np.sort(np.fromiter(self._landmark, dtype=np.int64))
         position, covariance = ([self._landmark[int(j)][part] for j in index] for part in (0, 1))
         return Landmarks(index, np.array(position).reshape(-1, 3), np.array(covariance).reshape(-1, 3, 3))

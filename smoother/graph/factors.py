@@ -1,4 +1,4 @@
-"""The terms of a problem as GTSAM factors, with the same likelihood as the filters have.
+"""GTSAM factors of a problem, with the likelihood of the filters.
 
 `StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances.
 """
@@ -17,7 +17,7 @@ FIXED_POSE_SIGMA = 1e-6
 
 
 class FactorBuilder:
-    """Makes the factors of one problem."""
+    """Builds the GTSAM factors of one problem."""
 
     def __init__(self, problem: Problem) -> None:
         camera = problem.sequence.camera
@@ -30,23 +30,23 @@ class FactorBuilder:
 
     @property
     def fixed_pose_sigmas(self) -> FloatArray:
-        """(6,) rad and m: the standard deviations of a pose that is held."""
+        """Standard deviations (6,), rad and m, of a fixed pose."""
         return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
 
     def pose_prior(self) -> gtsam.PriorFactorPose3:
-        """The prior on the pose of frame 0."""
+        """Prior factor of the pose of frame 0."""
         covariance = reorder_tangent(self.problem.initial_covariance) + np.diag(self.fixed_pose_sigmas**2)
         noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
         return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(self.problem.initial_pose), noise)
 
     def between(self, frame: int) -> gtsam.BetweenFactorPose3:
-        """The increment from `frame` to the next."""
+        """Between factor of the increment from `frame` to the next."""
         noise = gtsam.noiseModel.Gaussian.Covariance(self.step_covariance[frame])
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
     def stereo(self, frame: int, key: int, rows: FloatArray) -> gtsam.GenericStereoFactor3D:
-        """One observation, `rows` (3,) uL, uR, v, of the landmark `key`; no throw where that is behind the camera."""
+        """Stereo factor of the rows uL, uR, v (3,), px, of the landmark `key`; does not throw on cheirality."""
         uL, uR, v = rows.tolist()
         return gtsam.GenericStereoFactor3D(
             gtsam.StereoPoint2(uL, uR, v),
@@ -60,7 +60,7 @@ class FactorBuilder:
         )
 
     def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:
-        """The problem's prior on one landmark, which goes by `key`."""
+        """Prior factor of one landmark with key `key`."""
         prior = self.problem.landmark_prior
         assert prior is not None
         row = int(np.searchsorted(self.problem.features, landmark))
@@ -69,7 +69,7 @@ class FactorBuilder:
 
 
 def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:
-    """The noise model of (uL, uR, v), under the problem's kernel."""
+    """Noise model of (uL, uR, v), under the problem's kernel."""
     gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.sqrt(problem.measurement.row_variance))
     if problem.kernel is None:
         return gaussian

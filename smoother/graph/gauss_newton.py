@@ -1,4 +1,4 @@
-"""The final relinearization: Gauss-Newton over the whole graph from where the increments led."""
+"""Gauss-Newton with step extension on a whole graph."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ MAX_STEP_SCALE = 64.0
 
 
 def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
-    """The factors of a graph without the empty slots that removals leave."""
+    """Graph without the empty slots of removed factors."""
     if graph.nrFactors() == graph.size():
         return gtsam.NonlinearFactorGraph(graph)
     result = gtsam.NonlinearFactorGraph()
@@ -24,7 +24,7 @@ def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGra
 
 
 class GaussNewtonResult(NamedTuple):
-    """Where the steps led, and why they ended before their time, if they did."""
+    """Values after the steps, and the reason of an early failure."""
 
     values: gtsam.Values
     failure: str = ""
@@ -36,7 +36,7 @@ def gauss_newton(
     max_steps: int = MAX_STEPS,
     relative_decrease: float = RELATIVE_DECREASE,
 ) -> GaussNewtonResult:
-    """The values after Gauss-Newton steps, as long as each lowers the cost.
+    """Apply Gauss-Newton steps as long as each lowers the cost.
 
     Every linearization point of an incremental run is off by up to its threshold; this takes that away. Under a kernel
     the steps are too short along weak directions, so each is doubled as long as that lowers the cost further. Where
@@ -62,7 +62,7 @@ def gauss_newton(
 def _line_search(
     graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, step: gtsam.VectorValues, cost: float
 ) -> tuple[gtsam.Values, float]:
-    """The values and their cost after the step, or that many times it that doubling still pays."""
+    """Values and cost after the step, doubled as long as that lowers the cost."""
     times, best = 1.0, values
     while times <= MAX_STEP_SCALE:
         trial = values.retract(step.scale(times))

@@ -1,4 +1,4 @@
-"""The edge to GTSAM: the order of tangent vectors, and the world in which an incremental solver works."""
+"""Conversions to and from GTSAM: tangent order, covariances, values, and the frame of an incremental solver."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -14,11 +14,11 @@ from fgbaseline.geometry import FloatArray, se3, so3
 from .keys import landmark_key, pose_key
 
 ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
-"""takes [v, w] (ours) to [w, v] (GTSAM's), and back"""
+"""Index that takes [v, w] (ours) to [w, v] (GTSAM), and back."""
 
 
 def in_first_pose_frame(problem: Problem) -> Problem:
-    """The problem in the world of its first pose, whose answer `Estimate.moved` by that pose is that of the problem.
+    """Express the problem in the frame of its first pose; `Estimate.moved` by that pose undoes it.
 
     GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
     depend on how the world is turned.
@@ -51,7 +51,7 @@ def reorder_tangent(covariance: Any) -> FloatArray:
 
 
 def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
-    """(n, 4, 4) world_T_imu of the frames, their rotations exact: GTSAM's lose that by rounding in long descents."""
+    """Poses world_T_imu (n, 4, 4) of the frames, renormalized: GTSAM's lose that by rounding in long descents."""
     poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
     poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
     return poses
@@ -60,7 +60,7 @@ def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray
 def landmarks_from_values(
     values: gtsam.Values, keys: Mapping[int, int], covariance: Mapping[int, FloatArray] | None = None
 ) -> Landmarks:
-    """The landmarks (index in the sequence -> key), with their covariances where there are any by key."""
+    """Landmarks of `keys` (landmark -> key), with covariances by key if given."""
     index = sorted(keys)
     position = np.array([values.atPoint3(keys[j]) for j in index]).reshape(-1, 3)
     shape = None if covariance is None else np.array([covariance[keys[j]] for j in index]).reshape(-1, 3, 3)
@@ -68,7 +68,7 @@ def landmarks_from_values(
 
 
 def values_from_state(world_T_imu: FloatArray, landmarks: Landmarks) -> gtsam.Values:
-    """A state of that graph."""
+    """GTSAM values of poses (T, 4, 4) and landmarks."""
     values = gtsam.Values()
     for k, pose in enumerate(world_T_imu):
         values.insert(pose_key(k), gtsam.Pose3(pose))

@@ -1,4 +1,4 @@
-"""What a batch solution starts with: which observations take part, and where their landmarks are along a path."""
+"""Initial values of a batch solution: selected observations, and landmarks triangulated along a path."""
 
 from dataclasses import replace
 
@@ -16,13 +16,13 @@ from .landmark_initialization import InitializationCriterion
 
 
 def restricted_problem(problem: Problem, used: BoolArray) -> Problem:
-    """The problem with only the observations `used` (n,) of its sequence's."""
+    """Problem with only the observations `used` (n,) of its sequence's."""
     excluded = np.where(used, Excluded.NO, np.maximum(problem.excluded, Excluded.GEOMETRY)).astype(np.uint8)
     return replace(problem, excluded=excluded)
 
 
 def initial_landmarks(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
-    """Where the landmarks of a problem start along a path (T, 4, 4): triangulated, or at their prior."""
+    """Initial landmarks along a path (T, 4, 4): triangulated, or at their prior."""
     o = problem.observations()
     if problem.landmark_prior is not None:
         index = np.unique(o.landmark)
@@ -31,7 +31,7 @@ def initial_landmarks(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
 
 
 def triangulate_along(problem: Problem, o: Observations, world_T_imu: FloatArray) -> Landmarks:
-    """Where observations have their landmarks along a path (T, 4, 4), well determined or not.
+    """Landmarks triangulated along a path (T, 4, 4), well determined or not.
 
     Those without a single positive disparity are left out.
     """
@@ -43,7 +43,7 @@ def triangulate_along(problem: Problem, o: Observations, world_T_imu: FloatArray
 
 
 def select_landmarks(landmarks: Landmarks, index: IntArray) -> Landmarks:
-    """Those of the landmarks that are among `index`."""
+    """Landmarks whose index is in `index`."""
     among = np.isin(landmarks.index, index)
     return Landmarks(landmarks.index[among], landmarks.position[among])
 

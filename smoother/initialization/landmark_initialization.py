@@ -1,4 +1,4 @@
-"""Landmarks that wait to enter the graph until their geometry is determined."""
+"""Landmark initialization: observations are collected until triangulation determines the position."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ START_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class InitializationCriterion:
-    """When the geometry of a landmark counts as determined."""
+    """Criterion by which the geometry of a landmark counts as determined."""
 
     min_observations: int = 3
     max_relative_deviation: float = 0.5
@@ -26,7 +26,7 @@ class InitializationCriterion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NewLandmark:
-    """A landmark that enters the graph: where it starts, and all its observations so far."""
+    """Landmark to add to the graph: initial position and all observations so far."""
 
     landmark: int
     position: FloatArray
@@ -36,7 +36,7 @@ class NewLandmark:
 
 
 class UninitializedLandmarks:
-    """Collects the observations of landmarks that are not in the graph, and tells which may enter."""
+    """Observations of landmarks that are not in the graph yet."""
 
     def __init__(self, problem: Problem, observations: Observations, criterion: InitializationCriterion) -> None:
         self._problem = problem
@@ -48,16 +48,16 @@ class UninitializedLandmarks:
         return len(self._observed)
 
     def add(self, landmark: int, observation: int) -> None:
-        """One more observation of a landmark that waits."""
+        """Add an observation of an uninitialized landmark."""
         self._observed.setdefault(landmark, []).append(observation)
 
     def last_seen(self) -> list[tuple[int, int]]:
-        """(landmark, frame it was seen last) of those that still wait."""
+        """Pairs (landmark, frame of its last observation) of the uninitialized landmarks."""
         frame = self._observations.frame
         return [(landmark, int(frame[observed[-1]])) for landmark, observed in sorted(self._observed.items())]
 
     def candidates(self, seen: list[int], since: int = 0) -> list[int]:
-        """Those of the landmarks `seen` in this frame with observations enough; those before `since` are forgotten."""
+        """Landmarks of `seen` with enough observations; observations before frame `since` are dropped."""
         if since > 0:
             for j in seen:
                 self._observed[j] = [i for i in self._observed[j] if self._observations.frame[i] >= since]
@@ -66,7 +66,7 @@ class UninitializedLandmarks:
         return [j for j in seen if len(self._observed[j]) >= self._criterion.min_observations]
 
     def initialize(self, candidates: list[int], world_T_imu: FloatArray) -> list[NewLandmark]:
-        """Those of the candidates that are determined along the poses (T, 4, 4); they wait no more.
+        """Initialize the candidates whose position is determined along the poses (T, 4, 4).
 
         With the poses held, the triangulated landmark must be in front of every camera that saw it, and no direction
         may have a larger standard deviation than the rule allows.

@@ -1,7 +1,7 @@
-"""Where a new frame's pose is likely to be: its prediction, corrected by what the frame sees of known landmarks.
+"""Pose initialization: the predicted pose of a new frame, refined on its observations of known landmarks.
 
-A factor under a kernel gets its weight where it is first linearized. At the predicted pose good observations look
-wrong and are weighted down, until the pose is relinearized; so the first linearization is done nearer to the answer.
+A robust factor gets its weight at its first linearization. At the predicted pose inliers have large residuals and are
+down-weighted until the pose is relinearized; so the first linearization is done nearer to the solution.
 """
 
 import numpy as np

@@ -1,8 +1,7 @@
-"""A path that fits the images piece by piece, from dead reckoning alone.
+"""Windowed initialization: a dead-reckoned path optimized window by window, as initial value of a batch solution.
 
-Points triangulated along a long dead-reckoned path lie so badly where it bends wrongly that a descent from there is
-caught behind cameras and far from the minimum. Over a second the bend is small. So the path is cut into short pieces,
-each is solved on its own and put back together, then longer ones along what came out, until what is left is small.
+Points triangulated along a long dead-reckoned path are far from the minimum, and some lie behind cameras. Over a second
+the drift is small. The path is therefore optimized in short windows, joined, and optimized again in longer ones.
 """
 
 import gtsam
@@ -19,13 +18,13 @@ from ..graph.keys import landmark_key, pose_key
 from .initial_values import triangulate_along
 
 WINDOW_LENGTHS = (10, 40, 160)
-"""frames of a piece"""
+"""Frames per window, in successive passes."""
 MIN_OBSERVATIONS = 2
 MAX_STEPS, RELATIVE_DECREASE = 15, 1e-3
 
 
 def optimize_in_windows(problem: Problem, world_T_imu: FloatArray) -> FloatArray:
-    """The path (T, 4, 4) after solving it in pieces; it starts where it did."""
+    """Path (T, 4, 4) after the windowed passes; its first pose is unchanged."""
     factors, observations, T = FactorBuilder(problem), problem.observations(), problem.n_frames
     for length in WINDOW_LENGTHS:
         starts = range(0, T - 1, length)
@@ -38,7 +37,7 @@ def optimize_in_windows(problem: Problem, world_T_imu: FloatArray) -> FloatArray
 def optimize_window(
     factors: FactorBuilder, observations: Observations, world_T_imu: FloatArray, first: int, last: int
 ) -> FloatArray:
-    """The poses of the frames first to last, the first one held, from what they see; as given if that fails."""
+    """Poses of the frames first to last, optimized with the first one fixed; unchanged if GTSAM fails."""
     o = observations.of_frames(first, last)
     often = np.bincount(o.landmark) >= MIN_OBSERVATIONS
     landmarks = triangulate_along(factors.problem, o.select(often[o.landmark]), world_T_imu)

@@ -1,4 +1,4 @@
-"""An iSAM2 that can go back: after an exception GTSAM leaves the tree destroyed."""
+"""iSAM2 with checkpoints: an exception of GTSAM leaves its tree destroyed."""
 
 from collections.abc import Mapping
 from collections.abc import Sequence as Listing
@@ -10,7 +10,7 @@ from ..errors import IndeterminateSystemError, named_variable
 from ..graph.keys import pose_key
 
 CHECKPOINT_INTERVAL, CHECKPOINT_SHARE = 50, 0.125
-"""updates from one copy to the next: at least so many, and this share of all so far"""
+"""Updates between checkpoints: at least this number, and this share of all so far."""
 
 
 class Update(NamedTuple):
@@ -22,15 +22,15 @@ class Update(NamedTuple):
     groups: Mapping[int, int] | None = None
     """of elimination, by key: the larger, the later; a key that is not named is in group 0"""
     relinearize: bool = False
-    """at this update, whichever the next one is that would"""
+    """force relinearization at this update"""
 
 
 class CheckpointedISAM2:
-    """`gtsam.ISAM2` with updates that either succeed or change nothing.
+    """`gtsam.ISAM2` with atomic updates.
 
-    From time to time a copy of the tree is kept; after a failure the copy is restored and the updates since then are
-    repeated, which gives the same tree and the same factor slots. A copy costs what the tree is large, so the larger
-    it is, the longer one serves; failures seldom come alone, so one is taken after each of them.
+    After a failure the last copy of the tree is restored and the updates since then are repeated, which gives the same
+    tree and factor slots. A copy costs time in proportion to the tree, so the interval grows with it. A checkpoint is
+    also taken after each failure, because failures come in series.
     """
 
     def __init__(self, params: gtsam.ISAM2Params, interval: int = CHECKPOINT_INTERVAL, first: int = 0) -> None:
@@ -53,7 +53,7 @@ class CheckpointedISAM2:
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
     ) -> gtsam.ISAM2Result:
-        """One update; raises IndeterminateSystemError, the tree being restored, where GTSAM fails.
+        """Update the tree; where GTSAM fails, restore it and raise IndeterminateSystemError.
 
         Without `groups` GTSAM eliminates all variables of the new factors last.
         """

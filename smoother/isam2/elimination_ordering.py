@@ -1,10 +1,8 @@
-"""In which order an update eliminates the variables that it touches: as they came.
+"""Elimination ordering of an iSAM2 update: constrained COLAMD with groups by the age of the last observation.
 
-Left to itself GTSAM has COLAMD order all that an update touches, but for what its new factors name, which comes last.
-COLAMD does not know that the drive goes on. It cuts the chain of poses in the middle as readily as at its old end, and
-what was eliminated last stays near the root, where every update meets it again: after 900 simulated frames poses of 30
-seconds ago stood there, in cliques of 500 columns. Groups by age let the old end go first; within a group COLAMD
-chooses. The solution is the same.
+Unconstrained COLAMD may cut the chain of poses in the middle. Variables eliminated last stay near the root, where
+every update visits them again: after 900 simulated frames, poses 30 s old were there, in cliques of 500 columns.
+Groups by age eliminate the oldest first; COLAMD orders within a group. The solution is unchanged.
 """
 
 from collections.abc import Collection
@@ -23,14 +21,14 @@ the end, which costs the next frame least, as long as so many dense columns do n
 
 
 class EliminationOrdering:
-    """When poses and landmarks were seen last, and the groups that follow from it."""
+    """Last observation of each landmark, and the elimination groups that follow from it."""
 
     def __init__(self) -> None:
         self._seen: dict[int, int] = {}
         """key of a landmark -> frame that saw it last; those seen last are at the end"""
 
     def remove(self, landmarks: Collection[int]) -> None:
-        """These (keys) leave the graph: GTSAM takes no group of a variable that it does not have."""
+        """Remove landmarks (keys): GTSAM accepts no group of an unknown variable."""
         for key in landmarks:
             self._seen.pop(key, None)
 

@@ -1,4 +1,4 @@
-"""The reference estimate, and what was known online, from one run of iSAM2."""
+"""Estimators `isam2` (the reference) and `isam2-online`, from one run of iSAM2."""
 
 import time
 from collections import Counter
@@ -20,15 +20,13 @@ from ..graph.marginal_covariances import marginal_covariances
 from .incremental_smoother import FrameLostError, IncrementalSmoother
 from .settings import ISAM2Settings
 
-"""kinds of events that are no trouble"""
-
 
 def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
-    """Incremental smoothing over the whole graph: every pose as known from all of the data.
+    """Incremental smoothing over the whole graph: every pose from all of the data.
 
-    A landmark enters once its geometry is determined, with all its observations. Where the system is indeterminate
-    the landmark behind it is given up, or the frame's observations; each is an event and the status is then
-    `recovered`. `by_products["isam2-online"]` is pose k as known from data up to k.
+    A landmark is initialized once its geometry is determined, with all its observations. Where the system is
+    indeterminate, its landmark or the frame's observations are dropped, with an event; the status is then
+    `recovered`. `by_products["isam2-online"]` is pose k as estimated from data up to k.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         answer = _solve(in_first_pose_frame(problem), progress, settings or ISAM2Settings())
@@ -36,7 +34,7 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Pose k as the same run knew it from data up to frame k: what a filter can fairly be compared with.
+    """Pose k as estimated from data up to frame k by the run of `isam2`: the causal counterpart of a filter.
 
     `by_products["isam2"]` is the run's final answer.
     """
@@ -92,7 +90,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
 def _run(
     problem: Problem, settings: ISAM2Settings, seconds: FloatArray, progress: Progress | None
 ) -> IncrementalSmoother:
-    """After the last frame; by QR from the start where Cholesky fails in a way that would cost a frame."""
+    """Run over all frames; with QR from the start where Cholesky would lose the observations of a frame."""
     quick = IncrementalSmoother(problem, settings)
     try:
         quick.run(seconds, progress)
@@ -117,7 +115,7 @@ def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
 def _final_solution(
     smoother: IncrementalSmoother, relinearize: bool
 ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-    """The whole graph and its solution, relinearized or not, without the landmarks whose geometry came undone."""
+    """The whole graph and its solution, relinearized or not, without cheirality violations."""
     slots, values = smoother.release()
     while True:
         graph = compact_graph(slots)
@@ -154,5 +152,5 @@ def _status(events: tuple[Event, ...]) -> tuple[Status, str]:
     trouble = Counter(event.kind for event in events if event.kind not in harmless)
     if not trouble:
         return Status.OK, ""
-    told = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
-    return Status.RECOVERED, f"the system was indeterminate on the way: {told}"
+    counts = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
+    return Status.RECOVERED, f"the system was indeterminate on the way: {counts}"

@@ -1,4 +1,4 @@
-"""The reference: iSAM2 over the whole graph, frame by frame."""
+"""Incremental smoother: iSAM2 over the whole graph, frame by frame."""
 
 import time
 from collections.abc import Collection
@@ -22,15 +22,15 @@ from .marginalized_isam2 import NO_POSE, MarginalizedISAM2, marginalization_hori
 from .settings import ISAM2Settings
 
 PRIOR = -1
-"""stands for an observation where a factor is the landmark's prior"""
+"""Index in place of an observation for the factor of a landmark's prior."""
 SETTLING_FRAMES = 4
-"""updates that all relinearize, from one on whose landmarks are all new: they and the last poses start far off"""
+"""Consecutive updates that relinearize after one with new landmarks only: they and the last poses start far off."""
 SETTLING_UPDATES = 8
-"""at most; three to five are usual"""
+"""Largest number of updates after the last frame; three to five are usual."""
 
 
 class FrameLostError(Exception):
-    """A frame's observations would have to be given up, to which QR may be an answer."""
+    """Cholesky would lose a frame's observations; QR may keep them."""
 
     def __init__(self, frame: int) -> None:
         super().__init__(f"frame {frame}")
@@ -38,7 +38,7 @@ class FrameLostError(Exception):
 
 
 class IncrementalSmoother:
-    """Builds and solves the graph frame by frame, and keeps what was given up on the way."""
+    """iSAM2 with landmark initialization, recovery from indeterminate systems and marginalization of old frames."""
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
         self.solver = MarginalizedISAM2(settings.params(problem.sequence.camera.baseline))
@@ -64,8 +64,10 @@ class IncrementalSmoother:
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
-        """All frames; `seconds` (T,) is filled. Raises GivenUpError, and FrameLostError unless by QR already (or under
-        landmark priors, whose graph QR has not been seen to rescue)."""
+        """Process all frames; fill `seconds` (T,).
+
+        Raises UnrecoverableError, and FrameLostError unless QR is used or landmarks have priors.
+        """
         T = self.problem.n_frames
         for k, observed in enumerate(self.builder.observations.by_frame(T)):
             start = time.perf_counter()
@@ -75,7 +77,7 @@ class IncrementalSmoother:
                 progress(k + 1, T)
 
     def settle(self) -> None:
-        """After the last frame: updates without anything new, until every variable is within its threshold."""
+        """Update without new factors after the last frame, until every variable is within its threshold."""
         for _ in range(SETTLING_UPDATES):
             try:
                 if self.solver.relinearize() == 0:
@@ -101,7 +103,7 @@ class IncrementalSmoother:
             self._marginalize_old_frames(k)
 
     def _marginalize_old_frames(self, k: int) -> None:
-        """After frame k: what is far behind leaves the tree, unless a track that is alive hangs on it."""
+        """Marginalize frames before the horizon of continuing tracks, after frame k."""
         kept = self._settings.kept_frames
         first = min(k + 1 - kept, marginalization_horizon(self.builder.observations, k))
         self._marginalize_at = k + kept
@@ -112,8 +114,10 @@ class IncrementalSmoother:
             self._marginalize_at = first + self._settings.tree_frames
 
     def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
-        """The update, after the tree has gone back to frame 0 where it names what left the tree: that could not be
-        known when the tree was exchanged. Where GTSAM fails, the update without the landmarks that reach back."""
+        """Update after restoring the whole tree, where it refers to marginalized variables.
+
+        Where GTSAM fails to restore it, the update without those landmarks.
+        """
         frame, back = self.builder.frame, {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
         back |= {e.landmark for e in update.new_landmarks if frame[e.observations[0]] < self._first}
         if not back:
@@ -132,7 +136,7 @@ class IncrementalSmoother:
         return update.without(back)
 
     def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
-        """See `update.Graph`."""
+        """See `IncrementalGraph.add`."""
         k, factors = update.frame, self.builder.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
@@ -175,10 +179,10 @@ class IncrementalSmoother:
             self._slots.setdefault(j, {})[i] = slot
 
     def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
-        """See `update.Graph`.
+        """See `IncrementalGraph.suspect_landmarks`.
 
-        GTSAM names a variable near the trouble, seldom the culprit. That is a landmark which the last solution sent
-        behind a camera or onto its plane; only where there is none, the named one is taken.
+        GTSAM names a variable near the cause. The cause is usually a cheirality violation of the last solution; only
+        without one, the named variable is taken.
         """
         culprits = [j for j in self._cheirality_violations(self.solver.estimate()) if j not in dropped]
         if culprits:
@@ -197,7 +201,7 @@ class IncrementalSmoother:
         )
 
     def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """After the last frame: the factors in their slots, and the solution. The tree is gone, as large as it is."""
+        """Factors in their slots and the solution, after the last frame; frees the tree."""
         graph, values = self.solver.release()
         there = set(self.key.values())
         for key in values.keys():  # noqa: SIM118
@@ -206,9 +210,9 @@ class IncrementalSmoother:
         return graph, values
 
     def drop_cheirality_violations(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:
-        """Takes every landmark whose geometry came undone out of what `release` gave; False if there is none.
+        """Remove cheirality violations from the result of `release`; False if there is none.
 
-        Such a landmark pulls at nothing (its Jacobian is zero) and its residual means nothing.
+        The Jacobian of such a landmark is zero and its residual meaningless.
         """
         dropped = self._cheirality_violations(values)
         for j in dropped:
@@ -220,13 +224,13 @@ class IncrementalSmoother:
         return bool(dropped)
 
     def used(self) -> BoolArray:
-        """Which of the problem's observations are in the graph."""
+        """Mask (n,) of the problem's observations in the graph."""
         used = np.zeros(len(self.builder.observations), dtype=np.bool_)
         used[[i for slots in self._slots.values() for i in slots if i != PRIOR]] = True
         return used
 
     def online_landmarks(self) -> Landmarks:
-        """Every landmark as known at the frame that saw it last."""
+        """Landmarks as estimated at their latest observation."""
         position = self.builder.landmark_position
         index = np.sort(np.fromiter(position, dtype=np.int64))
         return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))

@@ -1,11 +1,9 @@
-"""A graph that grows with the drive, and an iSAM2 whose tree is over the part of it that can still move.
+"""iSAM2 over the recent part of a growing graph, with old frames marginalized into a linear prior.
 
-An update of GTSAM walks over its whole tree: which variables are above a threshold, which cliques hold one of those,
-and all that hangs on the cliques that it replaces. So it becomes dear late in a drive, though it changes no more than
-before. From time to time the tree is exchanged for one over the last frames, and what came before becomes a linear
-prior on what remains, at the same linearization points: the answer is the same, but these frames are not relinearized
-any more. The graph keeps every factor, for the last Gauss-Newton steps over all of it, and for a landmark that comes
-back after it left: the tree is then built anew over all frames.
+An update of GTSAM traverses its whole tree, so its cost grows with the length of the drive. From time to time the tree
+is replaced by one over the last frames, and the rest becomes a linear prior at the same linearization points. The
+solution is unchanged, but marginalized frames are not relinearized. The graph keeps every factor: for the final
+Gauss-Newton steps, and to rebuild the whole tree when a marginalized landmark is observed again.
 """
 
 from collections.abc import Collection, Mapping
@@ -27,11 +25,11 @@ IN_PRIOR = -1
 NO_POSE = -1
 """stands for the frame of a factor that names no pose"""
 UNSEEN_FRAMES = 2
-"""for which a track without an observation may still go on: the mask interrupts tracks for that long"""
+"""Frames without an observation after which a track may continue: the mask interrupts tracks for that long."""
 
 
 class MarginalizedISAM2:
-    """A whole graph, its factors in slots that stay, and a tree over its end; updates succeed or change nothing."""
+    """Whole graph with constant factor slots, and an iSAM2 tree over its recent part; updates are atomic."""
 
     def __init__(self, params: gtsam.ISAM2Params) -> None:
         self._params = params
@@ -50,7 +48,7 @@ class MarginalizedISAM2:
 
     @property
     def tree(self) -> gtsam.ISAM2:
-        """As the last update left it; another one after `marginalize_before`."""
+        """Tree after the last update; replaced by `marginalize_before` and `restore_all`."""
         return self._isam.tree
 
     def update(
@@ -88,12 +86,12 @@ class MarginalizedISAM2:
         return slots
 
     def relinearize(self) -> int:
-        """Relinearises what is beyond its threshold: how many variables. Raises IndeterminateSystemError."""
+        """Relinearize variables beyond their thresholds; return their number. Raises IndeterminateSystemError."""
         result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearize=True)
         return int(result.getVariablesRelinearized())
 
     def marginalize_before(self, first: int, groups: Mapping[int, int]) -> bool:
-        """Exchanges the tree for one over the frames from `first` on; False, nothing being changed, if GTSAM fails.
+        """Marginalize the frames before `first` into a linear prior; False, with the tree unchanged, if GTSAM fails.
 
         Nothing new may name what leaves: poses before `first`, and landmarks that were not seen since. `groups` are of
         elimination, as in `update`.
@@ -119,11 +117,11 @@ class MarginalizedISAM2:
         return True
 
     def is_marginalized(self, key: int) -> bool:
-        """Whether a variable is in the prior only."""
+        """True where a variable is in the linear prior only."""
         return bool(self._marginalized.exists(key))
 
     def restore_all(self, groups: Mapping[int, int]) -> bool:
-        """Exchanges the tree for one over all frames, without a prior; False, nothing being changed, if GTSAM fails.
+        """Rebuild the tree over all frames; False, with the tree unchanged, if GTSAM fails.
 
         `groups` are of elimination, as in `update`.
         """
@@ -188,13 +186,13 @@ class MarginalizedISAM2:
         return behind, ahead, place
 
     def estimate(self) -> gtsam.Values:
-        """Of every variable that was ever in the tree and was not removed from it, and of the tail."""
+        """Estimates of all variables, marginalized ones and the auxiliary pose included."""
         values = gtsam.Values(self._marginalized)
         values.insert(self.tree.calculateEstimate())
         return values
 
     def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """The factors in their slots, and the solution without the tail. The tree is gone, as large as it is."""
+        """Factors in their slots and the solution without the auxiliary pose; frees the tree."""
         values = self.estimate()
         values.erase(AUXILIARY_POSE)
         del self._isam
@@ -209,9 +207,9 @@ def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:
 
 
 def marginalization_horizon(o: Observations, k: int) -> int:
-    """The first frame of all tracks that the frames up to k have seen, the last time at k - UNSEEN_FRAMES or later.
+    """Oldest frame of the tracks observed at k - UNSEEN_FRAMES or later, from observations up to frame k.
 
-    The frame after k, where there is none.
+    Frame k + 1 where there is no such track.
     """
     recent, now = np.searchsorted(o.frame, [k - UNSEEN_FRAMES, k + 1])
     alive = np.isin(o.landmark[:now], o.landmark[recent:now])

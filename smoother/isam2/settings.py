@@ -8,13 +8,13 @@ from ..graph.keys import thresholds
 from ..initialization.landmark_initialization import InitializationCriterion
 
 WILDFIRE_THRESHOLD = 1e-5
-"""rad, and m for a baseline of half a metre or more: smaller changes of a solution are not carried on through the tree.
-GTSAM has one threshold for both, by default 1e-3: that leaves 0.1 mm in what is known online, and gains no time"""
+"""rad, and m for a baseline of half a meter or more: smaller changes are not propagated through the Bayes tree. The
+default of GTSAM, 1e-3, leaves an error of 0.1 mm in the online estimate and saves no time."""
 
 
 @dataclass(frozen=True, slots=True)
 class ISAM2Settings:
-    """How the graph is solved; only `initialization` moves its optimum."""
+    """Settings of iSAM2; only `initialization` changes the optimum of the graph."""
 
     relinearize_position: float = 0.04
     """baselines of the rig, of a pose: what is seen moves by no more than this share of its disparity"""
@@ -23,19 +23,19 @@ class ISAM2Settings:
     relinearize_landmark: float = 0.002
     """as a share of its distance"""
     relinearize_skip: int = 3
-    """updates from one that relinearizes what is beyond its threshold to the next; a fixed-lag smoother does at each"""
+    """updates from one relinearization to the next; the fixed-lag smoother relinearizes at each"""
     initialization: InitializationCriterion = field(default_factory=InitializationCriterion)
     relinearize_at_end: bool = True
-    """Gauss-Newton over the whole graph after the last frame; without it the answer is what the increments led to"""
+    """Gauss-Newton over the whole graph after the last frame"""
     qr: bool = False
-    """QR in place of Cholesky: three times slower, and at ease with pivots of very unequal size"""
+    """QR in place of Cholesky: three times slower, and robust to pivots of very unequal size"""
     tree_frames: int = 600
-    """frames that the tree may be over before those behind the last `kept_frames` leave it for a prior; those before
-    them, as far back as a track reaches that is alive, stay"""
+    """frames in the tree at which those before the last `kept_frames` are marginalized into a linear prior; frames of
+    tracks that continue are kept"""
     kept_frames: int = 200
 
     def params(self, baseline: float) -> gtsam.ISAM2Params:
-        """The same in GTSAM's terms, for a rig with this baseline (m)."""
+        """GTSAM parameters for a rig with this baseline (m)."""
         params = gtsam.ISAM2Params()
         params.setRelinearizeThreshold(
             thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark, baseline)

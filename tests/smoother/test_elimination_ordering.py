@@ -12,8 +12,8 @@ from fgbaseline import data, smoother
 from fgbaseline.data import NoiseSettings, Problem
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.smoother import incremental
 from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.isam2 import estimator
 from fgbaseline.smoother.isam2.elimination_ordering import GROUP_FRAMES, MANY_LANDMARKS, N_GROUPS, EliminationOrdering
 
 LIFE = 3
@@ -87,7 +87,7 @@ def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
         calls.append(frame)
         return {pose_key(frame): min(frame, 1), AUXILIARY_POSE: 1 + min(frame, 1)}
 
-    monkeypatch.setattr(incremental.EliminationOrdering, "groups", last)
+    monkeypatch.setattr(EliminationOrdering, "groups", last)
     other = smoother.isam2(problem)
     assert calls == list(range(problem.n_frames))
     np.testing.assert_allclose(ours.world_T_imu, other.world_T_imu, atol=1e-6)
@@ -104,13 +104,13 @@ def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
 
 def test_the_tail_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     graphs = []
-    final = smoother.reference._final
+    final = estimator._final_solution
 
     def kept(*arguments: object) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         graphs.append(final(*arguments))
         return graphs[-1]
 
-    monkeypatch.setattr(smoother.reference, "_final", kept)
+    monkeypatch.setattr(estimator, "_final_solution", kept)
     smoother.isam2(short_drive())
     ((graph, values),) = graphs
     assert not values.exists(AUXILIARY_POSE)
