@@ -40,7 +40,7 @@ class GraphBuilder:
     def frame_update(
         self, k: int, observed: range, known: Collection[int], dropped: Collection[int], first_frame: int = 0
     ) -> FrameUpdate:
-        """Frame k with its observations, in a graph of the landmarks `known` and the frames from `since` on."""
+        """Update by frame k for a graph of the landmarks `known` and the frames from `first_frame` on."""
         landmarks = self.observations.landmark[observed.start : observed.stop].tolist()
         tracked = {j: i for j, i in zip(landmarks, observed, strict=True) if j in known}
         uninitialized = [
@@ -68,8 +68,8 @@ class GraphBuilder:
     def _windowed_path(self, k: int, first_frame: int) -> FloatArray:
         """Path (T, 4, 4), its last frames optimized on the images, where frame k observes no known landmark.
 
-        At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would be
-        so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.
+        At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would
+        be so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.
         """
         first = max(k - WINDOW_FRAMES, first_frame)
         if self.problem.landmark_prior is not None or k - first < WINDOW_FRAMES:

@@ -29,10 +29,10 @@ class FixedLagSettings:
 
 
 def fixed_lag(problem: Problem, progress: Progress | None = None, settings: FixedLagSettings | None = None) -> Estimate:
-    """Fixed-lag smoothing: variables leaving the window are marginalized into a linear prior.
+    """Fixed-lag smoothing: what leaves the window are marginalized into a linear prior.
 
-    Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks are
-    initialized as in `isam2`, with their observations in the window; a marginalized one that is observed again is new
+    Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks
+    are initialized as in `isam2`, with their observations in the window; a marginalized one that is observed again is new
     to the graph. Indeterminate systems are handled as in `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
