@@ -32,8 +32,8 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     """Fixed-lag smoothing: what leaves the window are marginalized into a linear prior.
 
     Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks
-    are initialized as in `isam2`, with their observations in the window; a marginalized one that is observed again is new
-    to the graph. Indeterminate systems are handled as in `isam2`.
+    are initialized as in `isam2`, with their observations in the window. A marginalized one that is observed again is
+    new to the graph. Indeterminate systems are handled as in `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         answer = _solve(in_first_pose_frame(problem), progress, settings or FixedLagSettings())
