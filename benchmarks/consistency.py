@@ -31,7 +31,7 @@ from fgbaseline.data import Calibration, Estimate, HuberKernel, NoiseSettings, P
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.track_mask import MaskSettings
-from fgbaseline.ekf import JointSettings, Linearisation
+from fgbaseline.ekf import JointSettings, Linearization
 from fgbaseline.reports.figures.palette import OWN
 
 FRAMES = 20
@@ -39,7 +39,7 @@ PARTS = 5
 """of the drive, over which growth is shown"""
 EVERYTHING = MaskSettings(min_disparity=-np.inf, max_row_mismatch=np.inf, prediction_gate=np.inf, min_track=1)
 """There are no wrong matches to find, and a gate along noisy velocities would keep what agrees with their noise."""
-INVERSE_DEPTH = JointSettings(linearisation=Linearisation.TEXTBOOK)
+INVERSE_DEPTH = JointSettings(linearization=Linearization.TEXTBOOK)
 COLOURS = OWN | {
     "joint-ekf-first-estimate": "#56B4E9",
     "textbook, inverse depth": "#882255",

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 OUT, MEMORY = Path("out/fuzz"), Path("/dev/shm")
-MEGABYTES, SECONDS_EACH, LONGEST = 1024, 10, 8192
+MEGABYTES, SECONDS_EACH, MAX_STEP_SCALE = 1024, 10, 8192
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -72,7 +72,7 @@ def run(name: str, seconds: int) -> dict[str, Any]:
         "max_total_time": seconds,
         "rss_limit_mb": MEGABYTES,
         "timeout": SECONDS_EACH,
-        "max_len": LONGEST,
+        "max_len": MAX_STEP_SCALE,
         "print_final_stats": 1,
         "artifact_prefix": f"{corpus}-",
     }

@@ -1,7 +1,7 @@
 """What was tried to make iSAM2 faster, and what it does to the answer: `python -m benchmarks.isam2_variants FILE...`.
 
 Each variant answers the same problem in turn. Told are processor time, the share of it in GTSAM's updates, and how far
-final and online paths are from those of the variant that relinearises at every update.
+final and online paths are from those of the variant that relinearizes at every update.
 """
 
 import time
@@ -17,10 +17,10 @@ import numpy as np
 from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.geometry import FloatArray
-from fgbaseline.smoother import elimination
-from fgbaseline.smoother.elimination import Chronology
-from fgbaseline.smoother.incremental import ISAM2Settings
-from fgbaseline.smoother.starts import restricted
+from fgbaseline.smoother.initialization.initial_values import restricted_problem
+from fgbaseline.smoother.isam2 import elimination_ordering
+from fgbaseline.smoother.isam2.elimination_ordering import EliminationOrdering
+from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from .gtsam_time import INCREMENTAL, gtsam_timed
 
@@ -28,7 +28,7 @@ EVERY = ISAM2Settings(relinearize_skip=1)
 
 
 class PartialCheck(ISAM2Settings):
-    """Looks for variables to relinearise from the root of the tree down, no further than they moved."""
+    """Looks for variables to relinearize from the root of the tree down, no further than they moved."""
 
     def params(self, baseline: float) -> gtsam.ISAM2Params:
         params = super().params(baseline)
@@ -55,34 +55,34 @@ def landmarks_first(problem: Problem) -> Estimate:
 
 def keyframes(problem: Problem) -> Estimate:
     """Every second frame is blind: its pose stays, tied by the velocities."""
-    return smoother.isam2(restricted(problem, problem.mask & (problem.sequence.observations.frame % 2 == 0)))
+    return smoother.isam2(restricted_problem(problem, problem.mask & (problem.sequence.observations.frame % 2 == 0)))
 
 
 @contextmanager
 def crowds_above(landmarks: int) -> Iterator[None]:
-    before, elimination.CROWD = elimination.CROWD, landmarks
+    before, elimination_ordering.MANY_LANDMARKS = elimination_ordering.MANY_LANDMARKS, landmarks
     try:
         yield
     finally:
-        elimination.CROWD = before
+        elimination_ordering.MANY_LANDMARKS = before
 
 
 def by_colamd(problem: Problem) -> Estimate:
     """All that an update touches is ordered by COLAMD, but for what the new factors name, which is last."""
-    before = Chronology.groups
+    before = EliminationOrdering.groups
 
-    def latest_last(self: Chronology, frame: int, landmarks: Collection[int], **_: int) -> dict[int, int]:
-        return before(self, frame, landmarks, fresh=True)
+    def latest_last(self: EliminationOrdering, frame: int, landmarks: Collection[int], **_: int) -> dict[int, int]:
+        return before(self, frame, landmarks, all_new=True)
 
-    Chronology.groups = latest_last  # type: ignore[method-assign]
+    EliminationOrdering.groups = latest_last  # type: ignore[method-assign]
     try:
         return smoother.isam2(problem)
     finally:
-        Chronology.groups = before  # type: ignore[method-assign]
+        EliminationOrdering.groups = before  # type: ignore[method-assign]
 
 
 VARIANTS = (
-    Variant("relinearised at every update", isam2(EVERY)),
+    Variant("relinearized at every update", isam2(EVERY)),
     Variant("at every second", isam2(replace(EVERY, relinearize_skip=2))),
     Variant("at every third (the default)", isam2(ISAM2Settings())),
     Variant("the default, in the order of COLAMD", by_colamd),
@@ -101,7 +101,7 @@ VARIANTS = (
     ),
     Variant("at every one, checked from the root down", isam2(PartialCheck(relinearize_skip=1))),
     Variant("at every one, landmarks eliminated before the pose", landmarks_first),
-    Variant("at every one, by QR", isam2(replace(EVERY, careful=True))),
+    Variant("at every one, by QR", isam2(replace(EVERY, qr=True))),
     Variant("the default, every second frame without observations", keyframes),
     Variant("landmarks leave: `fixed-lag`", smoother.fixed_lag),
 )

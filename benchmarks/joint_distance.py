@@ -1,8 +1,8 @@
 """How far the joint filter is from iSAM2, and what of it is what: `python benchmarks/joint_distance.py FILE...`.
 
 Each row changes one thing. `isam2-online` has the same data as a filter: the rest of the way to `isam2` is what only
-later frames tell. iSAM2 that never moves a linearisation point is a filter as far as linearisation goes, on the very
-graph that iSAM2 solves: from there to `isam2-online` it is linearisation and nothing else.
+later frames tell. iSAM2 that never moves a linearization point is a filter as far as linearization goes, on the very
+graph that iSAM2 solves: from there to `isam2-online` it is linearization and nothing else.
 """
 
 # ruff: noqa: E402
@@ -23,7 +23,7 @@ from rich.table import Table
 
 from fgbaseline import compare, data, ekf, smoother
 from fgbaseline.data import Estimate, Excluded, Problem, Sequence, Status
-from fgbaseline.ekf import JointSettings, Linearisation
+from fgbaseline.ekf import JointSettings, Linearization
 from fgbaseline.smoother import ISAM2Settings
 
 NEVER = 1e9
@@ -52,7 +52,7 @@ def online(problem: Problem, settings: ISAM2Settings | None = None) -> tuple[Est
 
 
 def steps(problem: Problem) -> Iterator[Step]:
-    """Default first; then linearisation, what takes part, weighting and gating, noise."""
+    """Default first; then linearization, what takes part, weighting and gating, noise."""
     known, final = online(problem)
     fixed = ISAM2Settings(relinearize_position=NEVER, relinearize_rotation=NEVER, relinearize_landmark=NEVER)
 
@@ -61,11 +61,13 @@ def steps(problem: Problem) -> Iterator[Step]:
 
     yield Step("", "isam2-online", known, known, final)
     yield Step("", "joint-ekf", joint(problem), known, final)
-    yield Step("linearisation", "isam2-online that never relinearises", online(problem, fixed)[0], known, final)
-    for way in (Linearisation.FIRST_ESTIMATE, Linearisation.TEXTBOOK):
-        yield Step("linearisation", f"joint-ekf, {way}", joint(problem, linearisation=way), known, final)
-    yield Step("linearisation", "joint-ekf, textbook, world", ekf.joint_ekf_textbook(problem), known, final)
-    yield Step("same data", "joint-ekf on what isam2 used", joint(restricted(problem, final.used)), known, final)
+    yield Step("linearization", "isam2-online that never relinearizes", online(problem, fixed)[0], known, final)
+    for way in (Linearization.FIRST_ESTIMATE, Linearization.TEXTBOOK):
+        yield Step("linearization", f"joint-ekf, {way}", joint(problem, linearization=way), known, final)
+    yield Step("linearization", "joint-ekf, textbook, world", ekf.joint_ekf_textbook(problem), known, final)
+    yield Step(
+        "same data", "joint-ekf on what isam2 used", joint(restricted_problem(problem, final.used)), known, final
+    )
     if problem.kernel is not None:
         plain = replace(problem, kernel=None)
         known_plain, final_plain = online(plain)
@@ -82,7 +84,7 @@ def steps(problem: Problem) -> Iterator[Step]:
     yield Step("bias", "joint-ekf-bias", ekf.joint_ekf_bias(problem), known, final)
 
 
-def restricted(problem: Problem, used: np.ndarray) -> Problem:
+def restricted_problem(problem: Problem, used: np.ndarray) -> Problem:
     """The problem with only the observations `used` (n,)."""
     excluded = np.where(used, Excluded.NO, np.maximum(problem.excluded, Excluded.GEOMETRY)).astype(np.uint8)
     left = np.unique(problem.sequence.observations.landmark[used])

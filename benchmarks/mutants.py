@@ -50,8 +50,9 @@ def copied() -> None:
 def mutants() -> list[Mutant]:
     """All there are, by module."""
     found = []
-    for path in sorted((PLACE / "mutants" / "fgbaseline").glob("*/*.meta")):
-        module = f"{path.parent.name}/{path.name.removesuffix('.meta')}"
+    root = PLACE / "mutants" / "fgbaseline"
+    for path in sorted(root.rglob("*.meta")):
+        module = path.relative_to(root).as_posix().removesuffix(".meta")
         codes = json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
         found += [Mutant(name, module, code) for name, code in codes.items()]
     return found

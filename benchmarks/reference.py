@@ -1,4 +1,4 @@
-"""How near iSAM2 comes to batch, with and without the final relinearisation: `python benchmarks/reference.py FILE...`.
+"""How near iSAM2 comes to batch, with and without the final relinearization: `python benchmarks/reference.py FILE...`.
 
 Costs are those of `compare.cost`, over the observations that batch used, so that they compare. Exits 1 where a limit
 is passed: 0.05 m between the paths, and a cost above batch's by 0.01 % without a kernel, by 0.5 % with one.
@@ -42,8 +42,8 @@ def recordings(files: tuple[Path, ...]) -> Iterator[Sequence]:
 
 
 def row(problem: Problem) -> tuple[list[str], bool]:
-    """What the three answers come to, and whether iSAM2 holds the limits before and after its relinearisation."""
-    before = smoother.isam2(problem, settings=ISAM2Settings(relinearise_at_end=False))
+    """What the three answers come to, and whether iSAM2 holds the limits before and after its relinearization."""
+    before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": after})
     for estimate in (before, after, batch):

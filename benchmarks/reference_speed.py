@@ -53,7 +53,7 @@ def on_recording(recording: Path, runs: int) -> list[Row]:
     return [
         row(f"{name}: real time", real_time, " times", least=LEAST_REAL_TIME),
         row(f"{name}: share outside {INCREMENTAL}", 100.0 * outside, "%", most=MOST_OUTSIDE),
-        row(f"of that, {OTHER} (covariances, copies, last relinearisation)", 100.0 * other, "%"),
+        row(f"of that, {OTHER} (covariances, copies, last relinearization)", 100.0 * other, "%"),
         row("of that, ours (Python, numpy, building factors)", 100.0 * (outside - other), "%"),
     ]
 

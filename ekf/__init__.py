@@ -1,19 +1,18 @@
-"""The filters: dead reckoning (equation 9), landmark mapping (10 to 12), the documented SLAM (13) and the joint one."""
+"""The filters: dead reckoning, landmark mapping, the documented decoupled EKF, and EKF-SLAM with one joint state."""
 
 from .dead_reckoning import dead_reckoning
-from .gyro_bias import GyroBiasPrior
-from .joint import joint_ekf
-from .joint_settings import JointSettings, Linearisation
-from .joint_variants import joint_ekf_bias, joint_ekf_first_estimate, joint_ekf_textbook, joint_ekf_ungated
-from .landmark_chart import Coordinates
-from .mapping import landmark_mapping
-from .slam import ekf
+from .decoupled_ekf import ekf
+from .joint.estimators import joint_ekf, joint_ekf_bias, joint_ekf_first_estimate, joint_ekf_textbook, joint_ekf_ungated
+from .joint.gyro_bias import GyroBiasPrior
+from .joint.landmark_representation import LandmarkRepresentation
+from .joint.settings import JointSettings, Linearization
+from .landmark_mapping import landmark_mapping
 
 __all__ = [
-    "Coordinates",
     "GyroBiasPrior",
     "JointSettings",
-    "Linearisation",
+    "LandmarkRepresentation",
+    "Linearization",
     "dead_reckoning",
     "ekf",
     "joint_ekf",

@@ -1,4 +1,4 @@
-"""Dead reckoning (equation 9): the velocities alone, mean and covariance."""
+"""Dead reckoning (equation 9): mean and covariance from the velocities alone."""
 
 import time
 
@@ -14,10 +14,10 @@ from .pose_update import predicted_covariance
 
 
 def dead_reckoning(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """The path of the increments, with its covariance (equation 9), and the landmarks seen from it.
+    """Path of the increments with its covariance (equation 9).
 
-    It uses no observation. Its landmarks, which tables ask for, are those of the prior where the problem has one
-    (the average of their back-projections), else triangulated along its path.
+    No observation corrects it. Its landmarks are those of the prior where the problem has one (the average of their
+    back-projections), else triangulated along the path.
     """
     start = time.perf_counter()
     world_T_imu = dead_reckoned_path(problem.increment, problem.initial_pose)
@@ -41,7 +41,7 @@ def dead_reckoning(problem: Problem, progress: Progress | None = None) -> Estima
 
 
 def propagated_covariance(problem: Problem) -> FloatArray:
-    """(T, 6, 6) covariances of the dead-reckoned poses (equation 9)."""
+    """Covariances (T, 6, 6) of the dead-reckoned poses (equation 9)."""
     steps = se3.exp(problem.increment)
     covariance = np.empty((problem.n_frames, 6, 6))
     covariance[0] = problem.initial_covariance

@@ -1,4 +1,4 @@
-"""The landmark half of the filter (equations 11 and 12), on independent 3x3 blocks.
+"""Landmark update (equations 11 and 12) on independent 3x3 blocks, for known poses.
 
 With the poses given, landmarks are conditionally independent: the report's 3M x 3M covariance is exactly block
 diagonal, and its update equals, block by block,
@@ -17,8 +17,8 @@ from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import predict, squared_norm
 
 
-class LandmarkBlocks:
-    """The means (m, 3) and covariances (m, 3, 3) of m independent landmarks, in the world frame."""
+class IndependentLandmarks:
+    """Means (m, 3), m, and covariances (m, 3, 3), m^2, of m independent landmarks in the world frame."""
 
     def __init__(self, problem: Problem, measurement: StereoMeasurement) -> None:
         m = len(problem.features)
@@ -38,7 +38,7 @@ class LandmarkBlocks:
     def update(
         self, world_T_imu: FloatArray, row: IntArray, pixel: FloatArray, weight: FloatArray | None = None
     ) -> None:
-        """Equations 11 and 12 for observations (n, 4) of the landmarks `row` (n,), seen from a pose (4, 4).
+        """Update landmarks `row` (n,) with pixels (n, 4) observed from a pose (4, 4) (equations 11 and 12).
 
         `weight` (n,) multiplies V^-1 of each observation; without it the kernel decides, of innovations whitened by
         H Sigma H^T + V. Landmarks that are not yet known start at their back-projection, with the information that
@@ -52,7 +52,7 @@ class LandmarkBlocks:
             self.known[row[fresh]] = True
         predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
         residual, rows, variance = model.documented_rows(pixel, predicted.pixel)
-        H = predicted.by_point()[:, rows, :3]
+        H = predicted.point_jacobian()[:, rows, :3]
         if weight is None:
             weight = np.ones(len(row))
             if model.kernel is not None:
@@ -75,7 +75,7 @@ class LandmarkBlocks:
         return squared_norm(residual, S)
 
     def covariance(self) -> FloatArray:
-        """(m, 3, 3) m^2; NaN for landmarks that were never seen."""
+        """Covariances (m, 3, 3), m^2; NaN for landmarks without an observation."""
         covariance = np.full_like(self.root_information, np.nan)
         half = np.linalg.inv(self.root_information[self.known])
         covariance[self.known] = half @ np.swapaxes(half, 1, 2)

@@ -1,4 +1,4 @@
-"""The pose half of the filter: prediction (equation 9) and update (equation 13)."""
+"""Pose prediction (equation 9) and measurement update (equation 13) with known landmarks."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from fgbaseline.geometry.measurement import predict, squared_norm
 
 
 class PoseInnovation(NamedTuple):
-    """What n observations of known landmarks say of a pose, in r rows each."""
+    """Innovation of n observations of known landmarks, in r rows each, with its Jacobian by the pose."""
 
     residual: FloatArray
     """(n, r) z - z~, px"""
@@ -19,8 +19,8 @@ class PoseInnovation(NamedTuple):
     variance: FloatArray
     """(r,) of each row, px^2"""
 
-    def squared_norms(self, covariance: FloatArray) -> FloatArray:
-        """(n,) r^T (H Sigma H^T + V)^-1 r of each observation alone, for three rows and a Sigma (6, 6)."""
+    def nis_per_observation(self, covariance: FloatArray) -> FloatArray:
+        """NIS (n,) of each observation alone, r^T (H Sigma H^T + V)^-1 r, for three rows and a Sigma (6, 6)."""
         H = self.jacobian
         return squared_norm(self.residual, H @ covariance @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
 
@@ -38,11 +38,11 @@ def pose_innovation(
     """
     predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
     residual, rows, variance = measurement.documented_rows(pixel, predicted.pixel)
-    return PoseInnovation(residual, predicted.by_pose()[:, rows], variance)
+    return PoseInnovation(residual, predicted.pose_jacobian()[:, rows], variance)
 
 
 class PosePosterior(NamedTuple):
-    """The result of equation 13."""
+    """Posterior of the pose (equation 13)."""
 
     correction: FloatArray
     """(6,) K (z - z~), the right perturbation to apply to the predicted pose"""
@@ -50,12 +50,12 @@ class PosePosterior(NamedTuple):
     """(6, 6) (I - K H) Sigma"""
     innovation_condition: float
     """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
-    squared_norm: float
+    nis: float
     """(z - z~)^T (H Sigma H^T + V)^-1 (z - z~), over all rows of each observation"""
 
 
 def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
-    """Equation 13 in a form whose cost is linear in the observations, and that keeps the covariance positive.
+    """Pose update (equation 13) in square-root form: linear cost in the observations, positive definite result.
 
     With Sigma = L L^T and B = V^-1/2 H L: (I - K H) Sigma = L (I + B^T B)^-1 L^T, and L^-1 K (z - z~) is the least
     squares solution of [B; I] x = [V^-1/2 (z - z~); 0]. The QR decomposition [B; I] = Q R gives both without forming
@@ -84,7 +84,7 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
 
 
 def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
-    """(6, 6) (I - K H) Sigma with the arithmetic that equation 13 prints, whatever that loses.
+    """Posterior covariance (6, 6) as equation 13 prints it, (I - K H) Sigma, with its rounding errors.
 
     Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
     """
@@ -95,7 +95,10 @@ def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weigh
 
 
 def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatArray) -> FloatArray:
-    """Sigma (6, 6) after a motion `step` (4, 4) with noise W (6, 6): F Sigma F^T + W, F = exp(-tau u^curly) (eq. 9)."""
+    """Predicted covariance (6, 6) after a motion `step` (4, 4) with noise W (6, 6) (equation 9).
+
+    F Sigma F^T + W with F = exp(-tau u^curly).
+    """
     F = se3.adjoint(se3.inverse(step))
     predicted: FloatArray = F @ covariance @ F.T + noise
     return 0.5 * (predicted + predicted.T)

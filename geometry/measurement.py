@@ -171,7 +171,7 @@ class Prediction:
         along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.seen.near.size))
         return np.ascontiguousarray(self.camera.rows_along(self.seen, along).transpose(2, 0, 1)).reshape(-1, 4)
 
-    def by_pose(self) -> FloatArray:
+    def pose_jacobian(self) -> FloatArray:
         """(n, 3, 6) derivatives by the right perturbation [v, w] of world_T_imu: H of equation 13.
 
         T exp(delta) moves the point s in the IMU's frame by -hat(delta) s = [-s4 I, hat(s)] delta.
@@ -184,7 +184,7 @@ class Prediction:
         np.matmul(J, so3.hat3(s[:3].T), out=H[:, :, 3:])
         return H
 
-    def by_point(self) -> FloatArray:
+    def point_jacobian(self) -> FloatArray:
         """(n, 3, 4) derivatives by the homogeneous world point."""
         return np.asarray(self._by_camera_point @ (self.cam_T_imu @ self.imu_T_world)).reshape(-1, 3, 4)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
 from fgbaseline.data.problem import HuberKernel, Problem
-from fgbaseline.ekf import Coordinates, GyroBiasPrior, Linearisation
+from fgbaseline.ekf import GyroBiasPrior, LandmarkRepresentation, Linearization
 from fgbaseline.geometry import FloatArray, StereoCamera
 
 from .dense_filter import hat3, odot, u_curly_hat, u_hat
@@ -89,8 +89,8 @@ class DenseJointFilter:
     """The filter on a problem."""
 
     problem: Problem
-    coordinates: Coordinates = Coordinates.INVERSE_DEPTH
-    linearisation: Linearisation = Linearisation.TEXTBOOK
+    coordinates: LandmarkRepresentation = LandmarkRepresentation.INVERSE_DEPTH
+    linearization: Linearization = Linearization.TEXTBOOK
     gyro_bias: GyroBiasPrior | None = None
     pose: FloatArray = field(init=False)
     P: FloatArray = field(init=False)
@@ -131,12 +131,12 @@ class DenseJointFilter:
             F[:6, 6:9] = -dt * right_jacobian(u)[:, 3:]
             Q[6:9, 6:9] = self.gyro_bias.walk**2 * dt * np.eye(3)
         predicted = self.pose @ expm(u_hat(u))
-        if self.linearisation is Linearisation.FIRST_ESTIMATE:
+        if self.linearization is Linearization.FIRST_ESTIMATE:
             F[:6, :6] = adjoint(np.linalg.inv(predicted) @ self.as_predicted)
         self.pose = predicted
         self.P = F @ self.P @ F.T + Q
 
-    def linearised(
+    def linearized(
         self, landmark: Landmark, pose: FloatArray, xi: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Predicted pixels (4,), their derivatives by the pose (4, 6) and by xi (4, 3)."""
@@ -185,9 +185,9 @@ class DenseJointFilter:
         residual, H = np.zeros(4 * len(seen)), np.zeros((4 * len(seen), len(self.P)))
         for i, j in enumerate(seen):
             landmark = self.landmarks[j]
-            predicted, H_pose, H_xi = self.linearised(landmark, self.pose, landmark.xi)
-            if self.linearisation is Linearisation.FIRST_ESTIMATE:
-                _, H_pose, H_xi = self.linearised(landmark, self.as_predicted, landmark.first)
+            predicted, H_pose, H_xi = self.linearized(landmark, self.pose, landmark.xi)
+            if self.linearization is Linearization.FIRST_ESTIMATE:
+                _, H_pose, H_xi = self.linearized(landmark, self.as_predicted, landmark.first)
             rows = slice(4 * i, 4 * i + 4)
             residual[rows] = z[i] - predicted
             H[rows, :6] = H_pose
@@ -203,7 +203,7 @@ class DenseJointFilter:
             self.bias = self.bias + delta[6:9]
         for landmark in self.landmarks.values():
             landmark.xi = landmark.xi + delta[landmark.start : landmark.start + 3]
-        if self.linearisation is Linearisation.INVARIANT:
+        if self.linearization is Linearization.INVARIANT:
             # B N- = N+, where N- [Ad(T-), 0] projects onto N- along the landmarks.
             B = np.eye(len(self.P))
             B[:, :6] += (self.unobservable() - before) @ adjoint(pose)
@@ -229,13 +229,13 @@ class DenseJointFilter:
         z = camera.fu * camera.baseline / (uL - uR)
         x, y = (uL - camera.cu) / camera.fu, (0.5 * (vL + vR) - camera.cv) / camera.fv
         world_T_cam = self.pose @ self.problem.sequence.imu_T_cam
-        if self.coordinates is Coordinates.WORLD:
+        if self.coordinates is LandmarkRepresentation.WORLD:
             chart, xi = None, (world_T_cam @ np.array([x * z, y * z, z, 1.0]))[:3]
         else:
             chart, xi = world_T_cam, np.array([x, y, 1.0 / z])
         landmark = Landmark(0, xi, xi, chart)
-        _, H_pose, H_xi = self.linearised(
-            landmark, self.as_predicted if self.linearisation is Linearisation.FIRST_ESTIMATE else self.pose, xi
+        _, H_pose, H_xi = self.linearized(
+            landmark, self.as_predicted if self.linearization is Linearization.FIRST_ESTIMATE else self.pose, xi
         )
         A = np.linalg.inv(H_xi.T @ H_xi) @ H_xi.T
         G = np.zeros((3, len(self.P)))

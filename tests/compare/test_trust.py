@@ -16,7 +16,8 @@ from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import disparity
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import full_graph
+from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
 
@@ -236,7 +237,7 @@ def test_the_cost_is_that_of_the_four_rows_and_of_the_graph(kernel: data.HuberKe
     problem = plain_problem(Scene().sequence(), kernel)
     estimate = smoother.isam2(problem)
     # But for the prior of the first pose, which it leaves out.
-    graph, values = whole_graph(problem), values_at(estimate.world_T_imu, estimate.landmarks)
+    graph, values = full_graph(problem), values_from_state(estimate.world_T_imu, estimate.landmarks)
     expected = graph.error(values) - graph.at(0).error(values)
     assert cost(problem, estimate, problem.mask) == pytest.approx(expected, rel=1e-9)
 

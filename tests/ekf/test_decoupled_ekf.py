@@ -12,9 +12,9 @@ from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, Problem, Reading, Status
 from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
-from fgbaseline.ekf.landmark_update import LandmarkBlocks
-from fgbaseline.ekf.mapping import map_along
-from fgbaseline.ekf.slam import _loss_as_printed
+from fgbaseline.ekf.decoupled_ekf import _printed_form_failure
+from fgbaseline.ekf.landmark_mapping import map_landmarks
+from fgbaseline.ekf.landmark_update import IndependentLandmarks
 from fgbaseline.geometry import FloatArray, HuberKernel, se3
 from fgbaseline.geometry.measurement import measured_rows, predict
 
@@ -143,7 +143,7 @@ def test_a_landmark_without_prior_starts_where_it_is_first_seen_with_what_that_s
     problem = plain_problem(Scene(frames=2, n_points=5, seed=seed).sequence())
     pose = se3.exp(np.random.default_rng(seed).normal(size=6))
     pixel = problem.sequence.observations.pixel[:5]
-    blocks = LandmarkBlocks(problem, problem.measurement)  # V = 0.25 px^2
+    blocks = IndependentLandmarks(problem, problem.measurement)  # V = 0.25 px^2
     blocks.update(pose, np.arange(5), pixel, np.ones(5))
     in_camera = problem.sequence.camera.triangulate(pixel)
     # The right image's row moves the point a little, since depth and height come from uL, vL, uR only.
@@ -161,7 +161,7 @@ def test_a_landmark_without_prior_starts_where_it_is_first_seen_with_what_that_s
 def test_a_mapped_landmark_is_where_its_sights_meet() -> None:
     sequence = Scene(sigma_pixel=0.0, sigma_velocity=(0.0, 0.0)).sequence()
     problem = plain_problem(sequence)
-    blocks, _ = map_along(problem, dead_reckoned_path(problem.increment))
+    blocks, _ = map_landmarks(problem, dead_reckoned_path(problem.increment))
     assert sequence.truth is not None
     assert sequence.truth.landmarks is not None
     np.testing.assert_allclose(blocks.mean, sequence.truth.landmarks, rtol=1e-8, atol=1e-8)
@@ -203,11 +203,11 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
 def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
     weight = np.ones(12)
-    assert _loss_as_printed(1e-6 * np.eye(6), innovation, weight) == ""
+    assert _printed_form_failure(1e-6 * np.eye(6), innovation, weight) == ""
     # So small beside the noise of the pixels that the gain changes nothing.
     lost = "leaves (I - K H) Sigma as printed with an eigenvalue of -1.0e-12"
-    assert _loss_as_printed(-1e-12 * np.eye(6), innovation, weight) == lost
-    assert _loss_as_printed(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
+    assert _printed_form_failure(-1e-12 * np.eye(6), innovation, weight) == lost
+    assert _printed_form_failure(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
 
 
 def test_a_singular_innovation_is_told_in_words_and_figures() -> None:
@@ -232,11 +232,11 @@ def test_mapping_weighs_an_innovation_by_its_own_covariance(seed: int, threshold
     problem = plain_problem(Scene(frames=2, n_points=5, seed=seed).sequence(), kernel)
     pixel, cam_T_imu = problem.sequence.observations.pixel, se3.inverse(KITTI.imu_T_cam)
     wrong = pixel[5:] + np.random.default_rng(seed).normal(size=(5, 4)) * 3.0
-    blocks, expected = (LandmarkBlocks(problem, problem.measurement) for _ in range(2))
+    blocks, expected = (IndependentLandmarks(problem, problem.measurement) for _ in range(2))
     for each in (blocks, expected):
         each.update(np.eye(4), np.arange(5), pixel[:5])
     sigma, predicted = blocks.covariance(), predict(KITTI.camera, cam_T_imu, np.eye(4), blocks.mean)
-    H, residual = predicted.by_point()[:, :, :3], measured_rows(wrong) - predicted.pixel
+    H, residual = predicted.point_jacobian()[:, :, :3], measured_rows(wrong) - predicted.pixel
     S = H @ sigma @ np.swapaxes(H, 1, 2) + 0.25 * np.diag([1.0, 1.0, 0.5])
     norm = np.sqrt([r @ np.linalg.solve(s, r) for r, s in zip(residual, S, strict=True)])
     expected.update(np.eye(4), np.arange(5), wrong, np.minimum(1.0, threshold / norm))

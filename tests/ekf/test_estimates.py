@@ -8,7 +8,7 @@ import pytest
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Problem
-from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
 from fgbaseline.geometry import FgbaselineError
 
 from ..builders.synthetic import drive
@@ -46,7 +46,7 @@ def test_it_has_its_name_the_time_of_each_frame_and_tells_how_far_it_is(name: st
 
 
 def test_the_textbook_is_in_the_world_at_the_newest_estimate() -> None:
-    assert JointSettings.textbook() == JointSettings(Coordinates.WORLD, Linearisation.TEXTBOOK, gate=None)
+    assert JointSettings.textbook() == JointSettings(LandmarkRepresentation.WORLD, Linearization.TEXTBOOK, gate=None)
     assert ekf.joint_ekf_textbook is OURS["joint-ekf-textbook"]
 
 

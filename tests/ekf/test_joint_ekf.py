@@ -11,17 +11,24 @@ from scipy.stats import chi2
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
-from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
-from fgbaseline.ekf.joint_update import Innovation, NotPositiveDefiniteError, StackedJacobian, correct
-from fgbaseline.ekf.landmark_chart import chart, coordinates_of, generators, homogeneous, moved_by, world_points
-from fgbaseline.ekf.screening import screened
+from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
+from fgbaseline.ekf.joint.gating import gate_observations
+from fgbaseline.ekf.joint.landmark_representation import (
+    chart,
+    coordinates_of,
+    generators,
+    homogeneous,
+    motion_jacobian,
+    world_points,
+)
+from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 
 SCENE = Scene().sequence()
-EVERY_WAY = [JointSettings(c, way) for c in Coordinates for way in Linearisation]
+EVERY_WAY = [JointSettings(c, way) for c in LandmarkRepresentation for way in Linearization]
 
 
 def random_pose(seed: int) -> FloatArray:
@@ -38,8 +45,8 @@ def assert_covariances(covariances: FloatArray) -> None:
 # The pieces
 
 
-@given(st.integers(0, 10_000), st.sampled_from(Coordinates))
-def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: Coordinates) -> None:
+@given(st.integers(0, 10_000), st.sampled_from(LandmarkRepresentation))
+def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: LandmarkRepresentation) -> None:
     random = np.random.default_rng(seed)
     camera, T = SCENE.camera, random_pose(seed)
     rows = np.column_stack([random.uniform(100, 900, 4), random.uniform(50, 90, 4), random.uniform(50, 300, 4)])
@@ -55,11 +62,11 @@ def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: 
     np.testing.assert_allclose(predicted(np.zeros(6), np.zeros(3)), rows, rtol=1e-9)
     seen = predict(camera, cam_T_imu, T, homogeneous(charts, xi))
     h = 1e-6
-    by_pose = [(predicted(h * e, np.zeros(3)) - predicted(-h * e, np.zeros(3))) / (2 * h) for e in np.eye(6)]
-    np.testing.assert_allclose(seen.by_pose(), np.stack(by_pose, axis=2), rtol=1e-5, atol=1e-3)
+    pose_jacobian = [(predicted(h * e, np.zeros(3)) - predicted(-h * e, np.zeros(3))) / (2 * h) for e in np.eye(6)]
+    np.testing.assert_allclose(seen.pose_jacobian(), np.stack(pose_jacobian, axis=2), rtol=1e-5, atol=1e-3)
     unit = np.abs(xi).min() * h
     by_xi = [(predicted(np.zeros(6), unit * e) - predicted(np.zeros(6), -unit * e)) / (2 * unit) for e in np.eye(3)]
-    analytic = seen.by_point() @ charts[:, :, :3]
+    analytic = seen.point_jacobian() @ charts[:, :, :3]
     np.testing.assert_allclose(analytic, np.stack(by_xi, axis=2), rtol=1e-4, atol=1e-4 * np.abs(analytic).max())
 
 
@@ -77,13 +84,13 @@ def test_three_rows_say_what_four_say(seed: int) -> None:
     for i, j in enumerate(slot):
         uL, uR, v = 0, 1, 2
         for row, source in enumerate((uL, v, uR, v)):
-            H[i, row, :6] = three.by_pose[i, source]
-            H[i, row, 6 + 3 * j : 9 + 3 * j] = three.by_landmark[i, source]
+            H[i, row, :6] = three.pose_jacobian[i, source]
+            H[i, row, 6 + 3 * j : 9 + 3 * j] = three.landmark_jacobian[i, source]
     H = H.reshape(4 * n, size)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V * np.eye(4 * n))
     updated = P.copy()
     innovation = Innovation.of(three, measured_rows(residual), updated)
-    delta = correct(innovation, innovation.factorised(V * ROW_VARIANCE), updated)
+    delta = kalman_update(innovation, innovation.factorize(V * ROW_VARIANCE), updated)
     np.testing.assert_allclose(delta, K @ residual.reshape(-1), rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(updated, (np.eye(size) - K @ H) @ P, rtol=1e-6, atol=1e-9 * np.abs(P).max())
     np.testing.assert_array_equal(updated, updated.T)
@@ -95,12 +102,12 @@ def test_an_update_with_what_is_no_covariance_is_refused_and_changes_nothing() -
     H = StackedJacobian(np.array([0]), np.ones((1, 3, 6)), np.eye(3)[None])
     innovation = Innovation.of(H, np.ones((1, 3)), P)
     with pytest.raises(NotPositiveDefiniteError):
-        correct(innovation, innovation.factorised(np.ones((1, 3))), P)
+        kalman_update(innovation, innovation.factorize(np.ones((1, 3))), P)
     np.testing.assert_array_equal(P, before)
 
 
-@given(st.integers(0, 10_000), st.sampled_from(Coordinates))
-def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: Coordinates) -> None:
+@given(st.integers(0, 10_000), st.sampled_from(LandmarkRepresentation))
+def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: LandmarkRepresentation) -> None:
     random = np.random.default_rng(seed)
     T = random_pose(seed)
     points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)])
@@ -108,9 +115,9 @@ def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: 
     charts = np.tile(chart(coordinates, world_T_cam @ se3.exp(0.1 * random.normal(size=6))), (6, 1, 1))
     xi = coordinates_of(charts, points @ world_T_cam.T)
     seen = predict(SCENE.camera, se3.inverse(SCENE.imu_T_cam), T, homogeneous(charts, xi))
-    nu = moved_by(generators(charts), xi)
-    moved = seen.by_pose() @ se3.adjoint(se3.inverse(T)) + seen.by_point() @ charts[:, :, :3] @ nu
-    assert np.abs(moved).max() < 1e-9 * np.abs(seen.by_pose()).max()
+    nu = motion_jacobian(generators(charts), xi)
+    moved = seen.pose_jacobian() @ se3.adjoint(se3.inverse(T)) + seen.point_jacobian() @ charts[:, :, :3] @ nu
+    assert np.abs(moved).max() < 1e-9 * np.abs(seen.pose_jacobian()).max()
     # and nu is what the name says
     g = 1e-6 * random.normal(size=6)
     there = coordinates_of(charts, homogeneous(charts, xi) @ se3.exp(g).T)
@@ -122,11 +129,11 @@ def test_world_points_come_out_of_their_charts_with_the_right_spread(seed: int) 
     random = np.random.default_rng(seed)
     C = random_pose(seed)
     points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)]) @ C.T
-    charts = np.tile(chart(Coordinates.INVERSE_DEPTH, C), (6, 1, 1))
+    charts = np.tile(chart(LandmarkRepresentation.INVERSE_DEPTH, C), (6, 1, 1))
     xi = coordinates_of(charts, points)
     found = world_points(charts, xi, np.tile(1e-12 * np.eye(3), (6, 1, 1)))
     np.testing.assert_allclose(found.position, points[:, :3], rtol=1e-9, atol=1e-9)
-    assert found.in_sight.all()
+    assert found.in_front.all()
     steps = 1e-6 * np.eye(3)
     J = np.stack([(homogeneous(charts, xi + e) - homogeneous(charts, xi - e)) / 2e-6 for e in steps], axis=2)
     X = homogeneous(charts, xi)
@@ -138,12 +145,12 @@ def test_world_points_come_out_of_their_charts_with_the_right_spread(seed: int) 
 # The filter
 
 
-@pytest.mark.parametrize("coordinates", Coordinates)
-def test_a_landmark_without_prior_enters_as_with_a_prior_that_says_nothing(coordinates: Coordinates) -> None:
+@pytest.mark.parametrize("coordinates", LandmarkRepresentation)
+def test_a_landmark_without_prior_enters_as_with_a_prior_that_says_nothing(coordinates: LandmarkRepresentation) -> None:
     o = SCENE.observations
     two = plain_problem(replace(SCENE, observations=o.select((o.frame < 2) & (o.landmark < 4))))
     plain = ekf.joint_ekf(two, settings=JointSettings(coordinates))
-    # At its back-projection, where it is linearised the same, but with 1 km of doubt.
+    # At its back-projection, where it is linearized the same, but with 1 km of doubt.
     world_T_cam = two.initial_pose @ SCENE.imu_T_cam
     first = measured_rows(two.observations().pixel[:4])
     X = back_projected(SCENE.camera, first) @ world_T_cam.T
@@ -170,7 +177,7 @@ def test_covariances_are_covariances(seed: int, path: str, how: JointSettings) -
     assert_covariances(estimate.landmarks.covariance)
 
 
-@pytest.mark.parametrize("how", EVERY_WAY, ids=lambda how: f"{how.coordinates}-{how.linearisation}")
+@pytest.mark.parametrize("how", EVERY_WAY, ids=lambda how: f"{how.coordinates}-{how.linearization}")
 def test_where_the_world_has_its_origin_makes_no_difference(how: JointSettings) -> None:
     problem = replace(plain_problem(SCENE), kernel=HuberKernel(1.5))
     G = se3.exp([50.0, -20.0, 7.0, 0.5, -1.0, 2.0])
@@ -181,19 +188,19 @@ def test_where_the_world_has_its_origin_makes_no_difference(how: JointSettings) 
     np.testing.assert_allclose(there.landmarks.position, se3.transform(G, here.landmarks.position), atol=1e-6)
 
 
-@pytest.mark.parametrize("coordinates", Coordinates)
-def test_doubt_about_where_the_world_is_moves_nothing_unless_linearised_by_the_textbook(
-    coordinates: Coordinates,
+@pytest.mark.parametrize("coordinates", LandmarkRepresentation)
+def test_doubt_about_where_the_world_is_moves_nothing_unless_linearized_by_the_textbook(
+    coordinates: LandmarkRepresentation,
 ) -> None:
     problem = replace(matched(drive("town", seconds=5.0, features_per_frame=20.0)), kernel=None)
     doubt = replace(problem, initial_covariance=np.diag(np.repeat([1.0, 0.1], 3)))
     apart = {}
-    for how in Linearisation:
+    for how in Linearization:
         sure, unsure = (ekf.joint_ekf(p, settings=JointSettings(coordinates, how)) for p in (problem, doubt))
         apart[how] = np.abs(sure.world_T_imu - unsure.world_T_imu).max()
-    assert apart[Linearisation.INVARIANT] < 1e-6
-    assert apart[Linearisation.FIRST_ESTIMATE] < 1e-6
-    assert apart[Linearisation.TEXTBOOK] > 1e-3
+    assert apart[Linearization.INVARIANT] < 1e-6
+    assert apart[Linearization.FIRST_ESTIMATE] < 1e-6
+    assert apart[Linearization.TEXTBOOK] > 1e-3
 
 
 def test_a_frame_without_observations_is_a_prediction() -> None:
@@ -419,30 +426,32 @@ def measured(kernel: HuberKernel | None) -> StereoMeasurement:
 def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
     wild: int, tame: int, believed: bool
 ) -> None:
-    verdict = screened(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None))
-    assert verdict.taken.tolist() == [believed] * (wild + tame)
+    verdict = gate_observations(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None))
+    assert verdict.accepted.tolist() == [believed] * (wild + tame)
     assert verdict.rejection is (None if believed else EventKind.FRAME_DISAGREES)
-    always = screened(
+    always = gate_observations(
         np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None, disagreeing_share=None)
     )
-    assert always.plain
+    assert always.full_weight
 
 
 def test_what_is_no_number_disagrees() -> None:
-    assert screened(np.full(5, np.nan), measured(None), JointSettings()).rejection is EventKind.FRAME_DISAGREES
+    assert gate_observations(np.full(5, np.nan), measured(None), JointSettings()).rejection is EventKind.FRAME_DISAGREES
 
 
 def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
     at = chi2.ppf(0.99, 3)
-    gated = screened(np.array([0.0, 0.999 * at, 1.001 * at]), measured(None), JointSettings(gate=0.99))
-    assert gated.taken.tolist() == [True, True, False]
+    gated = gate_observations(np.array([0.0, 0.999 * at, 1.001 * at]), measured(None), JointSettings(gate=0.99))
+    assert gated.accepted.tolist() == [True, True, False]
     assert gated.rejection is EventKind.OUTSIDE_GATE
-    assert screened(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
-    weighted = screened(np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings(gate=None))
+    assert gate_observations(np.array([0.0, 0.999 * at]), measured(None), JointSettings(gate=0.99)).rejection is None
+    weighted = gate_observations(
+        np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings(gate=None)
+    )
     assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
-    assert not weighted.plain
-    assert screened(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).plain
-    assert not gated.plain
+    assert not weighted.full_weight
+    assert gate_observations(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).full_weight
+    assert not gated.full_weight
 
 
 def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it_cost() -> None:

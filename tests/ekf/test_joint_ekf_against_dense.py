@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from fgbaseline import ekf
 from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Observations, Problem, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.ekf import Coordinates, GyroBiasPrior, JointSettings, Linearisation
+from fgbaseline.ekf import GyroBiasPrior, JointSettings, LandmarkRepresentation, Linearization
 from fgbaseline.geometry import FloatArray
 
 from ..builders.dense_joint_filter import DenseJointFilter, Moment
@@ -115,12 +115,12 @@ def same_as_dense(problem: Problem, estimate: Estimate, moments: list[Moment]) -
         same_covariance(covariance, spread)
 
 
-@pytest.mark.parametrize("linearisation", Linearisation)
+@pytest.mark.parametrize("linearization", Linearization)
 @pytest.mark.parametrize("name", ["town, kernel", "loop, uncertain start", "returning", "town, prior"])
-def test_with_a_gyroscope_bias_in_the_state_it_is_still_that_filter(name: str, linearisation: Linearisation) -> None:
+def test_with_a_gyroscope_bias_in_the_state_it_is_still_that_filter(name: str, linearization: Linearization) -> None:
     problem, prior = turning(PROBLEMS[name]), GyroBiasPrior(0.05, 0.003)
-    estimate = ekf.joint_ekf(problem, settings=keeping(linearisation=linearisation, gyro_bias=prior))
-    moments = DenseJointFilter(problem, linearisation=linearisation, gyro_bias=prior).run()
+    estimate = ekf.joint_ekf(problem, settings=keeping(linearization=linearization, gyro_bias=prior))
+    moments = DenseJointFilter(problem, linearization=linearization, gyro_bias=prior).run()
     same_as_dense(problem, estimate, moments)
     assert estimate.gyro_bias is not None
     assert np.abs(estimate.gyro_bias.mean[-1]).max() > 0.003
@@ -129,18 +129,18 @@ def test_with_a_gyroscope_bias_in_the_state_it_is_still_that_filter(name: str, l
         same_covariance(estimate.gyro_bias.covariance[k], moment.joint[6:9, 6:9])
 
 
-@pytest.mark.parametrize("linearisation", Linearisation)
-@pytest.mark.parametrize("coordinates", Coordinates)
+@pytest.mark.parametrize("linearization", Linearization)
+@pytest.mark.parametrize("coordinates", LandmarkRepresentation)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_poses_and_landmarks_are_those_of_the_filter_that_keeps_everything(
-    name: str, coordinates: Coordinates, linearisation: Linearisation
+    name: str, coordinates: LandmarkRepresentation, linearization: Linearization
 ) -> None:
     problem = PROBLEMS[name]
-    estimate = ekf.joint_ekf(problem, settings=keeping(coordinates=coordinates, linearisation=linearisation))
+    estimate = ekf.joint_ekf(problem, settings=keeping(coordinates=coordinates, linearization=linearization))
     assert estimate.status == "ok"
     assert estimate.events == ()
     np.testing.assert_array_equal(estimate.used, problem.mask)
-    same_as_dense(problem, estimate, DenseJointFilter(problem, coordinates, linearisation).run())
+    same_as_dense(problem, estimate, DenseJointFilter(problem, coordinates, linearization).run())
 
 
 def test_a_landmark_that_comes_back_after_it_was_marginalized_is_a_new_one() -> None:

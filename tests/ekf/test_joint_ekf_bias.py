@@ -13,7 +13,7 @@ from fgbaseline.data import Estimate, Sequence
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
-from fgbaseline.ekf import GyroBiasPrior, JointSettings, Linearisation
+from fgbaseline.ekf import GyroBiasPrior, JointSettings, Linearization
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors
@@ -67,9 +67,9 @@ def test_the_right_jacobian_is_the_difference_of_motions(seed: int, angle: float
 
 
 @pytest.mark.parametrize("path", ["town", "handheld"])
-@pytest.mark.parametrize("linearisation", [Linearisation.INVARIANT, Linearisation.FIRST_ESTIMATE])
-def test_a_constant_bias_is_found_to_within_what_the_filter_says(path: PathName, linearisation: Linearisation) -> None:
-    settings = JointSettings(linearisation=linearisation, gyro_bias=GyroBiasPrior())
+@pytest.mark.parametrize("linearization", [Linearization.INVARIANT, Linearization.FIRST_ESTIMATE])
+def test_a_constant_bias_is_found_to_within_what_the_filter_says(path: PathName, linearization: Linearization) -> None:
+    settings = JointSettings(linearization=linearization, gyro_bias=GyroBiasPrior())
     of_pose, of_bias = [], []
     for seed in range(SEEDS):
         sequence = biased(path, seed)
@@ -143,7 +143,7 @@ VARIANTS = {
     "joint-ekf-bias": JointSettings(gyro_bias=GyroBiasPrior()),
     "joint-ekf-ungated": JointSettings(gate=None),
     "joint-ekf-textbook": JointSettings.textbook(),
-    "joint-ekf-first-estimate": JointSettings(linearisation=Linearisation.FIRST_ESTIMATE),
+    "joint-ekf-first-estimate": JointSettings(linearization=Linearization.FIRST_ESTIMATE),
 }
 
 

@@ -1,4 +1,4 @@
-"""Whether the joint filter's covariances tell the truth, on drives whose noise it is told, and what linearisation does.
+"""Whether the joint filter's covariances tell the truth, on drives whose noise it is told, and what linearization does.
 
 `pytest -s tests/ekf/test_joint_ekf_consistency.py` prints the mean NEES (6 if all is right) over 10 seeds.
 """
@@ -12,14 +12,14 @@ import pytest
 from fgbaseline import ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
-from fgbaseline.ekf import Coordinates, JointSettings, Linearisation
+from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
 from fgbaseline.geometry import FloatArray, se3
 
 from ..builders.synthetic import matched
 
 SEEDS = 10
 FRAMES = (1, 5, 10, 20, 50, 100, 199)
-WAYS = {f"{c}, {way}": JointSettings(c, way) for c in Coordinates for way in Linearisation}
+WAYS = {f"{c}, {way}": JointSettings(c, way) for c in LandmarkRepresentation for way in Linearization}
 
 
 @cache
@@ -61,7 +61,7 @@ def test_the_filter_knows_its_error_and_the_textbook_believes_too_much(path: Pat
 
 
 def test_every_way_agrees_on_what_is_nearly_linear() -> None:
-    # With a fiftieth of the noise the updates are small, and all ways of linearising say the same.
+    # With a fiftieth of the noise the updates are small, and all ways of linearizing say the same.
     sequence = simulate(
         Simulation(
             path="handheld",

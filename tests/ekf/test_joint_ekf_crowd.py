@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fgbaseline import ekf
 from fgbaseline.data import Estimate, LandmarkPrior, Problem, Sequence, Status
 from fgbaseline.ekf import JointSettings
-from fgbaseline.ekf.admission import CELL, admitted
+from fgbaseline.ekf.joint.feature_selection import CELL, select_features
 from fgbaseline.geometry import FloatArray, se3
 
 from ..builders.hostile import CROWD, CROWD_FRAMES, HALF, base, crowd
@@ -133,8 +133,8 @@ def test_no_more_enter_than_there_are_places_and_no_place_stays_empty(
     seed: int, n: int, inside: int, places: int
 ) -> None:
     random = np.random.default_rng(seed)
-    enters = admitted(sights(random, n), sights(random, inside), places)
-    assert np.count_nonzero(enters) == min(n, max(places, 0))
+    selected = select_features(sights(random, n), sights(random, inside), places)
+    assert np.count_nonzero(selected) == min(n, max(places, 0))
 
 
 def test_places_go_round_the_image_and_to_the_nearest_of_each_place() -> None:
@@ -144,8 +144,8 @@ def test_places_go_round_the_image_and_to_the_nearest_of_each_place() -> None:
 
     candidates = np.array([row(0, 40.0), row(0, 39.0), row(0, 38.0), row(1, 1.0), row(1, 2.0), row(2, 0.5)])
     nobody = np.empty((0, 3))
-    np.testing.assert_array_equal(admitted(candidates, nobody, 3), [True, False, False, False, True, True])
-    np.testing.assert_array_equal(admitted(candidates, nobody, 4), [True, True, False, False, True, True])
+    np.testing.assert_array_equal(select_features(candidates, nobody, 3), [True, False, False, False, True, True])
+    np.testing.assert_array_equal(select_features(candidates, nobody, 4), [True, True, False, False, True, True])
     # Where some of the first cell are in the state already, others come first.
     inside = np.array([row(0, 5.0), row(0, 6.0)])
-    np.testing.assert_array_equal(admitted(candidates, inside, 3), [False, False, False, True, True, True])
+    np.testing.assert_array_equal(select_features(candidates, inside, 3), [False, False, False, True, True, True])

@@ -8,8 +8,8 @@ from scipy.stats import chi2
 
 from fgbaseline.data import HuberKernel
 from fgbaseline.ekf import ekf, joint_ekf
-from fgbaseline.ekf.innovation_norm import squared_norm_of_known
-from fgbaseline.ekf.joint_update import Factor, NotPositiveDefiniteError
+from fgbaseline.ekf.joint.update import CholeskyFactor, NotPositiveDefiniteError
+from fgbaseline.ekf.nis import decoupled_nis
 from fgbaseline.geometry import se3
 
 from ..builders.synthetic import Scene, first_innovation, plain_problem
@@ -22,10 +22,10 @@ def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
     HPHt = A @ A.T
     before = HPHt.copy()
     expected = residual.reshape(-1) @ np.linalg.solve(HPHt + np.diag(np.tile(variance, 4)), residual.reshape(-1))
-    assert Factor.of(HPHt, residual, variance).squared_norm == pytest.approx(expected, rel=1e-12)
+    assert CholeskyFactor.of(HPHt, residual, variance).nis == pytest.approx(expected, rel=1e-12)
     np.testing.assert_array_equal(HPHt, before)
     with pytest.raises(NotPositiveDefiniteError):
-        Factor.of(-HPHt, residual, variance)
+        CholeskyFactor.of(-HPHt, residual, variance)
 
 
 def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
@@ -36,12 +36,12 @@ def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
     three = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, 0.5, 0, 0.5]])
     H, nu = (three @ innovation.jacobian).reshape(-1, 6), (innovation.residual @ three.T).reshape(-1)
     S = H @ sigma @ H.T + 0.25 * np.diag(np.tile([1.0, 1.0, 0.5], 12))
-    assert squared_norm_of_known(innovation, sigma) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
+    assert decoupled_nis(innovation, sigma) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
 
 
 def test_what_is_no_covariance_has_no_norm() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
-    assert np.isnan(squared_norm_of_known(innovation, np.full((6, 6), np.nan)))
+    assert np.isnan(decoupled_nis(innovation, np.full((6, 6), np.nan)))
 
 
 @pytest.mark.parametrize("told", [1.0, 0.5])

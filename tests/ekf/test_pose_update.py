@@ -185,7 +185,7 @@ def test_the_kernel_lowers_the_weight_beyond_its_threshold_only(seed: int, thres
     pixel[::2] += 100.0 * random.normal(size=pixel[::2].shape)
     kernel, sigma = HuberKernel(threshold), covariance_of(random, 1e-4)
     innovation = pose_innovation(StereoMeasurement(KITTI.camera, 2.25, kernel), CAM_T_IMU, world_T_imu, points, pixel)
-    weight = kernel.weight(innovation.squared_norms(sigma))
+    weight = kernel.weight(innovation.nis_per_observation(sigma))
     R = np.diag([2.25, 2.25, 1.125])
     for r, H, w in zip(innovation.residual, innovation.jacobian, weight, strict=True):
         whitened = np.sqrt(r @ np.linalg.inv(H @ sigma @ H.T + R) @ r)

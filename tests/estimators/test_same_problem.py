@@ -10,17 +10,18 @@ from hypothesis import strategies as st
 from fgbaseline.compare.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
 from fgbaseline.data.diagnose.window_terms import WindowData, joined, pixel_terms
-from fgbaseline.ekf.joint_settings import JointSettings
-from fgbaseline.ekf.joint_update import Innovation, StackedJacobian
+from fgbaseline.ekf.joint.gating import gate_observations
+from fgbaseline.ekf.joint.settings import JointSettings
+from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
-from fgbaseline.ekf.screening import screened
 from fgbaseline.geometry import se3
 from fgbaseline.geometry.measurement import measured_rows, predict, squared_norm
 from fgbaseline.geometry.stereo import PRINTED
 from fgbaseline.geometry.triangulation import triangulate_tracks
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key, pose_key
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import full_graph
+from fgbaseline.smoother.graph.factors import FactorBuilder
+from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 
 from ..builders.synthetic import Scene, plain_problem, with_pixels
 
@@ -59,10 +60,10 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     points, pixel = points[o.landmark[seen]], o.pixel[seen]
     documented = pose_innovation(model, cam_T_imu, pose, points, pixel)
     predicted = predict(s.camera, cam_T_imu, pose, points)
-    residual, by_pose = measured_rows(pixel) - predicted.pixel, predicted.by_pose()
-    by_point = predicted.by_point()[:, :, :3]
+    residual, pose_jacobian = measured_rows(pixel) - predicted.pixel, predicted.pose_jacobian()
+    by_point = predicted.point_jacobian()[:, :, :3]
     np.testing.assert_array_equal(documented.residual, residual)
-    np.testing.assert_array_equal(documented.jacobian, by_pose)
+    np.testing.assert_array_equal(documented.jacobian, pose_jacobian)
     # The judges: residuals of the comparison, and those of the reprojection in four rows.
     four = pixel - s.camera.project(se3.transform(cam_T_imu @ se3.inverse(pose), points))
     np.testing.assert_allclose(measured_rows(four), residual, atol=1e-9)
@@ -77,7 +78,10 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     in_white = by_point / np.sqrt(model.row_variance)[:, None]
     np.testing.assert_allclose(np.moveaxis(window.by_point, 2, 0), in_white, rtol=1e-7, atol=1e-9)
     # The graph.
-    values, factors = values_at(estimate.world_T_imu, estimate.landmarks), Factors(replace(problem, kernel=None))
+    values, factors = (
+        values_from_state(estimate.world_T_imu, estimate.landmarks),
+        FactorBuilder(replace(problem, kernel=None)),
+    )
     turned = np.r_[3:6, 0:3]
     for i, j in enumerate(o.landmark[seen]):
         factor = factors.stereo(k, landmark_key(int(j)), measured_rows(pixel[i]))
@@ -85,7 +89,7 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
         A, b = factor.linearize(values).jacobian()
         np.testing.assert_allclose(b, white[i], rtol=1e-7, atol=1e-8)
         scale = np.sqrt(model.row_variance)[:, None]
-        expected = {pose_key(k): by_pose[i][:, turned], landmark_key(int(j)): by_point[i]}
+        expected = {pose_key(k): pose_jacobian[i][:, turned], landmark_key(int(j)): by_point[i]}
         blocks = np.concatenate([expected[key] for key in factor.keys()], axis=1)  # noqa: SIM118
         np.testing.assert_allclose(A * scale, blocks, rtol=1e-6, atol=1e-6)
 
@@ -103,12 +107,12 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     norm = np.sqrt((residual**2 / (V * np.array([1.0, 1.0, 0.5]))).sum(axis=1))
     expected = np.minimum(1.0, threshold / norm)
     # The documented filter and the joint one, with Sigma = 0.
-    ekf = model.weight(pose_innovation(model, cam_T_imu, pose, points, pixel).squared_norms(np.zeros((6, 6))))
+    ekf = model.weight(pose_innovation(model, cam_T_imu, pose, points, pixel).nis_per_observation(np.zeros((6, 6))))
     np.testing.assert_allclose(ekf, expected, rtol=1e-9)
     n = len(points)
-    H = StackedJacobian(np.arange(n), predicted.by_pose(), predicted.by_point()[:, :, :3])
+    H = StackedJacobian(np.arange(n), predicted.pose_jacobian(), predicted.point_jacobian()[:, :, :3])
     innovation = Innovation.of(H, residual, np.zeros((6 + 3 * n, 6 + 3 * n)))
-    joint = screened(innovation.squared_norms(model.row_variance), model, JointSettings()).weight
+    joint = gate_observations(innovation.nis_per_observation(model.row_variance), model, JointSettings()).weight
     np.testing.assert_allclose(joint, expected, rtol=1e-9)
     # The diagnosis.
     data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), measured_rows(pixel), np.zeros((1, 6)), np.ones(1))
@@ -116,8 +120,8 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     terms = pixel_terms(model, s.imu_T_cam, joined([(data, two, points)]), two, points, np.zeros((1, 8)))
     np.testing.assert_allclose(terms.weight, expected, rtol=1e-9)
     # The graph: GTSAM multiplies residual and Jacobian by the root of the weight.
-    values = values_at(estimate.world_T_imu, estimate.landmarks)
-    robust, plain = Factors(problem), Factors(replace(problem, kernel=None))
+    values = values_from_state(estimate.world_T_imu, estimate.landmarks)
+    robust, plain = FactorBuilder(problem), FactorBuilder(replace(problem, kernel=None))
     for i, j in enumerate(o.landmark[seen]):
         weighted, full = (
             factors.stereo(1, landmark_key(int(j)), measured_rows(pixel[i])).linearize(values).jacobian()[1]
@@ -149,8 +153,8 @@ def test_one_state_has_one_cost_in_the_graph_the_comparison_and_the_triangulatio
     problem = disagreeing(seed, kernel)
     first, second = disturbed(problem, seed), disturbed(problem, seed + 1)
     first, second = (replace(e, world_T_imu=first.world_T_imu) for e in (first, second))
-    graph = whole_graph(problem)
-    by_graph = [graph.error(values_at(e.world_T_imu, e.landmarks)) for e in (first, second)]
+    graph = full_graph(problem)
+    by_graph = [graph.error(values_from_state(e.world_T_imu, e.landmarks)) for e in (first, second)]
     by_numpy = [cost(problem, e, problem.mask) for e in (first, second)]
     o, model = problem.observations(), problem.measurement
     poses = first.world_T_imu[o.frame] @ problem.sequence.imu_T_cam

@@ -100,8 +100,8 @@ def camera_jacobian(patch: pytest.MonkeyPatch) -> None:
 
 def joint_jacobian(patch: pytest.MonkeyPatch) -> None:
     """Of the three rows by the pose, in the joint filter."""
-    right = Prediction.by_pose
-    patch.setattr(Prediction, "by_pose", lambda seen: -right(seen))
+    right = Prediction.pose_jacobian
+    patch.setattr(Prediction, "pose_jacobian", lambda seen: -right(seen))
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ from fgbaseline import data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray
-from fgbaseline.smoother.convention import reordered
-from fgbaseline.smoother.covariances import covariances
-from fgbaseline.smoother.keys import landmark_key, pose_key
-from fgbaseline.smoother.pieces import piecewise
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import full_graph
+from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent, values_from_state
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
+from fgbaseline.smoother.graph.marginal_covariances import marginal_covariances
+from fgbaseline.smoother.initialization.windowed_initialization import optimize_in_windows
 
 from ..builders.four_rows import cost, information
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
@@ -73,13 +73,13 @@ def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
     estimate = smoother.isam2(problem)
     assert estimate.covariance is not None
     kept = replace(problem, excluded=np.where(estimate.used, 0, 2).astype(np.uint8))
-    graph, values = whole_graph(kept), values_at(estimate.world_T_imu, estimate.landmarks)
-    swept, marginals = covariances(graph, values), gtsam.Marginals(graph, values)
+    graph, values = full_graph(kept), values_from_state(estimate.world_T_imu, estimate.landmarks)
+    swept, marginals = marginal_covariances(graph, values), gtsam.Marginals(graph, values)
     assert len(swept) == problem.n_frames + len(estimate.landmarks)
     for key in [pose_key(1), pose_key(20), pose_key(problem.n_frames - 1), landmark_key(int(kept.features[0]))]:
         expected = marginals.marginalCovariance(key)
         np.testing.assert_allclose(swept[key], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    np.testing.assert_allclose(estimate.covariance[9], reordered(swept[pose_key(9)]), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(estimate.covariance[9], reorder_tangent(swept[pose_key(9)]), rtol=1e-6, atol=1e-12)
 
 
 def test_an_answer_that_is_given_is_not_found_again() -> None:
@@ -112,7 +112,8 @@ def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> N
     assert truth is not None
     path = dead_reckoned_path(problem.increment, problem.initial_pose)
     near, far = (
-        np.linalg.norm((p - truth.world_T_imu)[:, :3, 3], axis=1).max() for p in (piecewise(problem, path), path)
+        np.linalg.norm((p - truth.world_T_imu)[:, :3, 3], axis=1).max()
+        for p in (optimize_in_windows(problem, path), path)
     )
     assert far > 5.0
     assert near < 0.2 * far

@@ -8,14 +8,15 @@ from hypothesis import strategies as st
 
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.measurement import measured_rows
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
-from fgbaseline.smoother.keys import landmark_key, pose_key
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.graph.factors import FactorBuilder
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
+from fgbaseline.smoother.isam2.checkpointed_isam2 import CheckpointedISAM2
 
 from ..builders.synthetic import Scene, plain_problem
 
 PROBLEM = plain_problem(Scene(frames=12, n_points=6).sequence())
-FACTORS = Factors(PROBLEM)
+FACTORS = FactorBuilder(PROBLEM)
 TRUTH = PROBLEM.sequence.truth
 
 
@@ -31,7 +32,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     assert TRUTH is not None
     assert TRUTH.landmarks is not None
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    graph.push_back(FACTORS.first_pose() if k == 0 else FACTORS.motion(k - 1))
+    graph.push_back(FACTORS.pose_prior() if k == 0 else FACTORS.between(k - 1))
     values.insert(pose_key(k), gtsam.Pose3(TRUTH.world_T_imu[k]))
     o = PROBLEM.observations()
     for i in np.flatnonzero(o.frame == k):
@@ -42,7 +43,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     return graph, values
 
 
-def behind_the_camera(isam: RestorableISAM2, k: int) -> None:
+def behind_the_camera(isam: CheckpointedISAM2, k: int) -> None:
     """An update with a new landmark behind the camera, whose Jacobian is zero."""
     assert TRUTH is not None
     graph, values = frame(k)
@@ -51,14 +52,14 @@ def behind_the_camera(isam: RestorableISAM2, k: int) -> None:
     isam.update(graph, values)
 
 
-def unknown_variable(isam: RestorableISAM2, k: int) -> None:
+def unknown_variable(isam: CheckpointedISAM2, k: int) -> None:
     """An update with a factor on a variable that is not there."""
     graph, values = frame(k)
     graph.push_back(FACTORS.stereo(k, landmark_key(98), np.array([600.0, 590.0, 180.0])))
     isam.update(graph, values)
 
 
-def everything(isam: RestorableISAM2) -> FloatArray:
+def everything(isam: CheckpointedISAM2) -> FloatArray:
     values = isam.tree.calculateEstimate()
     poses = [values.atPose3(key).matrix().ravel() for key in values.keys() if chr(gtsam.Symbol(key).chr()) == "x"]  # noqa: SIM118
     points = [values.atPoint3(key) for key in values.keys() if chr(gtsam.Symbol(key).chr()) != "x"]  # noqa: SIM118
@@ -69,7 +70,7 @@ def everything(isam: RestorableISAM2) -> FloatArray:
 @pytest.mark.parametrize("interval", [1, 3, 50])
 def test_after_a_failure_the_estimate_is_what_it_was(failure: object, interval: int) -> None:
     assert callable(failure)
-    isam = RestorableISAM2(parameters(), interval)
+    isam = CheckpointedISAM2(parameters(), interval)
     for k in range(8):
         isam.update(*frame(k))
     before, slots = everything(isam), isam.tree.getFactorsUnsafe().size()
@@ -81,7 +82,7 @@ def test_after_a_failure_the_estimate_is_what_it_was(failure: object, interval: 
 
 
 def test_the_failure_names_the_variable_where_gtsam_does() -> None:
-    isam = RestorableISAM2(parameters())
+    isam = CheckpointedISAM2(parameters())
     isam.update(*frame(0))
     with pytest.raises(IndeterminateSystemError) as caught:
         behind_the_camera(isam, 1)
@@ -91,7 +92,7 @@ def test_the_failure_names_the_variable_where_gtsam_does() -> None:
 @settings(max_examples=15, deadline=None)
 @given(st.sets(st.integers(1, 11)), st.integers(1, 5))
 def test_a_run_with_failures_is_the_run_without_them_slot_for_slot(failing: set[int], interval: int) -> None:
-    smooth, troubled = RestorableISAM2(parameters(), 50), RestorableISAM2(parameters(), interval)
+    smooth, troubled = CheckpointedISAM2(parameters(), 50), CheckpointedISAM2(parameters(), interval)
     for k in range(12):
         if k in failing:
             with pytest.raises(IndeterminateSystemError):

@@ -12,9 +12,9 @@ from fgbaseline import data, smoother
 from fgbaseline.data import NoiseSettings, Problem
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.smoother import incremental
-from fgbaseline.smoother.elimination import CROWD, FRAMES, GROUPS, Chronology
-from fgbaseline.smoother.keys import TAIL, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.isam2 import estimator
+from fgbaseline.smoother.isam2.elimination_ordering import GROUP_FRAMES, MANY_LANDMARKS, N_GROUPS, EliminationOrdering
 
 LIFE = 3
 """frames that a landmark of these drives is seen"""
@@ -30,10 +30,10 @@ def seen_at(frame: int) -> list[int]:
 
 
 def test_what_came_first_is_eliminated_first() -> None:
-    chronology = Chronology()
+    ordering = EliminationOrdering()
     frame = 0
-    for frame in range(2 * FRAMES * GROUPS):
-        groups = chronology.groups(frame, seen_at(frame))
+    for frame in range(2 * GROUP_FRAMES * N_GROUPS):
+        groups = ordering.groups(frame, seen_at(frame))
     ages = [groups.get(pose_key(k), 0) for k in range(frame + 1)]
     assert all(a <= b for a, b in pairwise(ages))
     assert ages[0] == 0
@@ -42,34 +42,34 @@ def test_what_came_first_is_eliminated_first() -> None:
     assert last_sight == ages[LIFE - 1 : frame]
     assert [groups[k] for k in seen_at(frame)] == [groups[pose_key(frame)]] * LIFE
     assert groups[pose_key(frame)] == max(ages) > ages[frame - 1]
-    assert groups[TAIL] == max(groups.values()) > groups[pose_key(frame)]
+    assert groups[AUXILIARY_POSE] == max(groups.values()) > groups[pose_key(frame)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.booleans()), min_size=1, max_size=60))
 def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool]]) -> None:
-    chronology, fresh_landmark = Chronology(), 0
-    for frame, (n, fresh) in enumerate(frames):
+    ordering, fresh_landmark = EliminationOrdering(), 0
+    for frame, (n, all_new) in enumerate(frames):
         sights = [key(fresh_landmark + i) for i in range(n)]
         fresh_landmark += n
-        groups = chronology.groups(frame, sights, fresh=fresh)
+        groups = ordering.groups(frame, sights, all_new=all_new)
         variables = 2 + (frame > 0) + n
         assert max(groups.values()) < variables
-        assert groups[TAIL] > max(group for k, group in groups.items() if k != TAIL)
+        assert groups[AUXILIARY_POSE] > max(group for k, group in groups.items() if k != AUXILIARY_POSE)
 
 
 def test_of_a_crowd_only_the_pose_is_kept_for_the_end() -> None:
-    crowd = list(map(key, range(CROWD + 1)))
-    assert Chronology().groups(5, crowd) == {pose_key(5): 1, TAIL: 2}
-    assert Chronology().groups(5, crowd, fresh=True) == {pose_key(5): 1, TAIL: 2}
+    crowd = list(map(key, range(MANY_LANDMARKS + 1)))
+    assert EliminationOrdering().groups(5, crowd) == {pose_key(5): 1, AUXILIARY_POSE: 2}
+    assert EliminationOrdering().groups(5, crowd, all_new=True) == {pose_key(5): 1, AUXILIARY_POSE: 2}
 
 
 def test_where_all_is_fresh_the_frame_before_is_kept_for_the_end() -> None:
-    groups = Chronology().groups(5, [key(0)], fresh=True)
-    assert groups == {pose_key(4): 1, pose_key(5): 1, key(0): 1, TAIL: 2}
+    groups = EliminationOrdering().groups(5, [key(0)], all_new=True)
+    assert groups == {pose_key(4): 1, pose_key(5): 1, key(0): 1, AUXILIARY_POSE: 2}
 
 
 def test_the_tail_is_no_landmark() -> None:
-    assert landmark_of(TAIL) is None
+    assert landmark_of(AUXILIARY_POSE) is None
 
 
 def short_drive() -> Problem:
@@ -83,11 +83,11 @@ def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
     ours = smoother.isam2(problem)
     calls = []
 
-    def last(_: Chronology, frame: int, __: list[int], **___: int) -> dict[int, int]:
+    def last(_: EliminationOrdering, frame: int, __: list[int], **___: int) -> dict[int, int]:
         calls.append(frame)
-        return {pose_key(frame): min(frame, 1), TAIL: 1 + min(frame, 1)}
+        return {pose_key(frame): min(frame, 1), AUXILIARY_POSE: 1 + min(frame, 1)}
 
-    monkeypatch.setattr(incremental.Chronology, "groups", last)
+    monkeypatch.setattr(EliminationOrdering, "groups", last)
     other = smoother.isam2(problem)
     assert calls == list(range(problem.n_frames))
     np.testing.assert_allclose(ours.world_T_imu, other.world_T_imu, atol=1e-6)
@@ -104,16 +104,16 @@ def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
 
 def test_the_tail_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     graphs = []
-    final = smoother.reference._final
+    final = estimator._final_solution
 
     def kept(*arguments: object) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         graphs.append(final(*arguments))
         return graphs[-1]
 
-    monkeypatch.setattr(smoother.reference, "_final", kept)
+    monkeypatch.setattr(estimator, "_final_solution", kept)
     smoother.isam2(short_drive())
     ((graph, values),) = graphs
-    assert not values.exists(TAIL)
+    assert not values.exists(AUXILIARY_POSE)
     keys = {key for i in range(graph.size()) for key in list(graph.at(i).keys())}
     assert pose_key(0) in keys
-    assert TAIL not in keys
+    assert AUXILIARY_POSE not in keys

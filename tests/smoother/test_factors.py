@@ -13,9 +13,9 @@ from fgbaseline.data import HuberKernel, Problem
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
-from fgbaseline.smoother.convention import reordered
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key, pose_key
+from fgbaseline.smoother.graph.factors import FactorBuilder
+from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent
+from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 
 from ..builders.four_rows import State, cost
 from ..builders.synthetic import Scene, drive, plain_problem
@@ -24,12 +24,12 @@ SEEDS = st.integers(0, 2**32 - 1)
 SCENE = Scene(frames=6, n_points=8).sequence()
 
 
-def graph_of(problem: Problem, factors: Factors) -> gtsam.NonlinearFactorGraph:
+def graph_of(problem: Problem, factors: FactorBuilder) -> gtsam.NonlinearFactorGraph:
     """Every factor of the problem, whatever the geometry of its landmarks."""
     graph = gtsam.NonlinearFactorGraph()
-    graph.push_back(factors.first_pose())
+    graph.push_back(factors.pose_prior())
     for k in range(problem.n_frames - 1):
-        graph.push_back(factors.motion(k))
+        graph.push_back(factors.between(k))
     o = problem.observations()
     for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
         graph.push_back(factors.stereo(k, landmark_key(j), measured_rows(pixel)))
@@ -39,7 +39,7 @@ def graph_of(problem: Problem, factors: Factors) -> gtsam.NonlinearFactorGraph:
     return graph
 
 
-def values_of(state: State, problem: Problem, factors: Factors) -> gtsam.Values:
+def values_of(state: State, problem: Problem, factors: FactorBuilder) -> gtsam.Values:
     values = gtsam.Values()
     for k, pose in enumerate(state.world_T_imu):
         values.insert(pose_key(k), gtsam.Pose3(pose))
@@ -70,7 +70,7 @@ PROBLEMS = {
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_graph_and_the_four_rows_differ_by_a_constant(name: str) -> None:
     problem = PROBLEMS[name]
-    factors = Factors(problem)
+    factors = FactorBuilder(problem)
     graph = graph_of(problem, factors)
     random = np.random.default_rng(7)
     # vL - vR carries no information on the state.
@@ -91,7 +91,7 @@ def test_the_graph_and_the_four_rows_differ_by_a_constant(name: str) -> None:
 def test_the_kernel_is_huber_on_the_norm_of_the_three_rows() -> None:
     k = 2.5
     problem = plain_problem(SCENE, HuberKernel(k))
-    factors, state = Factors(problem), near_truth(problem, np.random.default_rng(0), 1.0)
+    factors, state = FactorBuilder(problem), near_truth(problem, np.random.default_rng(0), 1.0)
     values = values_of(state, problem, factors)
     o, s = problem.observations(), problem.sequence
     points = se3.transform(se3.inverse(state.world_T_imu @ s.imu_T_cam)[o.frame], state.landmarks[o.landmark])
@@ -110,7 +110,7 @@ def test_the_kernel_is_huber_on_the_norm_of_the_three_rows() -> None:
 def test_the_stereo_factor_is_predicted_minus_measured_through_the_extrinsic(seed: int) -> None:
     problem = PROBLEMS["no prior"]
     random = np.random.default_rng(seed)
-    state, factors = near_truth(problem, random, 2.0), Factors(problem)
+    state, factors = near_truth(problem, random, 2.0), FactorBuilder(problem)
     i = int(random.integers(len(problem.observations())))
     o, s = problem.observations(), problem.sequence
     frame, landmark = int(o.frame[i]), int(o.landmark[i])
@@ -140,7 +140,7 @@ def test_the_motion_factor_is_the_logarithm_of_what_the_increment_leaves(seed: i
     W = A @ A.T
     problem = PROBLEMS["no prior"]
     problem = replace(problem, increment_covariance=np.broadcast_to(W, problem.increment_covariance.shape))
-    state, factors = near_truth(problem, random, 3.0), Factors(problem)
+    state, factors = near_truth(problem, random, 3.0), FactorBuilder(problem)
     k = int(random.integers(problem.n_frames - 1))
 
     def error(moved: State) -> FloatArray:
@@ -148,7 +148,7 @@ def test_the_motion_factor_is_the_logarithm_of_what_the_increment_leaves(seed: i
         return se3.log(se3.exp(-problem.increment[k]) @ step)
 
     values = values_of(state, problem, factors)
-    factor = factors.motion(k)
+    factor = factors.between(k)
     np.testing.assert_allclose(factor.unwhitenedError(values)[[3, 4, 5, 0, 1, 2]], error(state), atol=1e-10)
     e = error(state)
     assert factor.error(values) == pytest.approx(0.5 * e @ np.linalg.solve(W, e), rel=1e-6)
@@ -174,13 +174,13 @@ def slope(error: object, state: State, columns: list[int]) -> FloatArray:
 
 def test_the_order_of_tangents_is_turned_and_turned_back() -> None:
     named = np.add.outer(10 * np.arange(1, 7), np.arange(1, 7))
-    assert reordered(named)[0].tolist() == [44, 45, 46, 41, 42, 43]
-    np.testing.assert_array_equal(reordered(reordered(named)), named)
+    assert reorder_tangent(named)[0].tolist() == [44, 45, 46, 41, 42, 43]
+    np.testing.assert_array_equal(reorder_tangent(reorder_tangent(named)), named)
 
 
 def test_a_point_behind_the_camera_throws_nothing() -> None:
     problem = PROBLEMS["no prior"]
-    factors = Factors(problem)
+    factors = FactorBuilder(problem)
     state = near_truth(problem, np.random.default_rng(0), 0.0)
     behind = State(state.world_T_imu, state.landmarks + problem.sequence.imu_T_cam[:3, 2] * -100.0)
     values = values_of(behind, problem, factors)
@@ -191,8 +191,8 @@ def test_a_point_behind_the_camera_throws_nothing() -> None:
 
 def test_the_dead_reckoned_path_costs_no_motion() -> None:
     problem = PROBLEMS["no prior"]
-    factors = Factors(problem)
+    factors = FactorBuilder(problem)
     state = near_truth(problem, np.random.default_rng(0), 0.0)
     values = values_of(State(dead_reckoned_path(problem.increment), state.landmarks), problem, factors)
-    assert sum(factors.motion(k).error(values) for k in range(problem.n_frames - 1)) < 1e-20
-    assert factors.first_pose().error(values) == 0.0
+    assert sum(factors.between(k).error(values) for k in range(problem.n_frames - 1)) < 1e-20
+    assert factors.pose_prior().error(values) == 0.0

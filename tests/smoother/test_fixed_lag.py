@@ -11,11 +11,11 @@ from fgbaseline.data import HuberKernel, Observations, Status
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.smoother import FixedLagSettings
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.incremental import ISAM2Settings
-from fgbaseline.smoother.journal import IndeterminateSystemError
-from fgbaseline.smoother.keys import distance_key, pose_key
-from fgbaseline.smoother.restorable_lag import RestorableLag
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.fixed_lag.checkpointed_fixed_lag import CheckpointedFixedLag
+from fgbaseline.smoother.graph.factors import FactorBuilder
+from fgbaseline.smoother.graph.keys import distance_key, pose_key
+from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 from .test_isam2 import PROBLEMS, SCENE, flipped, truncated
@@ -31,7 +31,7 @@ def test_a_window_that_holds_everything_ends_like_isam2(name: str) -> None:
     assert lagged.status is Status.OK
     np.testing.assert_array_equal(lagged.used, full.used)
     np.testing.assert_array_equal(lagged.landmarks.index, full.landmarks.index)
-    # It has no final relinearisation.
+    # It has no final relinearization.
     assert lagged.covariance is not None
     assert full.covariance is not None
     assert_within(lagged.world_T_imu, full.world_T_imu, full.covariance, 0.4)
@@ -54,7 +54,7 @@ def test_a_pose_is_the_one_known_when_it_was_last_in_the_window() -> None:
     estimate = smoother.fixed_lag(problem, settings=settings)
     assert estimate.covariance is not None
     for k in (5, 20, 30):
-        # Frame k is in the window up to the tenth frame after it; nothing has been marginalised before frame 11.
+        # Frame k is in the window up to the tenth frame after it; nothing has been marginalized before frame 11.
         then = smoother.isam2(truncated(problem, k + 11))
         assert then.covariance is not None
         assert_within(estimate.world_T_imu[k][None], then.world_T_imu[k][None], then.covariance[k][None], 0.3)
@@ -95,7 +95,7 @@ def test_sights_before_the_window_do_not_help_a_landmark_in() -> None:
     assert 3 in smoother.fixed_lag(plain_problem(rare), settings=LONG).landmarks.index
 
 
-def test_a_landmark_that_comes_undone_costs_that_landmark_alone() -> None:
+def test_a_cheirality_violation_costs_that_landmark_alone() -> None:
     estimate = smoother.fixed_lag(flipped(5, slice(3, None)), settings=LONG)
     assert estimate.world_T_imu.shape == (10, 4, 4)
     assert np.isfinite(estimate.world_T_imu).all()
@@ -131,12 +131,12 @@ def test_frames_that_see_nothing_are_dead_reckoned() -> None:
     assert position_errors(estimate, blind).max() < 2.0
 
 
-def window(lag: float = 0.45) -> RestorableLag:
-    return RestorableLag(lag, TIGHT, SCENE.camera.baseline)
+def window(lag: float = 0.45) -> CheckpointedFixedLag:
+    return CheckpointedFixedLag(lag, TIGHT, SCENE.camera.baseline)
 
 
 PROBLEM = plain_problem(Scene(frames=12, n_points=6).sequence(), HuberKernel())
-FACTORS = Factors(PROBLEM)
+FACTORS = FactorBuilder(PROBLEM)
 
 
 def near_key(landmark: int) -> int:
@@ -148,7 +148,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values, dict[int, f
     assert truth is not None
     assert truth.landmarks is not None
     graph, values, now = gtsam.NonlinearFactorGraph(), gtsam.Values(), 0.1 * k
-    graph.push_back(FACTORS.first_pose() if k == 0 else FACTORS.motion(k - 1))
+    graph.push_back(FACTORS.pose_prior() if k == 0 else FACTORS.between(k - 1))
     values.insert(pose_key(k), gtsam.Pose3(truth.world_T_imu[k]))
     times = {pose_key(k): now}
     for i in np.flatnonzero(o.frame == k):
@@ -160,9 +160,9 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values, dict[int, f
     return graph, values, times
 
 
-def everything(lag: RestorableLag) -> dict[int, FloatArray]:
+def everything(lag: CheckpointedFixedLag) -> dict[int, FloatArray]:
     values = lag.smoother.calculateEstimate()
-    keys = lag.snapshot.times
+    keys = lag.checkpoint.times
     return {key: values.atPose3(key).matrix() if key >= pose_key(0) else values.atPoint3(key) for key in keys}
 
 
@@ -200,8 +200,8 @@ def test_a_forgotten_landmark_is_seen_no_more_but_what_left_with_it_stays() -> N
     lag.update(without, values, times, {gone})
     stereo = [
         factor
-        for i in range(lag.snapshot.factors.size())
-        if isinstance(factor := lag.snapshot.factors.at(i), gtsam.GenericStereoFactor3D)
+        for i in range(lag.checkpoint.factors.size())
+        if isinstance(factor := lag.checkpoint.factors.at(i), gtsam.GenericStereoFactor3D)
     ]
     assert stereo
     assert not any(gone in factor.keys() for factor in stereo)  # noqa: SIM118
@@ -212,9 +212,9 @@ def test_the_covariances_of_some_are_those_of_all() -> None:
     lag = window()
     for k in range(8):
         lag.update(*frame(k))
-    keys = list(lag.snapshot.times)
-    everyone = lag.snapshot.covariances(keys)
-    some = lag.snapshot.covariances(keys[2:5])
+    keys = list(lag.checkpoint.times)
+    everyone = lag.checkpoint.covariances(keys)
+    some = lag.checkpoint.covariances(keys[2:5])
     assert list(some) == keys[2:5]
     for key, covariance in some.items():
         np.testing.assert_allclose(covariance, everyone[key], rtol=1e-6, atol=1e-12)

@@ -1,4 +1,4 @@
-"""What the increments led to is the whole graph's minimum already, nearly; the final relinearisation takes the rest."""
+"""What the increments led to is the whole graph's minimum already, nearly; the final relinearization takes the rest."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,11 +13,11 @@ from fgbaseline.data import HuberKernel
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.incremental import IncrementalSmoother
-from fgbaseline.smoother.keys import TAIL
-from fgbaseline.smoother.relinearised import compact, relinearised
-from fgbaseline.smoother.starts import landmarks_from
-from fgbaseline.smoother.whole_graph import values_at, whole_graph
+from fgbaseline.smoother.batch.full_graph import full_graph, values_at
+from fgbaseline.smoother.graph.gauss_newton import compact_graph, gauss_newton
+from fgbaseline.smoother.graph.keys import AUXILIARY_POSE
+from fgbaseline.smoother.initialization.initial_values import initial_landmarks
+from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
 
 from ..builders.synthetic import drive, matched
 
@@ -28,7 +28,7 @@ def test_isam2_is_at_the_minimum_of_batch_before_and_after(
     path: PathName, kernel: HuberKernel | None, tolerance: float
 ) -> None:
     problem = replace(matched(drive(path, seconds=8.0, features_per_frame=20.0, wrong=0.05)), kernel=kernel)
-    before = smoother.isam2(problem, settings=ISAM2Settings(relinearise_at_end=False))
+    before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": after})
     np.testing.assert_array_equal(before.used, after.used)
@@ -42,7 +42,7 @@ def test_isam2_is_at_the_minimum_of_batch_before_and_after(
 
 def test_without_it_the_answer_is_another_and_what_was_known_online_the_same() -> None:
     problem = matched(drive(seconds=5.0, features_per_frame=15.0))
-    before = smoother.isam2(problem, settings=ISAM2Settings(relinearise_at_end=False))
+    before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     assert np.abs(before.world_T_imu - after.world_T_imu).max() > 1e-9
     online = [estimate.by_products["isam2-online"].world_T_imu for estimate in (before, after)]
@@ -57,32 +57,32 @@ def test_settling_ends_where_every_variable_is_within_its_threshold() -> None:
     increments.settle()
     costs.append(error(increments))
     assert costs[1] < costs[0]
-    assert increments.solver.relinearised() == 0
+    assert increments.solver.relinearize() == 0
     batch = smoother.batch(problem)
     assert costs[1] < (1.0 + 5e-5) * cost(problem, batch, batch.used)
 
 
 def error(increments: IncrementalSmoother) -> float:
     tree = increments.solver.tree
-    graph = compact(tree.getFactorsUnsafe())
+    graph = compact_graph(tree.getFactorsUnsafe())
     for i in range(graph.size()):
-        if TAIL in list(graph.at(i).keys()):  # linearised far off, and no part of the problem
+        if AUXILIARY_POSE in list(graph.at(i).keys()):  # linearized far off, and no part of the problem
             graph.remove(i)
-    return float(compact(graph).error(tree.calculateEstimate()))
+    return float(compact_graph(graph).error(tree.calculateEstimate()))
 
 
 def test_steps_from_far_off_end_at_the_minimum_or_say_that_they_do_not() -> None:
     problem = matched(drive(seconds=8.0, features_per_frame=20.0, wrong=0.05))
     batch = smoother.batch(problem)
-    graph, path = whole_graph(problem), dead_reckoned_path(problem.increment, problem.initial_pose)
-    along = landmarks_from(problem, path)
+    graph, path = full_graph(problem), dead_reckoned_path(problem.increment, problem.initial_pose)
+    along = initial_landmarks(problem, path)
     start = values_at(path, replace(along, position=path[-1, :3, 3] + 1.2 * (along.position - path[-1, :3, 3])))
     lowest = cost(problem, batch, batch.used)
     assert graph.error(start) > 100.0 * lowest
-    end = relinearised(graph, start)
+    end = gauss_newton(graph, start)
     assert not end.failure
     assert graph.error(end.values) < (1.0 + 1e-4) * lowest
-    early = relinearised(graph, start, max_steps=2)
+    early = gauss_newton(graph, start, max_steps=2)
     assert "still falls after 2" in early.failure
     assert graph.error(early.values) > 2.0 * lowest
 

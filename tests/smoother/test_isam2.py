@@ -12,9 +12,9 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.track_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.smoother.factors import Factors
-from fgbaseline.smoother.keys import landmark_key
-from fgbaseline.smoother.waiting import EntryRule, WaitingLandmarks
+from fgbaseline.smoother.graph.factors import FactorBuilder
+from fgbaseline.smoother.graph.keys import landmark_key
+from fgbaseline.smoother.initialization.landmark_initialization import InitializationCriterion, UninitializedLandmarks
 
 from ..builders.four_rows import State, cost, information
 from ..builders.synthetic import Scene, drive, first_frames, matched, plain_problem, position_errors, with_pixels
@@ -25,7 +25,7 @@ SCENE = Scene().sequence()
 
 def batch(problem: Problem) -> State:
     """The minimum by GTSAM's Levenberg-Marquardt, from the truth, to the last digit."""
-    factors = Factors(problem)
+    factors = FactorBuilder(problem)
     truth = near_truth(problem, np.random.default_rng(0), 0.0)
     params = gtsam.LevenbergMarquardtParams()
     params.setRelativeErrorTol(1e-15)
@@ -44,7 +44,7 @@ def state_of(estimate: Estimate) -> State:
 
 
 def nees(estimate: Estimate, sequence: Sequence) -> FloatArray:
-    """(T-1,) normalised errors squared of the poses after the first, which is held; 6 on average if all is right."""
+    """(T-1,) normalized errors squared of the poses after the first, which is held; 6 on average if all is right."""
     assert sequence.truth is not None
     assert estimate.covariance is not None
     error = se3.log(se3.inverse(estimate.world_T_imu) @ sequence.truth.world_T_imu)[1:]
@@ -216,7 +216,7 @@ def flipped(landmark: int, frames: slice) -> Problem:
     return plain_problem(with_pixels(SCENE, pixel))
 
 
-def test_a_landmark_that_comes_undone_costs_that_landmark_alone() -> None:
+def test_a_cheirality_violation_costs_that_landmark_alone() -> None:
     estimate = smoother.isam2(flipped(5, slice(3, None)))
     assert estimate.status is Status.RECOVERED
     assert "landmark dropped" in estimate.reason
@@ -291,13 +291,13 @@ def test_no_landmark_enters_behind_a_camera_that_saw_it() -> None:
     truth = problem.sequence.truth
     assert truth is not None
     assert truth.landmarks is not None
-    waiting = WaitingLandmarks(problem, problem.observations(), EntryRule())
+    uninitialized = UninitializedLandmarks(problem, problem.observations(), InitializationCriterion())
     for i in range(3):
-        waiting.add(0, i)
+        uninitialized.add(0, i)
     path = truth.world_T_imu.copy()
     camera = path[2] @ problem.sequence.imu_T_cam
     depth = float(camera[:3, 2] @ (truth.landmarks[0] - camera[:3, 3]))
     path[0] = path[2]
     path[0, :3, 3] += (depth + 3.0) * camera[:3, 2]
-    assert waiting.enter([0], path) == []
-    assert len(waiting.enter([0], truth.world_T_imu)) == 1
+    assert uninitialized.initialize([0], path) == []
+    assert len(uninitialized.initialize([0], truth.world_T_imu)) == 1

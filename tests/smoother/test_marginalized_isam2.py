@@ -13,12 +13,12 @@ from fgbaseline import smoother
 from fgbaseline.data import Estimate, LandmarkPrior, Observations, Problem, Status
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.incremental import IncrementalSmoother
-from fgbaseline.smoother.journal import IndeterminateSystemError, RestorableISAM2
-from fgbaseline.smoother.keys import landmark_of
-from fgbaseline.smoother.moving_tree import MovingTree
-from fgbaseline.smoother.reach import UNSEEN_FRAMES, earliest_tracked
-from fgbaseline.smoother.starts import triangulated
+from fgbaseline.smoother.errors import IndeterminateSystemError
+from fgbaseline.smoother.graph.keys import landmark_of
+from fgbaseline.smoother.initialization.initial_values import triangulate_along
+from fgbaseline.smoother.isam2.checkpointed_isam2 import CheckpointedISAM2
+from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
+from fgbaseline.smoother.isam2.marginalized_isam2 import UNSEEN_FRAMES, MarginalizedISAM2, marginalization_horizon
 
 from ..builders.synthetic import drive, matched
 
@@ -40,16 +40,16 @@ def whole(problem: Problem) -> Estimate:
 def exchanged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """For each exchange its first frame, and how many poses the new tree has."""
     told: list[tuple[int, int]] = []
-    shortened = MovingTree.shortened
+    shortened = MarginalizedISAM2.marginalize_before
 
-    def watched(self: MovingTree, first: int, groups: dict[int, int]) -> bool:
+    def watched(self: MarginalizedISAM2, first: int, groups: dict[int, int]) -> bool:
         done = shortened(self, first, groups)
         if done:
             point = self.tree.getLinearizationPoint()
             told.append((first, sum(chr(key >> 56) == "x" for key in point.keys())))  # noqa: SIM118
         return done
 
-    monkeypatch.setattr(MovingTree, "shortened", watched)
+    monkeypatch.setattr(MarginalizedISAM2, "marginalize_before", watched)
     return told
 
 
@@ -85,8 +85,8 @@ def test_a_tree_is_exchanged_for_an_equal_one(problem: Problem) -> None:
     last, tree = problem.n_frames - 1, increments.solver.tree
     poses = [gtsam.symbol("x", k) for k in range(last - 30, last + 1)]
     before = [tree.calculateEstimatePose3(key).matrix() for key in poses], tree.marginalCovariance(poses[-1])
-    first = min(last - 30, earliest_tracked(problem.observations(), last))
-    assert increments.solver.shortened(first, increments._chronology.anew(first, last))
+    first = min(last - 30, marginalization_horizon(problem.observations(), last))
+    assert increments.solver.marginalize_before(first, increments._ordering.batch_groups(first, last))
     assert increments.solver.tree is not tree
     tree = increments.solver.tree
     np.testing.assert_allclose([tree.calculateEstimatePose3(key).matrix() for key in poses], before[0], atol=1e-4)
@@ -94,7 +94,7 @@ def test_a_tree_is_exchanged_for_an_equal_one(problem: Problem) -> None:
 
 
 def test_under_landmark_priors_too(problem: Problem, exchanged: list[tuple[int, int]]) -> None:
-    near = triangulated(problem, problem.observations(), smoother.isam2(problem).world_T_imu)
+    near = triangulate_along(problem, problem.observations(), smoother.isam2(problem).world_T_imu)
     position = np.full((len(problem.features), 3), np.nan)
     position[problem.feature_row(near.index)] = near.position
     assert np.isfinite(position).all()
@@ -107,13 +107,13 @@ def test_under_landmark_priors_too(problem: Problem, exchanged: list[tuple[int, 
 def test_landmarks_that_come_back_bring_the_tree_back(
     exchanged: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    back, restored = [0], MovingTree.restored
+    back, restored = [0], MarginalizedISAM2.restore_all
 
-    def counted(self: MovingTree, groups: dict[int, int]) -> bool:
+    def counted(self: MarginalizedISAM2, groups: dict[int, int]) -> bool:
         back[0] += 1
         return restored(self, groups)
 
-    monkeypatch.setattr(MovingTree, "restored", counted)
+    monkeypatch.setattr(MarginalizedISAM2, "restore_all", counted)
     settings = Simulation(path="handheld", duration=6.0, features_per_frame=40.0, track_length=30.0, wrong_share=0.0)
     problem = matched(simulate(settings))
     o = problem.sequence.observations
@@ -132,7 +132,7 @@ def test_without_a_way_back_a_landmark_that_comes_back_is_dropped(monkeypatch: p
     old = int(o.landmark[o.frame == 0][0])
     again = replace(problem.sequence, observations=with_sight(o, int(o.frame.max()), old))
     returning = replace(problem, sequence=again, excluded=np.append(problem.excluded, np.uint8(0)))
-    monkeypatch.setattr(MovingTree, "restored", lambda *_: False)
+    monkeypatch.setattr(MarginalizedISAM2, "restore_all", lambda *_: False)
     estimate = smoother.isam2(returning, settings=SHORT)
     (event,) = (event for event in estimate.events if event.kind == "landmark dropped")
     assert (event.frame, event.landmark) == (o.frame.max(), old)
@@ -157,7 +157,7 @@ def test_the_earliest_frame_is_that_of_the_tracks_that_are_alive(seen: list[tupl
     o = Observations(frame, landmark, np.zeros((len(frame), 4)))
     for k in range(12):
         alive = {j for a, j in seen if k - UNSEEN_FRAMES <= a <= k}
-        assert earliest_tracked(o, k) == min((a for a, j in seen if a <= k and j in alive), default=k + 1)
+        assert marginalization_horizon(o, k) == min((a for a, j in seen if a <= k and j in alive), default=k + 1)
 
 
 def test_a_failed_exchange_changes_nothing(
@@ -178,10 +178,10 @@ def test_a_failure_costs_the_landmark_that_is_named(
 ) -> None:
     # In a small tree GTSAM orders everything anew, and takes no group of a variable that it does not have; in a tree
     # that was exchanged, a prior speaks of landmarks whose factors are gone.
-    update, named = RestorableISAM2.update, list[int]()
+    update, named = CheckpointedISAM2.update, list[int]()
 
     def failing(
-        self: RestorableISAM2,
+        self: CheckpointedISAM2,
         factors: gtsam.NonlinearFactorGraph,
         values: gtsam.Values,
         *rest: Any,
@@ -195,7 +195,7 @@ def test_a_failure_costs_the_landmark_that_is_named(
                 raise IndeterminateSystemError(named[0], "made up")
         return update(self, factors, values, *rest, **others)
 
-    monkeypatch.setattr(RestorableISAM2, "update", failing)
+    monkeypatch.setattr(CheckpointedISAM2, "update", failing)
     estimate = smoother.isam2(problem, settings=SHORT)
     (landmark,) = map(landmark_of, named)
     assert exchanged

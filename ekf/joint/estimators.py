@@ -1,0 +1,123 @@
+"""EKF-SLAM estimators with one joint state: `joint_ekf` and its named variants."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
+from fgbaseline.data.problem import Problem
+
+from .filter import JointFilter
+from .gyro_bias import GyroBiasPrior
+from .settings import JointSettings, Linearization
+from .state import BIAS, POSE
+
+BIAS_BLOCK = slice(POSE, POSE + BIAS)
+
+
+def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
+    """EKF-SLAM with one joint state: pose, optional gyroscope bias and landmarks, with all cross-covariances.
+
+    A landmark is initialized at its first observation (or at the problem's prior) and marginalized once
+    `JointSettings.unseen_frames` consecutive frames have not observed it. For tracks without longer gaps the poses
+    equal those of the filter that keeps every landmark. A landmark observed again later is initialized as a new one.
+    Marginalized landmarks keep their estimate and covariance.
+    """
+    if len(problem.observations()) == 0:
+        return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
+    with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _run(problem, progress, settings or JointSettings())
+
+
+def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`."""
+    settings = JointSettings(gyro_bias=GyroBiasPrior())
+    return replace(joint_ekf(problem, progress, settings), name="joint-ekf-bias")
+
+
+def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate."""
+    return replace(joint_ekf(problem, progress, JointSettings.textbook()), name="joint-ekf-textbook")
+
+
+def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Joint filter with first-estimate Jacobians in place of the invariant correction."""
+    settings = JointSettings(linearization=Linearization.FIRST_ESTIMATE)
+    return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
+
+
+def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Joint filter without a gate: outliers are only down-weighted by the kernel."""
+    return replace(joint_ekf(problem, progress, JointSettings(gate=None)), name="joint-ekf-ungated")
+
+
+def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -> Estimate:
+    start = time.perf_counter()
+    T = problem.n_frames
+    joint = JointFilter(problem, settings)
+    poses = np.full((T, 4, 4), np.nan)
+    covariances = np.full((T, 6, 6), np.nan)
+    bias = GyroBias(np.full((T, BIAS), np.nan), np.full((T, BIAS, BIAS), np.nan))
+    seconds = np.zeros(T)
+    failure = ""
+    for k, seen in enumerate(problem.observations().by_frame(T)):
+        frame_start = time.perf_counter()
+        joint.process_frame(k, seen)
+        covariance = joint.state.P[:POSE, :POSE]
+        if not (np.isfinite(joint.state.pose).all() and np.isfinite(covariance).all()):
+            failure = f"the pose is not finite after the update of frame {k}"
+            break
+        poses[k], covariances[k] = joint.state.pose, covariance
+        if settings.gyro_bias is not None:
+            bias.mean[k], bias.covariance[k] = joint.state.bias, joint.state.P[BIAS_BLOCK, BIAS_BLOCK]
+        seconds[k] = time.perf_counter() - frame_start
+        if progress is not None:
+            progress(k + 1, T)
+    if settings.gyro_bias is not None:
+        joint.events += _bias_events(bias)
+    if not failure:
+        joint.finish()
+    status, reason = _status(failure, joint, T)
+    return Estimate(
+        name="joint-ekf",
+        world_T_imu=poses,
+        covariance=covariances,
+        landmarks=joint.map.landmarks(problem.features),
+        used=problem.spread(joint.used),
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=time.perf_counter() - start,
+        events=tuple(joint.events),
+        innovations=joint.innovations,
+        gyro_bias=None if settings.gyro_bias is None else bias,
+    )
+
+
+def _bias_events(bias: GyroBias) -> list[Event]:
+    """Event with the bias estimate (rad/s, 1-sigma) of the last frame that has one."""
+    answered = np.flatnonzero(np.isfinite(bias.mean).all(axis=1))
+    if len(answered) == 0:
+        return []
+    k = int(answered[-1])
+    found = zip(bias.mean[k], np.sqrt(np.diagonal(bias.covariance[k])), strict=True)
+    text = ", ".join(f"{mean:+.4f} ± {deviation:.4f}" for mean, deviation in found)
+    return [Event(k, EventKind.GYROSCOPE_BIAS, f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
+
+
+def _status(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:
+    if failure:
+        return Status.FAILED, failure
+    trouble = {
+        EventKind.FRAME_DISAGREES: "most observations disagreed with the prediction, which took no part",
+        EventKind.COVARIANCE_LOST: "the joint covariance was no longer positive definite",
+        EventKind.STATE_FULL: f"the state was full: {joint.n_deferred} observations were not used",
+    }
+    remarks = []
+    for kind, what in trouble.items():
+        frames = sorted({event.frame for event in joint.events if event.kind == kind})
+        if frames:
+            remarks.append(f"at {len(frames)} of {n_frames} frames, first at frame {frames[0]}, {what}")
+    return (Status.RECOVERED, "; ".join(remarks)) if remarks else (Status.OK, "")

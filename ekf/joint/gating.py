@@ -1,0 +1,63 @@
+"""Chi-square gating of innovations: rejected frames, rejected observations and robust weights of the joint filter."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.special import chdtri
+
+from fgbaseline.data.estimate import EventKind
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import FloatArray, StereoMeasurement
+from fgbaseline.geometry.measurement import ROWS
+
+from .settings import JointSettings
+
+DISAGREEMENT = 1.0 - 1e-6
+"""Chi-square probability (5.5 sigma) beyond which an observation votes for rejecting the whole frame. Noise assumed too
+small by half stays below it; wrong matches do not."""
+MIN_VOTES = 5
+"""Smallest number of observations for which a frame can be rejected as a whole."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GatedObservations:
+    """Result of gating n observations."""
+
+    accepted: BoolArray
+    """(n,) mask of the observations to use"""
+    weight: FloatArray
+    """(n,) kernel weights: factors on the inverse of each observation's noise"""
+    rejection: EventKind | None = None
+    """reason for which the others are rejected"""
+
+    @property
+    def full_weight(self) -> bool:
+        """True where every observation is accepted with weight 1."""
+        return bool(self.accepted.all() and (self.weight == 1.0).all())
+
+
+def gate_observations(
+    squared_norm: FloatArray, measurement: StereoMeasurement, settings: JointSettings
+) -> GatedObservations:
+    """Gate observations by their NIS (n,), each innovation whitened by its own covariance.
+
+    Where more than `disagreeing_share` of a frame's observations are outliers, all are rejected: the few inliers agree
+    by chance.
+    """
+    n = len(squared_norm)
+    weight = measurement.weight(squared_norm)
+    if settings.disagreeing_share is not None and n >= MIN_VOTES:
+        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(DISAGREEMENT)))
+        if disagreeing > settings.disagreeing_share * n:
+            return GatedObservations(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
+    if settings.gate is not None:
+        accepted = squared_norm <= chi2_quantile(settings.gate)
+        return GatedObservations(accepted, weight, None if accepted.all() else EventKind.OUTSIDE_GATE)
+    return GatedObservations(np.ones(n, dtype=np.bool_), weight)
+
+
+@cache
+def chi2_quantile(probability: float) -> float:
+    """Chi-square quantile with the 3 degrees of freedom of one observation."""
+    return float(chdtri(len(ROWS), 1.0 - probability))

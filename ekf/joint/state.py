@@ -1,0 +1,185 @@
+"""Joint state of EKF-SLAM: pose, optional gyroscope bias and active landmarks, with their full covariance.
+
+The error state is [delta (6), d (3), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the error
+of the gyroscope bias (only if estimated), then the coordinates of each active landmark in its chart. The covariance
+lives in one square array that grows by doubling. A marginalized landmark is overwritten by the last one, so the active
+part is always the upper left square.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FloatArray
+
+from .landmark_representation import WorldPoints, generators, motion_jacobian, world_points
+
+POSE, BIAS = 6, 3
+ABSENT = -1
+
+
+class JointState:
+    """Pose, gyroscope bias and active landmarks, with one joint covariance."""
+
+    def __init__(
+        self,
+        pose: FloatArray,
+        covariance: FloatArray,
+        n_features: int,
+        bias_covariance: FloatArray | None = None,
+        capacity: int = 64,
+    ) -> None:
+        self.pose = pose
+        self.bias = np.zeros(BIAS)
+        """(3,) rad/s; zero where it is not estimated"""
+        self.n_body = POSE if bias_covariance is None else POSE + BIAS
+        """dimension of pose and bias: offset of the landmarks in the error state"""
+        self.predicted_pose = pose
+        """(4, 4) pose before the update of the current frame"""
+        self.count = 0
+        self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
+        """(m,) slot of each of the problem's features; ABSENT where it is not active"""
+        self._P = np.zeros((self.n_body + 3 * capacity, self.n_body + 3 * capacity))
+        self._P[:POSE, :POSE] = covariance
+        if bias_covariance is not None:
+            self._P[POSE : self.n_body, POSE : self.n_body] = bias_covariance
+        self._feature = np.zeros(capacity, dtype=np.int64)
+        self._xi, self._first_estimate = np.zeros((capacity, 3)), np.zeros((capacity, 3))
+        self._charts = np.zeros((capacity, 4, 4))
+        self._slot_generators = np.zeros((capacity, POSE, 4, 4))
+        self._motion_jacobian = np.zeros((capacity, 3, POSE))
+
+    def _grow(self) -> None:
+        P = np.zeros((2 * len(self._P), 2 * len(self._P)))
+        P[: self.size, : self.size] = self.P
+        self._P = P
+        self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian = (
+            np.concatenate([array, np.zeros_like(array)]) for array in self._slot_arrays()
+        )
+
+    def _slot_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays with one entry per landmark slot."""
+        return self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian
+
+    @property
+    def size(self) -> int:
+        """Dimension of the error state."""
+        return self.n_body + 3 * self.count
+
+    @property
+    def P(self) -> FloatArray:  # noqa: N802
+        """Covariance (size, size), a view."""
+        return self._P[: self.size, : self.size]
+
+    @property
+    def feature(self) -> IntArray:
+        """Feature (count,) of each slot, a view."""
+        return self._feature[: self.count]
+
+    @property
+    def xi(self) -> FloatArray:
+        """Landmark coordinates (count, 3) in their charts, a view."""
+        return self._xi[: self.count]
+
+    @property
+    def first_estimate(self) -> FloatArray:
+        """Landmark coordinates (count, 3) at initialization, a view."""
+        return self._first_estimate[: self.count]
+
+    @property
+    def charts(self) -> FloatArray:
+        """Landmark charts (count, 4, 4), a view."""
+        return self._charts[: self.count]
+
+    def correct_landmarks(self, by: FloatArray) -> FloatArray:
+        """Add `by` (count, 3) to the landmark coordinates; return the change (count, 3, 6) of `motion_jacobian`."""
+        self.xi[:] += by
+        before = self._motion_jacobian[: self.count]
+        now = motion_jacobian(self._slot_generators[: self.count], self.xi)
+        change = now - before
+        before[:] = now
+        return change
+
+    def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
+        """Predict (equation 9): move the pose by `step` (4, 4), Sigma <- F Sigma F^T + W.
+
+        `transition` F and `noise` W are (n_body, n_body): of the pose, and of the bias if estimated.
+        """
+        P, body = self.P, self.n_body
+        moved = transition @ P[:body]
+        P[:body, body:] = moved[:, body:]
+        P[body:, :body] = moved[:, body:].T
+        own = moved[:, :body] @ transition.T + noise
+        P[:body, :body] = 0.5 * (own + own.T)
+        self.pose = self.predicted_pose = self.pose @ step
+
+    def transform_covariance(self, pose_block: FloatArray, pose_jacobian: FloatArray) -> None:
+        """P <- B P B^T, B = [[pose_block, 0], [pose_jacobian, I]] with blocks (6, 6) and (3 count, 6).
+
+        The bias is unchanged: its rows of `pose_jacobian` would be zero.
+        """
+        P, G = self.P, pose_jacobian
+        if self.n_body > POSE:
+            G = np.concatenate([np.zeros((self.n_body - POSE, POSE)), pose_jacobian])
+        own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
+        half = G @ (cross + 0.5 * own @ G.T)
+        P[POSE:, POSE:] += half + half.T
+        P[:POSE, POSE:] = pose_block @ (cross + own @ G.T)
+        P[POSE:, :POSE] = P[:POSE, POSE:].T
+        turned = pose_block @ own @ pose_block.T
+        P[:POSE, :POSE] = 0.5 * (turned + turned.T)
+
+    def initialize(
+        self, row: IntArray, chart: FloatArray, xi: FloatArray, pose_jacobian: FloatArray, covariance: FloatArray
+    ) -> None:
+        """Initialize n landmarks in one chart (4, 4), with the error G delta + e each.
+
+        G = `pose_jacobian` (n, 3, 6) maps the pose error delta, `covariance` (n, 3, 3) is that of e.
+        """
+        n, old, new = len(row), self.size, self.size + 3 * len(row)
+        while self.count + n > len(self._feature):
+            self._grow()
+        slots = slice(self.count, self.count + n)
+        Z = np.broadcast_to(generators(chart), (n, POSE, 4, 4))
+        for array, value in zip(self._slot_arrays(), (row, xi, xi, chart, Z, motion_jacobian(Z, xi)), strict=True):
+            array[slots] = value
+        self.slot_of[row] = np.arange(self.count, self.count + n)
+        P, G = self._P, pose_jacobian.reshape(3 * n, POSE)
+        cross = G @ P[:POSE, :old]
+        P[old:new, :old] = cross
+        P[:old, old:new] = cross.T
+        own = cross[:, :POSE] @ G.T
+        each = np.arange(n)
+        own.reshape(n, 3, n, 3)[each, :, each, :] += covariance
+        P[old:new, old:new] = 0.5 * (own + own.T)
+        self.count += n
+
+    def marginalize(self, row: IntArray) -> None:
+        """Marginalize active landmarks `row` (n,): drop their rows and columns of P."""
+        leaving = self.slot_of[row]
+        left = self.count - len(leaving)
+        goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
+        goes[leaving] = True
+        holes = np.flatnonzero(goes[:left])
+        movers = left + np.flatnonzero(~goes[left:])
+        for array in self._slot_arrays():
+            array[holes] = array[movers]
+        to, source = self._indices(holes), self._indices(movers)
+        P = self.P
+        P[to, :] = P[source, :]
+        P[:, to] = P[:, source]
+        self.slot_of[row] = ABSENT
+        self.slot_of[self._feature[holes]] = holes
+        self.count = left
+
+    def world_points(self, row: IntArray) -> WorldPoints:
+        """World positions (m) of active landmarks, with covariances (m^2)."""
+        slot = self.slot_of[row]
+        index = self._indices(slot).reshape(-1, 3)
+        return world_points(self._charts[slot], self._xi[slot], self._P[index[:, :, None], index[:, None, :]])
+
+    def _indices(self, slot: IntArray) -> IntArray:
+        """Rows (3n,) of P of the landmarks in slots (n,)."""
+        return (self.n_body + 3 * slot[:, None] + np.arange(3)).reshape(-1)

@@ -1,0 +1,1 @@
+"""Levenberg-Marquardt over the full graph: the estimator `batch`."""

@@ -1,0 +1,136 @@
+"""Estimator `batch`: Levenberg-Marquardt on the full graph from two initial values; the lower cost is used."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
+from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
+from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
+from ..graph.keys import landmark_key, pose_key
+from ..graph.marginal_covariances import marginal_covariances
+from ..initialization.initial_values import determined_observations, restricted_problem, select_landmarks
+from ..initialization.landmark_initialization import InitializationCriterion
+from ..isam2.estimator import isam2
+from .full_graph import full_graph
+from .levenberg_marquardt import LocalMinimum, optimize_from_estimate, optimize_from_path
+
+DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's answer"
+SAME_COST = 1e-4
+"""relative; two starts that end nearer than that have found the same minimum"""
+
+
+def batch(problem: Problem, progress: Progress | None = None, given: Mapping[str, Estimate] | None = None) -> Estimate:
+    """The minimum of the graph that iSAM2 ended with, found from dead reckoning and from iSAM2's answer.
+
+    The observations are those that iSAM2 used, so that costs compare; where it failed, those of the landmarks that
+    are determined along dead reckoning, and there is one start only. An event says both costs. `given` may hold the
+    answer of `isam2` to this problem; else it is found here, and `by_products` has it with `isam2-online`. The time
+    is that of the batch solution alone.
+    """
+    answer = (given or {}).get("isam2")
+    by_products: dict[str, Estimate] = {}
+    if answer is None:
+        answer = isam2(problem, progress)
+        by_products = {"isam2": answer, **answer.by_products}
+    elif progress is not None:
+        progress(problem.n_frames, problem.n_frames)
+    with threadpool_limits(limits=1, user_api="blas"):
+        return replace(_solve(problem, answer), by_products=by_products)
+
+
+def _solve(problem: Problem, answer: Estimate) -> Estimate:
+    start = time.perf_counter()
+    T, path = problem.n_frames, dead_reckoned_path(problem.increment, problem.initial_pose)
+    failed = answer.status is Status.FAILED
+    used = determined_observations(problem, path, InitializationCriterion()) if failed else answer.used
+    events: list[Event] = []
+    while used.any():
+        kept = restricted_problem(problem, used)
+        minima = _minima(kept, path, None if failed else answer, events)
+        if not minima:
+            break
+        best = min(minima, key=lambda minimum: minimum.cost)
+        world_T_imu = poses_from_values(best.values, range(T))
+        gone = cheirality_violations(
+            kept, kept.observations(), world_T_imu, landmarks_from_values(best.values, _keys(kept))
+        )
+        if not gone:
+            covariance, landmarks = _marginals(kept, best, events)
+            status, reason = _status(answer, events)
+            return Estimate(
+                name="batch",
+                world_T_imu=world_T_imu,
+                covariance=covariance,
+                landmarks=landmarks,
+                used=used,
+                status=status,
+                reason=reason,
+                seconds_total=time.perf_counter() - start,
+                events=(*events, _costs(minima, T - 1)),
+            )
+        # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
+        events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in gone]
+        used = used & ~np.isin(problem.sequence.observations.landmark, gone)
+    return Estimate.failed("batch", "no landmark is determined, or no descent ended", T, len(used))
+
+
+def _status(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
+    trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
+    if answer.status is Status.FAILED:
+        trouble.insert(0, f"isam2 gave no answer to start from ({answer.reason})")
+    return (Status.RECOVERED, ", ".join(trouble)) if trouble else (Status.OK, "")
+
+
+def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: list[Event]) -> list[LocalMinimum]:
+    """Where the descents end; one that GTSAM breaks off is an event."""
+    graph = full_graph(kept)
+    starts: list[Callable[[], LocalMinimum]] = [lambda: optimize_from_path(graph, kept, DEAD_RECKONING, path)]
+    if answer is not None:
+        landmarks = select_landmarks(answer.landmarks, np.unique(kept.observations().landmark))
+        starts.append(lambda: optimize_from_estimate(graph, ISAM2, answer.world_T_imu, landmarks))
+    minima = []
+    for descend in starts:
+        try:
+            minima.append(descend())
+        except RuntimeError as error:
+            events.append(Event(kept.n_frames - 1, EventKind.DESCENT_FAILED, str(error).strip().partition("\n")[0]))
+    return [minimum for minimum in minima if np.isfinite(minimum.cost)]
+
+
+def _costs(minima: list[LocalMinimum], last: int) -> Event:
+    """What the starts came to."""
+    told = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
+    if len(minima) == 1:
+        return Event(last, EventKind.ONE_START, f"the cost is {told}: nothing says that it is the lowest")
+    low, high = sorted(minimum.cost for minimum in minima)
+    share = high / low - 1.0 if low > 0 else float("inf")
+    one, other = (poses_from_values(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
+    rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
+    apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
+    if share <= SAME_COST:
+        return Event(last, EventKind.SAME_COST, f"the cost is {told}: {apart}")
+    return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
+
+
+def _marginals(kept: Problem, best: LocalMinimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
+    T, keys = kept.n_frames, _keys(kept)
+    try:
+        covariance = marginal_covariances(full_graph(kept), best.values)
+    except RuntimeError:
+        events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
+        return np.full((T, 6, 6), np.nan), landmarks_from_values(best.values, keys)
+    poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
+    return poses, landmarks_from_values(best.values, keys, covariance)
+
+
+def _keys(problem: Problem) -> dict[int, int]:
+    return {int(j): landmark_key(int(j)) for j in np.unique(problem.observations().landmark)}

@@ -1,0 +1,58 @@
+"""Levenberg-Marquardt to convergence on the full graph, with final Gauss-Newton steps."""
+
+from typing import NamedTuple
+
+import gtsam
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..graph.gauss_newton import gauss_newton
+from ..graph.gtsam_conversions import values_from_state
+from ..initialization.initial_values import initial_landmarks
+from ..initialization.windowed_initialization import optimize_in_windows
+
+LM_STEPS, LM_DECREASE = 100, 1e-6
+"""Levenberg-Marquardt goes on until a step lowers the cost by no more than this share: it is near then"""
+LAST_STEPS, LAST_DECREASE = 50, 1e-10
+"""and undamped steps end it"""
+NEAR, FAR = 1e-9, 1e-5
+"""first damping: from an answer a Gauss-Newton step is the right one, from dead reckoning not"""
+
+
+class LocalMinimum(NamedTuple):
+    """Result of the optimization from one initial value."""
+
+    start: str
+    values: gtsam.Values
+    cost: float
+    """half the sum of squared whitened residuals, under the kernel"""
+
+
+def optimize_from_estimate(
+    graph: gtsam.NonlinearFactorGraph, start: str, world_T_imu: FloatArray, landmarks: Landmarks
+) -> LocalMinimum:
+    """Optimize from the estimate of another smoother."""
+    return _levenberg_marquardt(graph, start, values_from_state(world_T_imu, landmarks), NEAR)
+
+
+def optimize_from_path(
+    graph: gtsam.NonlinearFactorGraph, problem: Problem, start: str, world_T_imu: FloatArray
+) -> LocalMinimum:
+    """Optimize from a path alone, after windowed initialization; `graph` is that of `problem`."""
+    path = optimize_in_windows(problem, world_T_imu)
+    return _levenberg_marquardt(graph, start, values_from_state(path, initial_landmarks(problem, path)), FAR)
+
+
+def _levenberg_marquardt(
+    graph: gtsam.NonlinearFactorGraph, start: str, values: gtsam.Values, damping: float
+) -> LocalMinimum:
+    params = gtsam.LevenbergMarquardtParams()
+    params.setMaxIterations(LM_STEPS)
+    params.setRelativeErrorTol(LM_DECREASE)
+    params.setAbsoluteErrorTol(0.0)
+    params.setlambdaInitial(damping)
+    values = gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize()
+    values = gauss_newton(graph, values, LAST_STEPS, LAST_DECREASE).values
+    return LocalMinimum(start, values, float(graph.error(values)))

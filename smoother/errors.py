@@ -1,0 +1,21 @@
+"""Failures of the solution of a graph, and the variable named in messages of GTSAM."""
+
+import re
+
+
+class IndeterminateSystemError(Exception):
+    """A failed update, which left the solver unchanged. `key` is the variable named by GTSAM, if any."""
+
+    def __init__(self, key: int | None, text: str) -> None:
+        super().__init__(text)
+        self.key = key
+
+
+class UnrecoverableError(Exception):
+    """The run cannot continue: even a frame's motion alone leaves the system indeterminate."""
+
+
+def named_variable(text: str) -> int | None:
+    """Key of the variable named in a message of GTSAM."""
+    match = re.search(r"variable\s+(\d+)", text)
+    return int(match.group(1)) if match else None

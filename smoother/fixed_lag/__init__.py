@@ -1,0 +1,1 @@
+"""The incremental fixed-lag smoother `fixed-lag`."""

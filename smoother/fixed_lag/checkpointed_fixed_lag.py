@@ -1,0 +1,167 @@
+"""Fixed-lag smoother with checkpoints: an exception of GTSAM leaves it destroyed, and it cannot be copied."""
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple, SupportsFloat, SupportsIndex, SupportsInt
+
+import gtsam
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+
+from ..errors import IndeterminateSystemError, UnrecoverableError, named_variable
+from ..graph.gauss_newton import compact_graph
+from ..graph.keys import landmark_of
+from ..graph.marginal_covariances import marginal_covariances
+from ..isam2.settings import ISAM2Settings
+
+LOOSE_SIGMA = 2e3
+"""baselines; keeps a landmark determined that marginals still speak of, but no observation"""
+QR_UPDATES = 30
+"""by QR after a failure, before Cholesky is tried again: it is three times faster"""
+
+
+class Checkpoint(NamedTuple):
+    """State from which an equal smoother, to rounding, can be rebuilt."""
+
+    factors: gtsam.NonlinearFactorGraph
+    """marginals among them: linear, at the linearization point, which GTSAM keeps fixed for them; with empty slots"""
+    linearization_point: gtsam.Values
+    times: dict[int, float]
+
+    def covariances(self, keys: Collection[int]) -> dict[int, FloatArray]:
+        """Covariances of some variables by key: all others are eliminated first."""
+        if len(keys) == len(self.times):
+            return marginal_covariances(self.factors, self.linearization_point)
+        marginal = self.factors.linearize(self.linearization_point).marginal(list(keys))
+        ordering, widths = gtsam.Ordering(), []
+        for key in keys:
+            ordering.push_back(key)
+            widths.append(6 if landmark_of(key) is None else 3)
+        joint: FloatArray = np.linalg.inv(marginal.hessian(ordering)[0]).astype(np.float64)
+        ends = np.cumsum(widths)
+        return {key: joint[end - w : end, end - w : end] for key, end, w in zip(keys, ends, widths, strict=True)}
+
+
+class CheckpointedFixedLag:
+    """`gtsam.IncrementalFixedLagSmoother` with atomic updates.
+
+    GTSAM's Cholesky takes pivots of very unequal size for a failure, as they come about where pixels are sharp and the
+    path is long. QR does not; after an update by QR it is kept for some frames.
+    """
+
+    def __init__(self, lag: float, settings: ISAM2Settings, baseline: float) -> None:
+        self._lag, self._settings, self._baseline = lag, settings, baseline
+        self._qr_updates = 0
+        """still to be made by QR"""
+        self.smoother = self._new(qr=False)
+        self.checkpoint = self._current()
+        """as the last update left it"""
+
+    def update(
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        values: gtsam.Values,
+        times: Mapping[int, float],
+        forgotten: Collection[int] = (),
+        *,
+        qr: bool = False,
+    ) -> None:
+        """Update the window, first removing the factors of the landmarks `forgotten` (keys).
+
+        What has left the window since with such a landmark stays in the marginals. An update with `qr` is by QR, which
+        does not notice a landmark that nothing determines. Raises IndeterminateSystemError, nothing being changed,
+        where GTSAM fails.
+        """
+        try:
+            if qr:
+                self._qr_updates = QR_UPDATES
+            if qr or forgotten:
+                checkpoint = self._without(self.checkpoint, forgotten) if forgotten else self.checkpoint
+                self.smoother = self._rebuild(checkpoint, qr=self._qr_updates > 0)
+            self.smoother.update(factors, values, _plain(times))
+        except (RuntimeError, IndexError) as error:
+            self._restore()
+            raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
+        self.checkpoint = self._current()
+        self._return_to_cholesky()
+
+    def _restore(self) -> None:
+        """Back to the snapshot, the more carefully the less it can be done."""
+        held = self._with_loose_priors(
+            self.checkpoint, {key for key in self.checkpoint.times if landmark_of(key) is not None}
+        )
+        for checkpoint, qr in ((self.checkpoint, self._qr_updates > 0), (self.checkpoint, True), (held, True)):
+            try:
+                self.smoother = self._rebuild(checkpoint, qr=qr)
+            except RuntimeError:
+                continue
+            self._qr_updates = QR_UPDATES if qr else 0
+            return
+        raise UnrecoverableError("what the window knew cannot be restored after a failure")
+
+    def _return_to_cholesky(self) -> None:
+        """Return to Cholesky after `QR_UPDATES` updates with QR."""
+        if self._qr_updates == 1:
+            self._qr_updates = 0
+            self._restore()
+        elif self._qr_updates > 1:
+            self._qr_updates -= 1
+
+    def _current(self) -> Checkpoint:
+        # GTSAM gives references, which the next update changes.
+        s = self.smoother
+        return Checkpoint(
+            gtsam.NonlinearFactorGraph(s.getFactors()), gtsam.Values(s.getLinearizationPoint()), s.timestamps()
+        )
+
+    def _new(self, *, qr: bool) -> gtsam.IncrementalFixedLagSmoother:
+        params = self._settings.params(self._baseline)
+        params.findUnusedFactorSlots = True
+        params.relinearizeSkip = 1  # what leaves the window has no later chance, and most of the time goes elsewhere
+        if qr:
+            params.setFactorization("QR")
+        return gtsam.IncrementalFixedLagSmoother(self._lag, params)
+
+    def _rebuild(self, checkpoint: Checkpoint, *, qr: bool) -> gtsam.IncrementalFixedLagSmoother:
+        graph, factors = gtsam.NonlinearFactorGraph(), compact_graph(checkpoint.factors)
+        for i in range(factors.size()):
+            factor = factors.at(i)
+            if isinstance(factor, gtsam.LinearContainerFactor):
+                # Nothing keeps the point fixed in the new one: the marginal must know it.
+                point = checkpoint.linearization_point
+                factor = gtsam.LinearContainerFactor(factor.linearize(point), point)
+            graph.push_back(factor)
+        smoother = self._new(qr=qr)
+        if checkpoint.times:
+            smoother.update(graph, checkpoint.linearization_point, _plain(checkpoint.times))
+        return smoother
+
+    def _without(self, checkpoint: Checkpoint, forgotten: Collection[int]) -> Checkpoint:
+        graph, factors, in_marginals = gtsam.NonlinearFactorGraph(), compact_graph(checkpoint.factors), set[int]()
+        for i in range(factors.size()):
+            factor = factors.at(i)
+            if isinstance(factor, gtsam.LinearContainerFactor):
+                in_marginals |= {key for key in factor.keys() if key in forgotten}  # noqa: SIM118
+            elif any(key in forgotten for key in factor.keys()):  # noqa: SIM118
+                continue
+            graph.push_back(factor)
+        times = {key: time for key, time in checkpoint.times.items() if key not in forgotten or key in in_marginals}
+        values = gtsam.Values()
+        for key in times:
+            if landmark_of(key) is None:
+                values.insert(key, checkpoint.linearization_point.atPose3(key))
+            else:
+                values.insert(key, checkpoint.linearization_point.atPoint3(key))
+        return self._with_loose_priors(Checkpoint(graph, values, times), in_marginals)
+
+    def _with_loose_priors(self, checkpoint: Checkpoint, landmarks: Collection[int]) -> Checkpoint:
+        graph, point = compact_graph(checkpoint.factors), checkpoint.linearization_point
+        loose = gtsam.noiseModel.Isotropic.Sigma(3, LOOSE_SIGMA * self._baseline)
+        for key in landmarks:
+            graph.push_back(gtsam.PriorFactorPoint3(key, point.atPoint3(key), loose))
+        return checkpoint._replace(factors=graph)
+
+
+def _plain(times: Mapping[int, float]) -> Mapping[SupportsInt | SupportsIndex, SupportsFloat | SupportsIndex]:
+    # The stubs of GTSAM ask for exactly that type.
+    return {key: time for key, time in times.items()}  # noqa: C416

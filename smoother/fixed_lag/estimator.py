@@ -1,0 +1,81 @@
+"""Estimator `fixed-lag`: each pose from the data up to a few seconds after it, at a bounded cost per frame."""
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Progress, Status
+from fgbaseline.data.problem import Problem
+
+from ..errors import UnrecoverableError
+from ..frame_update import add_with_recovery
+from ..graph.cheirality import CHEIRALITY_VIOLATION
+from ..graph.gtsam_conversions import in_first_pose_frame
+from ..graph_builder import GraphBuilder
+from ..isam2.settings import ISAM2Settings
+from .window import FixedLagWindow
+
+
+@dataclass(frozen=True, slots=True)
+class FixedLagSettings:
+    """Length of the window and settings of its solver."""
+
+    lag: float = 5.0
+    """s"""
+    isam2: ISAM2Settings = field(default_factory=ISAM2Settings)
+
+
+def fixed_lag(problem: Problem, progress: Progress | None = None, settings: FixedLagSettings | None = None) -> Estimate:
+    """Fixed-lag smoothing: what leaves the window are marginalized into a linear prior.
+
+    Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks
+    are initialized as in `isam2`, with their observations in the window. A marginalized one that is observed again is
+    new to the graph. Indeterminate systems are handled as in `isam2`.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        answer = _solve(in_first_pose_frame(problem), progress, settings or FixedLagSettings())
+        return answer.moved(problem.initial_pose)
+
+
+def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:
+    start, T = time.perf_counter(), problem.n_frames
+    builder = GraphBuilder(problem, settings.isam2.initialization)
+    if len(builder.observations) == 0:
+        return Estimate.failed("fixed-lag", "no observations", T, len(problem.excluded))
+    window = FixedLagWindow(problem, builder, settings.lag, settings.isam2)
+    seconds, dropped, events = np.zeros(T), set[int](), list[Event]()
+    for k, observed in enumerate(builder.observations.by_frame(T)):
+        begin = time.perf_counter()
+        update = builder.frame_update(k, range(observed.start, observed.stop), window.key, dropped, window.oldest)
+        window.store_marginalized(float(problem.sequence.t[k]), update.tracked.keys())
+        try:
+            cost = add_with_recovery(window, update)
+        except UnrecoverableError as error:
+            return Estimate.failed("fixed-lag", str(error), T, len(problem.excluded))
+        dropped |= cost.landmarks
+        events += cost.events
+        builder.online_poses[k] = window.pose(k)
+        for j in builder.observations.landmark[observed].tolist():
+            if j in window.key:
+                builder.landmark_position[j] = window.position(j)
+        seconds[k] = time.perf_counter() - begin
+        if progress is not None:
+            progress(k + 1, T)
+    window.store_marginalized(np.inf, ())
+    events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in window.lost]
+    trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
+    return Estimate(
+        name="fixed-lag",
+        world_T_imu=window.path,
+        covariance=window.covariance,
+        landmarks=window.landmarks(),
+        used=problem.spread(window.used),
+        status=Status.RECOVERED if trouble else Status.OK,
+        reason=f"the system was indeterminate on the way: {', '.join(trouble)}" if trouble else "",
+        seconds=seconds,
+        seconds_total=time.perf_counter() - start,
+        events=tuple(events),
+    )

@@ -1,0 +1,164 @@
+"""Sliding window of the fixed-lag smoother over a problem, and the estimates marginalized from it."""
+
+from collections import Counter
+from collections.abc import Collection
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..errors import IndeterminateSystemError
+from ..frame_update import FrameUpdate
+from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
+from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
+from ..graph.keys import distance_key, landmark_of, pose_key
+from ..graph_builder import GraphBuilder
+from ..isam2.settings import ISAM2Settings
+from .checkpointed_fixed_lag import CheckpointedFixedLag
+
+
+class FixedLagWindow:
+    """Frames and landmarks of the last `lag` seconds; a landmark's time is that of the frame that saw it last."""
+
+    def __init__(self, problem: Problem, builder: GraphBuilder, lag: float, settings: ISAM2Settings) -> None:
+        self._problem, self._builder, self._baseline = problem, builder, problem.sequence.camera.baseline
+        self._lag = CheckpointedFixedLag(lag, settings, self._baseline)
+        self._seconds = lag
+        self._last_seen: dict[int, float] = {}
+        """of each landmark in the window"""
+        self._observed: dict[int, list[int]] = {}
+        self._times_initialized: Counter[int] = Counter()
+        self.key: dict[int, int] = {}
+        """of each landmark in the window; one that comes back has a new one"""
+        self.oldest = 0
+        """frame in the window"""
+        self.newest = -1
+        self.used = np.zeros(len(builder.observations), dtype=np.bool_)
+        self.path = np.full((problem.n_frames, 4, 4), np.nan)
+        """(T, 4, 4) world_T_imu of marginalized frames, from all data in the window then"""
+        self.covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        self.lost: list[int] = []
+        """landmarks that violated cheirality when they were marginalized"""
+        self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}
+
+    def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
+        """See `IncrementalGraph.add`."""
+        k, now = update.frame, float(self._problem.sequence.t[update.frame])
+        graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
+        graph.push_back(update.motion_factor)
+        new: dict[int, int] = {}
+        for entry in update.new_landmarks:
+            j = entry.landmark
+            distance = float(np.linalg.norm(entry.position - update.initial_pose[:3, 3])) / self._baseline
+            name = j + self._problem.sequence.n_landmarks * self._times_initialized[j]
+            new[j] = distance_key(name, distance)
+            values.insert(new[j], entry.position)
+            if self._problem.landmark_prior is not None:
+                graph.push_back(self._builder.factors.landmark_prior(j, new[j]))
+            for i in entry.observations:
+                graph.push_back(self._builder.stereo(i, new[j]))
+        for j, i in update.tracked.items():
+            graph.push_back(self._builder.stereo(i, self.key[j]))
+        seen = new | {j: self.key[j] for j in update.tracked}
+        times = {pose_key(k): now} | dict.fromkeys(seen.values(), now)
+        forgotten = {self.key[j] for j in dropped if j in self.key}
+        try:
+            self._lag.update(graph, values, times, forgotten)
+        except IndeterminateSystemError:
+            if set(self.cheirality_violations(self.key)) - set(dropped):
+                raise
+            # No landmark is to blame: it may be the pivots alone.
+            self._lag.update(graph, values, times, forgotten, qr=True)
+        self._record(update, new, now, dropped)
+
+    def _record(self, update: FrameUpdate, new: dict[int, int], now: float, dropped: Collection[int]) -> None:
+        """Record the landmarks and observations of a successful update."""
+        self.newest = update.frame
+        for j in dropped:
+            self.used[self._observed.pop(j, [])] = False
+            self._leave(j)
+        self.key |= new
+        self._times_initialized.update(new.keys())
+        for entry in update.new_landmarks:
+            self._observed[entry.landmark] = list(entry.observations)
+        for j, i in update.tracked.items():
+            self._observed[j].append(i)
+        for j in (*new, *update.tracked):
+            self._last_seen[j] = now
+            self.used[self._observed[j]] = True
+        while self._problem.sequence.t[self.oldest] < now - self._seconds:
+            self.oldest += 1
+        for j in [j for j, time in self._last_seen.items() if time < now - self._seconds]:
+            self._leave(j)
+
+    def _leave(self, landmark: int) -> None:
+        for known in (self.key, self._last_seen, self._observed):
+            known.pop(landmark, None)
+
+    def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
+        """See `IncrementalGraph.suspect_landmarks`; as in `IncrementalSmoother`."""
+        culprits = [j for j in self.cheirality_violations(self.key) if j not in dropped]
+        if culprits:
+            return dict.fromkeys(culprits, CHEIRALITY_VIOLATION)
+        named = None if error.key is None else landmark_of(error.key)
+        if named is None or named % self._problem.sequence.n_landmarks in dropped:
+            return {}
+        return {named % self._problem.sequence.n_landmarks: "the system was indeterminate near it"}
+
+    def cheirality_violations(self, landmarks: Collection[int]) -> list[int]:
+        """Landmarks of the window that violate cheirality in its frames."""
+        if not landmarks:
+            return []
+        values = self._lag.smoother.calculateEstimate()
+        path = np.full_like(self.path, np.nan)
+        path[self.oldest : self.newest + 1] = poses_from_values(values, range(self.oldest, self.newest + 1))
+        o = self._builder.observations.select(np.sort([i for j in landmarks for i in self._observed[j]]))
+        o = o.select(o.frame >= self.oldest)
+        return cheirality_violations(
+            self._problem, o, path, landmarks_from_values(values, {j: self.key[j] for j in landmarks})
+        )
+
+    def pose(self, frame: int) -> FloatArray:
+        """Pose world_T_imu (4, 4) of a frame in the window."""
+        return np.asarray(self._lag.smoother.calculateEstimatePose3(pose_key(frame)).matrix(), dtype=np.float64)
+
+    def position(self, landmark: int) -> FloatArray:
+        """Position (3,), m, of a landmark in the window."""
+        return np.asarray(self._lag.smoother.calculateEstimatePoint3(self.key[landmark]), dtype=np.float64)
+
+    def store_marginalized(self, now: float, seen: Collection[int]) -> None:
+        """Store the estimates of variables that leave the window at `now` (s), except landmarks `seen` then."""
+        window = range(self.oldest, self.newest + 1)
+        frames = [frame for frame in window if self._problem.sequence.t[frame] < now - self._seconds]
+        leaving = [j for j, time in self._last_seen.items() if time < now - self._seconds and j not in seen]
+        if not frames and not leaving:
+            return
+        covariance = self._covariances([*map(pose_key, frames), *(self.key[j] for j in leaving)])
+        for frame in frames:
+            self.path[frame] = self.pose(frame)
+            self.covariance[frame] = pose_covariances(self._problem, [covariance[pose_key(frame)]], frame)[0]
+        lost = self.cheirality_violations(leaving)
+        self.lost += lost
+        for j in leaving:
+            if j in lost:
+                self.used[self._observed[j]] = False
+            else:
+                self._landmark[j] = (self.position(j), covariance[self.key[j]])
+
+    def _covariances(self, keys: list[int]) -> dict[int, FloatArray]:
+        """Covariances of variables by key; NaN where they are indeterminate."""
+        try:
+            return self._lag.checkpoint.covariances(keys)
+        except (RuntimeError, np.linalg.LinAlgError):
+            size = {key: 6 if landmark_of(key) is None else 3 for key in keys}
+            return {key: np.full((n, n), np.nan) for key, n in size.items()}
+
+    def landmarks(self) -> Landmarks:
+        """Marginalized landmarks as estimated then; the latest estimate of one initialized several times."""
+        index = np.sort(np.fromiter(self._landmark, dtype=np.int64))
+        position, covariance = ([self._landmark[int(j)][part] for j in index] for part in (0, 1))
+        return Landmarks(index, np.array(position).reshape(-1, 3), np.array(covariance).reshape(-1, 3, 3))

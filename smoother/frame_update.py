@@ -1,0 +1,90 @@
+"""Update of the factor graph by one frame, with recovery from an indeterminate system."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
+
+import gtsam
+
+from fgbaseline.data.estimate import Event, EventKind
+from fgbaseline.geometry import FloatArray
+
+from .errors import IndeterminateSystemError, UnrecoverableError
+from .initialization.landmark_initialization import NewLandmark
+
+MAX_ATTEMPTS = 20
+"""Attempts to solve a frame with fewer landmarks before all its observations are dropped."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FrameUpdate:
+    """New pose with its factors: motion, new landmarks and observations."""
+
+    frame: int
+    initial_pose: FloatArray
+    """(4, 4) world_T_imu, initial value"""
+    motion_factor: gtsam.NonlinearFactor
+    """between factor from the previous frame, or the prior of the first pose"""
+    new_landmarks: tuple[NewLandmark, ...]
+    tracked: Mapping[int, int]
+    """landmark of the graph -> its observation in this frame"""
+
+    def without(self, landmarks: Collection[int]) -> "FrameUpdate":
+        """Update without the new landmarks and observations of some landmarks."""
+        new = tuple(entry for entry in self.new_landmarks if entry.landmark not in landmarks)
+        return replace(self, new_landmarks=new, tracked={j: i for j, i in self.tracked.items() if j not in landmarks})
+
+    def without_observations(self) -> "FrameUpdate":
+        """Update by the motion alone."""
+        return replace(self, new_landmarks=(), tracked={})
+
+
+class IncrementalGraph(Protocol):
+    """Incremental solver that frame updates are added to."""
+
+    def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
+        """Add a frame and remove the factors of the `dropped` landmarks, atomically.
+
+        Raises IndeterminateSystemError, with the graph unchanged, where the result is indeterminate.
+        """
+
+    def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
+        """Further landmarks that may have caused a failure -> reason."""
+
+
+class Recovery(NamedTuple):
+    """Landmarks dropped by a frame update, with the events."""
+
+    landmarks: frozenset[int]
+    events: tuple[Event, ...]
+
+
+def add_with_recovery(graph: IncrementalGraph, update: FrameUpdate) -> Recovery:
+    """Add a frame; where the system is indeterminate, without suspect landmarks, then without observations.
+
+    Raises UnrecoverableError.
+    """
+    dropped: dict[int, str] = {}
+    for _ in range(MAX_ATTEMPTS):
+        try:
+            graph.add(update.without(dropped), dropped)
+            return _recovery(update.frame, dropped)
+        except IndeterminateSystemError as error:
+            suspects = graph.suspect_landmarks(error, dropped)
+        if not suspects:
+            break
+        dropped |= suspects
+    try:
+        graph.add(update.without_observations(), dropped)
+    except IndeterminateSystemError as error:
+        text = f"the system stays indeterminate at frame {update.frame} even without its observations"
+        raise UnrecoverableError(text) from error
+    landmarks, events = _recovery(update.frame, dropped)
+    reason = "its observations left the system indeterminate and were given up"
+    lost = Event(update.frame, EventKind.FRAME_WITHOUT_OBSERVATIONS, reason)
+    return Recovery(landmarks | {entry.landmark for entry in update.new_landmarks}, (*events, lost))
+
+
+def _recovery(frame: int, dropped: Mapping[int, str]) -> Recovery:
+    events = tuple(Event(frame, EventKind.LANDMARK_DROPPED, why, landmark) for landmark, why in dropped.items())
+    return Recovery(frozenset(dropped), events)

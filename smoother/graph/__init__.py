@@ -1,0 +1,1 @@
+"""The problem as a GTSAM factor graph: keys, factors, conversions, covariances and Gauss-Newton steps."""

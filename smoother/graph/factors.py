@@ -1,0 +1,77 @@
+"""GTSAM factors of a problem, with the likelihood of the filters.
+
+`StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances.
+"""
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, se3
+
+from .gtsam_conversions import reorder_tangent
+from .keys import pose_key
+
+FIXED_POSE_SIGMA = 1e-6
+"""baselines and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
+
+
+class FactorBuilder:
+    """Builds the GTSAM factors of one problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        camera = problem.sequence.camera
+        self.problem = problem
+        self.calibration = gtsam.Cal3_S2Stereo(camera.fu, camera.fv, 0.0, camera.cu, camera.cv, camera.baseline)
+        self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
+        self.stereo_noise = stereo_noise(problem)
+        self.steps = se3.exp(problem.increment)
+        self.step_covariance = reorder_tangent(problem.increment_covariance)
+
+    @property
+    def fixed_pose_sigmas(self) -> FloatArray:
+        """Standard deviations (6,), rad and m, of a fixed pose."""
+        return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
+
+    def pose_prior(self) -> gtsam.PriorFactorPose3:
+        """Prior factor of the pose of frame 0."""
+        covariance = reorder_tangent(self.problem.initial_covariance) + np.diag(self.fixed_pose_sigmas**2)
+        noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
+        return gtsam.PriorFactorPose3(pose_key(0), gtsam.Pose3(self.problem.initial_pose), noise)
+
+    def between(self, frame: int) -> gtsam.BetweenFactorPose3:
+        """Between factor of the increment from `frame` to the next."""
+        noise = gtsam.noiseModel.Gaussian.Covariance(self.step_covariance[frame])
+        step = gtsam.Pose3(self.steps[frame])
+        return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
+
+    def stereo(self, frame: int, key: int, rows: FloatArray) -> gtsam.GenericStereoFactor3D:
+        """Stereo factor of the rows uL, uR, v (3,), px, of the landmark `key`; does not throw on cheirality."""
+        uL, uR, v = rows.tolist()
+        return gtsam.GenericStereoFactor3D(
+            gtsam.StereoPoint2(uL, uR, v),
+            self.stereo_noise,
+            pose_key(frame),
+            key,
+            self.calibration,
+            False,
+            False,
+            self.imu_P_cam,
+        )
+
+    def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:
+        """Prior factor of one landmark with key `key`."""
+        prior = self.problem.landmark_prior
+        assert prior is not None
+        row = int(np.searchsorted(self.problem.features, landmark))
+        noise = gtsam.noiseModel.Gaussian.Covariance(prior.covariance)
+        return gtsam.PriorFactorPoint3(key, prior.mean[row], noise)
+
+
+def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:
+    """Noise model of (uL, uR, v), under the problem's kernel."""
+    gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.sqrt(problem.measurement.row_variance))
+    if problem.kernel is None:
+        return gaussian
+    huber = gtsam.noiseModel.mEstimator.Huber.Create(problem.kernel.threshold)
+    return gtsam.noiseModel.Robust.Create(huber, gaussian)

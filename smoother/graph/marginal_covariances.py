@@ -1,0 +1,123 @@
+"""The covariances of all variables of a graph in one sweep.
+
+Elimination writes the system as p(x_i | x_S) with R_i x_i + S_i x_S = d_i for one variable after another, S standing
+for neighbours that are eliminated later. From the last one back, with G = R_i^-1 S_i,
+
+    cov(x_i, x_S) = -G cov(x_S),    cov(x_i) = R_i^-1 R_i^-T + G cov(x_S) G^T,
+
+and cov(x_S) is part of the joint covariance of the first of S and its own neighbours: the sparse inverse subset of
+Takahashi (1973). It is exact, and has the landmarks as well, where `gtsam.Marginals` starts anew for each variable.
+"""
+
+from collections import defaultdict
+from typing import NamedTuple
+
+import gtsam
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+
+
+class _Joint(NamedTuple):
+    """Some variables and their joint covariance."""
+
+    columns: dict[int, range]
+    """of each variable, by its key"""
+    covariance: FloatArray
+
+    def of(self, keys: list[int]) -> list[int]:
+        """The columns of some of the variables, in the order of their keys."""
+        return [i for columns in map(self.columns.__getitem__, keys) for i in columns]
+
+
+class _Conditional(NamedTuple):
+    """p(x_i | x_S)."""
+
+    key: int
+    later: list[int]
+    """the keys of S"""
+    inverse: FloatArray
+    """(d, d) R_i^-1"""
+    density: gtsam.GaussianConditional
+
+    @property
+    def own(self) -> FloatArray:
+        """(d, d) R_i^-1 R_i^-T."""
+        return self.inverse @ self.inverse.T
+
+    @property
+    def gain(self) -> FloatArray:
+        """(d, n) G; large, so it is made when it is needed."""
+        return self.inverse @ self.density.S()
+
+
+def marginal_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
+    """The covariance (d, d) of every variable, by its key, in GTSAM's tangent order, linearized at `values`.
+
+    Raises RuntimeError where the system is indeterminate.
+    """
+    conditionals = _conditionals(graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD))
+    position = {conditional.key: i for i, conditional in enumerate(conditionals)}
+    children: dict[int, list[int]] = defaultdict(list)
+    pending: list[tuple[int, _Joint]] = []
+    for i, conditional in enumerate(conditionals):
+        if conditional.later:
+            children[min(map(position.__getitem__, conditional.later))].append(i)
+        else:
+            pending.append((i, _Joint({}, np.empty((0, 0)))))
+    found: dict[int, FloatArray] = {}
+    while pending:
+        # Depth first: only the joint covariances on the way to the root are held.
+        i, parent = pending.pop()
+        joint = _joint(conditionals[i], parent)
+        d = len(conditionals[i].inverse)
+        found[conditionals[i].key] = joint.covariance[:d, :d].copy()  # a view would hold the whole
+        inner = [child for child in children[i] if child in children]
+        pending.extend((child, joint) for child in inner)
+        found |= _leaves([conditionals[child] for child in children[i] if child not in children], joint)
+    return found
+
+
+def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
+    each = [net.at(i) for i in range(net.size())]
+    R = [np.array(conditional.R()) for conditional in each]
+    inverse: list[FloatArray] = [np.empty(0)] * len(each)
+    for d in {len(r) for r in R}:  # many at once cost little more than one
+        chosen = [i for i, r in enumerate(R) if len(r) == d]
+        for i, r in zip(chosen, np.linalg.inv(np.array([R[i] for i in chosen])), strict=True):
+            inverse[i] = r
+    result = []
+    for conditional, r in zip(each, inverse, strict=True):
+        key, *later = conditional.keys()
+        result.append(_Conditional(key, later, r, conditional))
+    return result
+
+
+def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
+    """The joint covariance of a variable and its later neighbours, which are among the variables of `parent`."""
+    d = len(conditional.inverse)
+    columns, end = {conditional.key: range(d)}, d
+    for key in conditional.later:
+        columns[key] = range(end, end + len(parent.columns[key]))
+        end = columns[key].stop
+    among = parent.of(conditional.later)
+    covariance = np.empty((end, end))
+    later = covariance[d:, d:] = parent.covariance[among][:, among]
+    gain = conditional.gain
+    cross = gain @ later
+    covariance[:d, d:], covariance[d:, :d] = -cross, -cross.T
+    covariance[:d, :d] = conditional.own + cross @ gain.T
+    return _Joint(columns, covariance)
+
+
+def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
+    """The covariances of variables whose later neighbours are all among those of `parent`, by their keys."""
+    result: dict[int, FloatArray] = {}
+    for d in {len(leaf.inverse) for leaf in leaves}:
+        chosen = [leaf for leaf in leaves if len(leaf.inverse) == d]
+        gain = np.zeros((len(chosen), d, len(parent.covariance)))
+        for i, leaf in enumerate(chosen):
+            gain[i][:, parent.of(leaf.later)] = leaf.gain
+        covariance = (gain @ parent.covariance) @ gain.transpose(0, 2, 1) + np.array([leaf.own for leaf in chosen])
+        result |= {leaf.key: covariance[i] for i, leaf in enumerate(chosen)}
+    return result

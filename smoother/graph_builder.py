@@ -1,0 +1,87 @@
+"""Graph builder: turns the observations of each frame into a frame update for an incremental solver."""
+
+from collections.abc import Collection
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import measured_rows
+
+from .frame_update import FrameUpdate
+from .graph.factors import FactorBuilder
+from .initialization.landmark_initialization import InitializationCriterion, UninitializedLandmarks
+from .initialization.pose_initialization import refine_predicted_pose
+from .initialization.windowed_initialization import optimize_window
+
+WINDOW_FRAMES = 2
+"""Frames before one without a known landmark that are optimized with it: initialization takes three observations."""
+
+
+class GraphBuilder:
+    """Builds frame updates of a problem from the online estimates of poses and landmarks."""
+
+    def __init__(self, problem: Problem, criterion: InitializationCriterion) -> None:
+        self.problem = problem
+        self.observations = problem.observations()
+        self.frame: list[int] = self.observations.frame.tolist()
+        """frame of each observation"""
+        self._rows = list(measured_rows(self.observations.pixel))
+        self.factors = FactorBuilder(problem)
+        self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
+        self._information = np.linalg.inv(problem.increment_covariance)
+        self.online_poses = np.full((problem.n_frames, 4, 4), np.nan)
+        """(T, 4, 4) world_T_imu as estimated online; filled by the solver, as is `landmark_position`"""
+        self.landmark_position: dict[int, FloatArray] = {}
+        """landmark -> position (3,), m, as estimated at its latest observation"""
+
+    def frame_update(
+        self, k: int, observed: range, known: Collection[int], dropped: Collection[int], first_frame: int = 0
+    ) -> FrameUpdate:
+        """Update by frame k for a graph of the landmarks `known` and the frames from `first_frame` on."""
+        landmarks = self.observations.landmark[observed.start : observed.stop].tolist()
+        tracked = {j: i for j, i in zip(landmarks, observed, strict=True) if j in known}
+        uninitialized = [
+            (j, i) for j, i in zip(landmarks, observed, strict=True) if j not in known and j not in dropped
+        ]
+        for landmark, i in uninitialized:
+            self.uninitialized.add(landmark, i)
+        self.online_poses[k] = self._predicted_pose(k, tracked)
+        candidates = self.uninitialized.candidates([landmark for landmark, _ in uninitialized], first_frame)
+        path = self._windowed_path(k, first_frame) if candidates and not tracked else self.online_poses
+        new_landmarks = self.uninitialized.initialize(candidates, path)
+        motion_factor = self.factors.pose_prior() if k == 0 else self.factors.between(k - 1)
+        return FrameUpdate(k, path[k], motion_factor, tuple(new_landmarks), tracked)
+
+    def _predicted_pose(self, k: int, tracked: dict[int, int]) -> FloatArray:
+        if k == 0:
+            return self.problem.initial_pose
+        pose: FloatArray = self.online_poses[k - 1] @ self.factors.steps[k - 1]
+        if not tracked:
+            return pose
+        points = np.array([self.landmark_position[j] for j in tracked])
+        pixel = self.observations.pixel[list(tracked.values())]
+        return refine_predicted_pose(self.problem, self._information[k - 1], pose, points, pixel)
+
+    def _windowed_path(self, k: int, first_frame: int) -> FloatArray:
+        """Path (T, 4, 4), its last frames optimized on the images, where frame k observes no known landmark.
+
+        At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would
+        be so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.
+        """
+        first = max(k - WINDOW_FRAMES, first_frame)
+        if self.problem.landmark_prior is not None or k - first < WINDOW_FRAMES:
+            return self.online_poses
+        path = self.online_poses.copy()
+        path[first : k + 1] = optimize_window(self.factors, self.observations, self.online_poses, first, k)
+        return path
+
+    def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
+        """Stereo factor of one observation of the landmark `key`."""
+        return self.factors.stereo(self.frame[observation], key, self._rows[observation])
+
+    def observed_landmarks(self, observed: range) -> IntArray:
+        """Landmarks of a frame's observations."""
+        return self.observations.landmark[observed.start : observed.stop]

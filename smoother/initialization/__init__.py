@@ -1,0 +1,1 @@
+"""Initial values: landmarks by triangulation, poses by prediction, and paths by windowed optimization."""

@@ -1,0 +1,89 @@
+"""iSAM2 with checkpoints: an exception of GTSAM leaves its tree destroyed."""
+
+from collections.abc import Mapping
+from collections.abc import Sequence as Listing
+from typing import NamedTuple
+
+import gtsam
+
+from ..errors import IndeterminateSystemError, named_variable
+from ..graph.keys import pose_key
+
+CHECKPOINT_INTERVAL, CHECKPOINT_SHARE = 50, 0.125
+"""Updates between checkpoints: at least this number, and this share of all so far."""
+
+
+class Update(NamedTuple):
+    """The arguments of one call of `ISAM2.update`."""
+
+    factors: gtsam.NonlinearFactorGraph
+    values: gtsam.Values
+    removed: tuple[int, ...] = ()
+    groups: Mapping[int, int] | None = None
+    """of elimination, by key: the larger, the later; a key that is not named is in group 0"""
+    relinearize: bool = False
+    """force relinearization at this update"""
+
+
+class CheckpointedISAM2:
+    """`gtsam.ISAM2` with atomic updates.
+
+    After a failure the last copy of the tree is restored and the updates since then are repeated, which gives the same
+    tree and factor slots. A copy costs time in proportion to the tree, so the interval grows with it. A checkpoint is
+    also taken after each failure, because failures come in series.
+    """
+
+    def __init__(self, params: gtsam.ISAM2Params, interval: int = CHECKPOINT_INTERVAL, first: int = 0) -> None:
+        """`first` is the frame of a pose that the tree has after every update."""
+        self.tree = gtsam.ISAM2(params)
+        self._first = pose_key(first)
+        self._interval = interval
+        self._updates = 0
+        self._take_checkpoint()
+
+    def _take_checkpoint(self) -> None:
+        self._checkpoint = gtsam.ISAM2(self.tree)
+        self._since_checkpoint: list[Update] = []
+
+    def update(
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        values: gtsam.Values,
+        removed: Listing[int] = (),
+        groups: Mapping[int, int] | None = None,
+        relinearize: bool = False,
+    ) -> gtsam.ISAM2Result:
+        """Update the tree; where GTSAM fails, restore it and raise IndeterminateSystemError.
+
+        Without `groups` GTSAM eliminates all variables of the new factors last.
+        """
+        step = Update(factors, values, tuple(removed), groups, relinearize)
+        if len(self._since_checkpoint) >= max(self._interval, int(CHECKPOINT_SHARE * self._updates)):
+            self._take_checkpoint()
+        try:
+            result = _apply(self.tree, step)
+            self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
+        except (RuntimeError, IndexError) as error:
+            self.tree = gtsam.ISAM2(self._checkpoint)
+            for past in self._since_checkpoint:
+                _apply(self.tree, past)
+            self._take_checkpoint()
+            raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
+        self._since_checkpoint.append(step)
+        self._updates += 1
+        return result
+
+
+def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
+    groups = None
+    if step.groups is not None:
+        groups = gtsam.KeyGroupMap()
+        for key, group in step.groups.items():
+            groups.insert2(key, group)
+    return tree.update(
+        step.factors,
+        step.values,
+        list(step.removed),
+        constrainedKeys=groups,
+        force_relinearize=step.relinearize,
+    )

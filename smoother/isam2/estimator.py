@@ -1,0 +1,156 @@
+"""Estimators `isam2` (the reference) and `isam2-online`, from one run of iSAM2."""
+
+import time
+from collections import Counter
+from dataclasses import replace
+
+import gtsam
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..errors import IndeterminateSystemError, UnrecoverableError
+from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
+from ..graph.gtsam_conversions import in_first_pose_frame, landmarks_from_values, pose_covariances, poses_from_values
+from ..graph.keys import pose_key
+from ..graph.marginal_covariances import marginal_covariances
+from .incremental_smoother import FrameLostError, IncrementalSmoother
+from .settings import ISAM2Settings
+
+
+def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
+    """Incremental smoothing over the whole graph: every pose from all of the data.
+
+    A landmark is initialized once its geometry is determined, with all its observations. Where the system is
+    indeterminate, its landmark or the frame's observations are dropped, with an event; the status is then
+    `recovered`. `by_products["isam2-online"]` is pose k as estimated from data up to k.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        answer = _solve(in_first_pose_frame(problem), progress, settings or ISAM2Settings())
+        return answer.moved(problem.initial_pose)
+
+
+def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:
+    """Pose k as estimated from data up to frame k by the run of `isam2`: the causal counterpart of a filter.
+
+    `by_products["isam2"]` is the run's final answer.
+    """
+    final = isam2(problem, progress)
+    if final.status is Status.FAILED:
+        return Estimate.failed("isam2-online", final.reason, problem.n_frames, len(problem.excluded))
+    return _with_by_product(final.by_products["isam2-online"], final)
+
+
+def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings) -> Estimate:
+    start = time.perf_counter()
+    T = problem.n_frames
+    if len(problem.observations()) == 0:
+        return Estimate.failed("isam2", "no observations", T, len(problem.excluded))
+    seconds = np.zeros(T)
+    try:
+        smoother = _run(problem, settings, seconds, progress)
+        smoother.settle()
+        graph, values = _final_solution(smoother, settings.relinearize_at_end)
+    except (UnrecoverableError, IndeterminateSystemError) as error:
+        return Estimate.failed("isam2", str(error), T, len(problem.excluded))
+    poses, landmarks = _marginals(smoother, graph, values)
+    events = (*smoother.events, *_never_determined(smoother))
+    status, reason = _status(events)
+    used = problem.spread(smoother.used())
+    online = Estimate(
+        name="isam2-online",
+        world_T_imu=smoother.builder.online_poses,
+        covariance=smoother.online_covariance,
+        landmarks=smoother.online_landmarks(),
+        used=used,
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=float(seconds.sum()),
+        events=events,
+    )
+    final = Estimate(
+        name="isam2",
+        world_T_imu=poses_from_values(values, range(T)),
+        covariance=poses,
+        landmarks=landmarks,
+        used=used,
+        status=status,
+        reason=reason,
+        seconds=seconds,
+        seconds_total=time.perf_counter() - start,
+        events=events,
+    )
+    return _with_by_product(final, online)
+
+
+def _run(
+    problem: Problem, settings: ISAM2Settings, seconds: FloatArray, progress: Progress | None
+) -> IncrementalSmoother:
+    """Run over all frames; with QR from the start where Cholesky would lose the observations of a frame."""
+    quick = IncrementalSmoother(problem, settings)
+    try:
+        quick.run(seconds, progress)
+        return quick
+    except (FrameLostError, UnrecoverableError):
+        if settings.qr or problem.landmark_prior is not None:
+            raise
+    where = quick.n_frames
+    smoother = IncrementalSmoother(problem, replace(settings, qr=True))
+    smoother.run(seconds, progress)
+    # Online, the frames before the failure were known by Cholesky.
+    smoother.builder.online_poses[:where] = quick.builder.online_poses[:where]
+    smoother.online_covariance[:where] = quick.online_covariance[:where]
+    smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
+    return smoother
+
+
+def _with_by_product(estimate: Estimate, other: Estimate) -> Estimate:
+    return replace(estimate, by_products={other.name: replace(other, by_products={})})
+
+
+def _final_solution(
+    smoother: IncrementalSmoother, relinearize: bool
+) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+    """The whole graph and its solution, relinearized or not, without cheirality violations."""
+    slots, values = smoother.release()
+    while True:
+        graph = compact_graph(slots)
+        values, failure = gauss_newton(graph, values) if relinearize else GaussNewtonResult(values)
+        if not smoother.drop_cheirality_violations(slots, values):
+            break
+    if failure:
+        last = smoother.problem.n_frames - 1
+        smoother.events.append(Event(last, EventKind.RELINEARIZATION_FAILED, f"{failure}; the step before stands"))
+    return graph, values
+
+
+def _marginals(
+    smoother: IncrementalSmoother, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values
+) -> tuple[FloatArray, Landmarks]:
+    """Covariances (T, 6, 6) of the poses, order [v, w], NaN where there are none; the landmarks with theirs."""
+    T = smoother.problem.n_frames
+    try:
+        covariance = marginal_covariances(graph, values)
+    except RuntimeError:
+        smoother.events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
+        return np.full((T, 6, 6), np.nan), landmarks_from_values(values, smoother.key)
+    poses = pose_covariances(smoother.problem, [covariance[pose_key(k)] for k in range(T)])
+    return poses, landmarks_from_values(values, smoother.key, covariance)
+
+
+def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
+    kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never fixed its position well enough"
+    return [Event(frame, kind, why, landmark) for landmark, frame in smoother.builder.uninitialized.last_seen()]
+
+
+def _status(events: tuple[Event, ...]) -> tuple[Status, str]:
+    harmless = (EventKind.LANDMARK_NEVER_DETERMINED, EventKind.SOLVED_BY_QR)
+    trouble = Counter(event.kind for event in events if event.kind not in harmless)
+    if not trouble:
+        return Status.OK, ""
+    counts = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
+    return Status.RECOVERED, f"the system was indeterminate on the way: {counts}"

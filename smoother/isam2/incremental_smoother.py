@@ -1,0 +1,239 @@
+"""Incremental smoother: iSAM2 over the whole graph, frame by frame."""
+
+import time
+from collections.abc import Collection
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.estimate import Event, EventKind, Landmarks, Progress
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
+
+from ..errors import IndeterminateSystemError
+from ..frame_update import FrameUpdate, add_with_recovery
+from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
+from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
+from ..graph.keys import distance_key, landmark_of, pose_key
+from ..graph_builder import GraphBuilder
+from .elimination_ordering import EliminationOrdering
+from .marginalized_isam2 import NO_POSE, MarginalizedISAM2, marginalization_horizon
+from .settings import ISAM2Settings
+
+PRIOR = -1
+"""Index in place of an observation for the factor of a landmark's prior."""
+SETTLING_FRAMES = 4
+"""Consecutive updates that relinearize after one with new landmarks only: they and the last poses start far off."""
+SETTLING_UPDATES = 8
+"""Largest number of updates after the last frame; three to five are usual."""
+
+
+class FrameLostError(Exception):
+    """Cholesky would lose a frame's observations; QR may keep them."""
+
+    def __init__(self, frame: int) -> None:
+        super().__init__(f"frame {frame}")
+        self.frame = frame
+
+
+class IncrementalSmoother:
+    """iSAM2 with landmark initialization, recovery from indeterminate systems and marginalization of old frames."""
+
+    def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
+        self.solver = MarginalizedISAM2(settings.params(problem.sequence.camera.baseline))
+        self._settings = settings
+        self.problem = problem
+        self._may_lose_frames = settings.qr or problem.landmark_prior is not None
+        self.builder = GraphBuilder(problem, settings.initialization)
+        self.online_covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        self.key: dict[int, int] = {}
+        """of each landmark in the graph"""
+        self._slots: dict[int, dict[int, int]] = {}
+        """landmark -> {observation, or PRIOR: slot of its factor in the graph}"""
+        self._dropped: set[int] = set()
+        self.n_frames = 0
+        """in the graph"""
+        self._settling_frames = 0
+        """frames for which every update relinearizes"""
+        self._ordering = EliminationOrdering()
+        self._first = 0
+        """frame in the tree"""
+        self._marginalize_at = settings.tree_frames
+        """frame"""
+        self.events: list[Event] = []
+
+    def run(self, seconds: FloatArray, progress: Progress | None) -> None:
+        """Process all frames; fill `seconds` (T,).
+
+        Raises UnrecoverableError, and FrameLostError unless QR is used or landmarks have priors.
+        """
+        T = self.problem.n_frames
+        for k, observed in enumerate(self.builder.observations.by_frame(T)):
+            start = time.perf_counter()
+            self._process_frame(k, range(observed.start, observed.stop))
+            seconds[k] = time.perf_counter() - start
+            if progress is not None:
+                progress(k + 1, T)
+
+    def settle(self) -> None:
+        """Update without new factors after the last frame, until every variable is within its threshold."""
+        for _ in range(SETTLING_UPDATES):
+            try:
+                if self.solver.relinearize() == 0:
+                    return
+            except IndeterminateSystemError:  # the tree is as it was, and so good enough
+                return
+
+    def _process_frame(self, k: int, observed: range) -> None:
+        update = self._with_restored_tree(self.builder.frame_update(k, observed, self.key, self._dropped))
+        landmarks, events = add_with_recovery(self, update)
+        if not self._may_lose_frames and any(event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS for event in events):
+            raise FrameLostError(k)
+        self.n_frames = k + 1
+        self._dropped |= landmarks
+        self.events += events
+        tree = self.solver.tree
+        self.builder.online_poses[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
+        self.online_covariance[k] = pose_covariances(self.problem, [tree.marginalCovariance(pose_key(k))], k)[0]
+        for j in self.builder.observed_landmarks(observed).tolist():
+            if j in self.key and j not in self._dropped:
+                self.builder.landmark_position[j] = tree.calculateEstimatePoint3(self.key[j])
+        if k >= self._marginalize_at:
+            self._marginalize_old_frames(k)
+
+    def _marginalize_old_frames(self, k: int) -> None:
+        """Marginalize frames before the horizon of continuing tracks, after frame k."""
+        kept = self._settings.kept_frames
+        first = min(k + 1 - kept, marginalization_horizon(self.builder.observations, k))
+        self._marginalize_at = k + kept
+        if first < self._first + kept:
+            return
+        if self.solver.marginalize_before(first, self._ordering.batch_groups(first, k)):
+            self._first = first
+            self._marginalize_at = first + self._settings.tree_frames
+
+    def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
+        """Update after restoring the whole tree, where it refers to marginalized variables.
+
+        Where GTSAM fails to restore it, the update without those landmarks.
+        """
+        frame, back = self.builder.frame, {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
+        back |= {e.landmark for e in update.new_landmarks if frame[e.observations[0]] < self._first}
+        if not back:
+            return update
+        k, new = update.frame, back - self._dropped
+        if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
+            self._first = 0
+            self._marginalize_at = max(
+                self._marginalize_at, 2 * k
+            )  # so that all of these together cost no more than one
+            return update
+        self.events += [
+            Event(k, EventKind.LANDMARK_DROPPED, "it came back, and the tree cannot go back", j) for j in sorted(new)
+        ]
+        self._dropped |= new
+        return update.without(back)
+
+    def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
+        """See `IncrementalGraph.add`."""
+        k, factors = update.frame, self.builder.factors
+        graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
+        graph.push_back(update.motion_factor)
+        owner: list[tuple[int, int]] = []
+        new = {
+            e.landmark: distance_key(e.landmark, self._baselines(e.position, update.initial_pose))
+            for e in update.new_landmarks
+        }
+        for entry in update.new_landmarks:
+            j, key = entry.landmark, new[entry.landmark]
+            values.insert(key, entry.position)
+            if self.problem.landmark_prior is not None:
+                graph.push_back(factors.landmark_prior(j, key))
+                owner.append((j, PRIOR))
+            for i in entry.observations:
+                graph.push_back(self.builder.stereo(i, key))
+                owner.append((j, i))
+        for j, i in update.tracked.items():
+            graph.push_back(self.builder.stereo(i, self.key[j]))
+            owner.append((j, i))
+        if update.new_landmarks and not update.tracked:
+            self._settling_frames = SETTLING_FRAMES
+        sighted = [*new.values(), *(self.key[j] for j in update.tracked)]
+        there = [j for j in dropped if j in self.key]
+        removed = [slot for j in there for slot in self._slots[j].values()]
+        self._ordering.remove([self.key[j] for j in there])
+        groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._settling_frames > 0)
+        frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
+        try:
+            slots = self.solver.update(graph, frames, values, pose_key(k), removed, groups, self._settling_frames > 0)
+        except IndeterminateSystemError:
+            self._ordering.remove(new.values())
+            raise
+        self._settling_frames = max(0, self._settling_frames - 1)
+        for j in there:
+            del self.key[j], self._slots[j]
+        self.key |= new
+        for (j, i), slot in zip(owner, slots[1:], strict=True):
+            self._slots.setdefault(j, {})[i] = slot
+
+    def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
+        """See `IncrementalGraph.suspect_landmarks`.
+
+        GTSAM names a variable near the cause. The cause is usually a cheirality violation of the last solution; only
+        without one, the named variable is taken.
+        """
+        culprits = [j for j in self._cheirality_violations(self.solver.estimate()) if j not in dropped]
+        if culprits:
+            return dict.fromkeys(culprits, CHEIRALITY_VIOLATION)
+        named = None if error.key is None else landmark_of(error.key)
+        if named is None or named in dropped or named in self._dropped:
+            return {}
+        return {named: "the system was indeterminate near it"}
+
+    def _cheirality_violations(self, values: gtsam.Values) -> list[int]:
+        if not self.key:
+            return []
+        o = self.builder.observations.select(self.used())
+        return cheirality_violations(
+            self.problem, o, poses_from_values(values, range(self.n_frames)), landmarks_from_values(values, self.key)
+        )
+
+    def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        """Factors in their slots and the solution, after the last frame; frees the tree."""
+        graph, values = self.solver.release()
+        there = set(self.key.values())
+        for key in values.keys():  # noqa: SIM118
+            if landmark_of(key) is not None and key not in there:  # given up, and still in the prior
+                values.erase(key)
+        return graph, values
+
+    def drop_cheirality_violations(self, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> bool:
+        """Remove cheirality violations from the result of `release`; False if there is none.
+
+        The Jacobian of such a landmark is zero and its residual meaningless.
+        """
+        dropped = self._cheirality_violations(values)
+        for j in dropped:
+            for slot in self._slots.pop(j).values():
+                graph.remove(slot)
+            values.erase(self.key.pop(j))
+        last = self.problem.n_frames - 1
+        self.events += [Event(last, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, landmark) for landmark in dropped]
+        return bool(dropped)
+
+    def used(self) -> BoolArray:
+        """Mask (n,) of the problem's observations in the graph."""
+        used = np.zeros(len(self.builder.observations), dtype=np.bool_)
+        used[[i for slots in self._slots.values() for i in slots if i != PRIOR]] = True
+        return used
+
+    def online_landmarks(self) -> Landmarks:
+        """Landmarks as estimated at their latest observation."""
+        position = self.builder.landmark_position
+        index = np.sort(np.fromiter(position, dtype=np.int64))
+        return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))
+
+    def _baselines(self, point: FloatArray, world_T_imu: FloatArray) -> float:
+        return float(np.linalg.norm(point - world_T_imu[:3, 3])) / self.problem.sequence.camera.baseline

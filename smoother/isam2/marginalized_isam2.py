@@ -1,0 +1,216 @@
+"""iSAM2 over the recent part of a growing graph, with old frames marginalized into a linear prior.
+
+An update of GTSAM traverses its whole tree, so its cost grows with the length of the drive. From time to time the tree
+is replaced by one over the last frames, and the rest becomes a linear prior at the same linearization points. The
+solution is unchanged, but marginalized frames are not relinearized. The graph keeps every factor: for the final
+Gauss-Newton steps, and to rebuild the whole tree when a marginalized landmark is observed again.
+"""
+
+from collections.abc import Collection, Mapping
+from collections.abc import Sequence as Listing
+
+import gtsam
+import numpy as np
+
+from fgbaseline.data.observations import Observations
+
+from ..errors import IndeterminateSystemError
+from ..graph.keys import AUXILIARY_POSE
+from .checkpointed_isam2 import CheckpointedISAM2
+
+AUXILIARY_NOISE = gtsam.noiseModel.Unit.Create(6)
+"""of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
+IN_PRIOR = -1
+"""stands for a factor's slot in the tree, where it is no longer one, or was removed"""
+NO_POSE = -1
+"""stands for the frame of a factor that names no pose"""
+UNSEEN_FRAMES = 2
+"""Frames without an observation after which a track may continue: the mask interrupts tracks for that long."""
+
+
+class MarginalizedISAM2:
+    """Whole graph with constant factor slots, and an iSAM2 tree over its recent part; updates are atomic."""
+
+    def __init__(self, params: gtsam.ISAM2Params) -> None:
+        self._params = params
+        self._isam = CheckpointedISAM2(params)
+        self._graph = gtsam.NonlinearFactorGraph()
+        self._marginalized = gtsam.Values()
+        """of the variables that are not in the tree any more"""
+        self._tree_slot: list[int] = []
+        """the slot in the tree of the factor in each slot of the graph"""
+        self._frame: list[int] = []
+        """the first frame whose pose each of these factors names"""
+        self._prior: list[int] = []
+        """the slots in the tree of what stands for factors behind it"""
+        self._auxiliary_slot: int | None = None
+        """the slot in the tree of the tie to it"""
+
+    @property
+    def tree(self) -> gtsam.ISAM2:
+        """Tree after the last update; replaced by `marginalize_before` and `restore_all`."""
+        return self._isam.tree
+
+    def update(
+        self,
+        factors: gtsam.NonlinearFactorGraph,
+        frames: Listing[int],
+        values: gtsam.Values,
+        newest: int,
+        removed: Collection[int] = (),
+        groups: Mapping[int, int] | None = None,
+        relinearize: bool = False,
+    ) -> Listing[int]:
+        """An update of the tree, see `RestorableISAM2`; the slots of the new factors, in their order.
+
+        `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` is the key of the pose,
+        among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior already
+        cannot be taken out of it. Raises IndeterminateSystemError.
+        """
+        places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
+        tied = gtsam.NonlinearFactorGraph(factors)
+        tied.push_back(gtsam.BetweenFactorPose3(newest, AUXILIARY_POSE, gtsam.Pose3(), AUXILIARY_NOISE))
+        if self._auxiliary_slot is None:
+            values.insert(AUXILIARY_POSE, values.atPose3(newest))
+        else:
+            places.append(self._auxiliary_slot)
+        result = self._isam.update(tied, values, places, groups, relinearize)
+        *new, self._auxiliary_slot = result.getNewFactorsIndices()
+        for slot in removed:
+            self._graph.remove(slot)
+            self._tree_slot[slot] = IN_PRIOR
+        slots = range(len(self._tree_slot), len(self._tree_slot) + len(new))
+        self._graph.push_back(factors)
+        self._tree_slot += new
+        self._frame += frames
+        return slots
+
+    def relinearize(self) -> int:
+        """Relinearize variables beyond their thresholds; return their number. Raises IndeterminateSystemError."""
+        result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearize=True)
+        return int(result.getVariablesRelinearized())
+
+    def marginalize_before(self, first: int, groups: Mapping[int, int]) -> bool:
+        """Marginalize the frames before `first` into a linear prior; False, with the tree unchanged, if GTSAM fails.
+
+        Nothing new may name what leaves: poses before `first`, and landmarks that were not seen since. `groups` are of
+        elimination, as in `update`.
+        """
+        point, factors = self.tree.getLinearizationPoint(), self.tree.getFactorsUnsafe()
+        behind, ahead, place = self._split(factors, first)
+        staying = set(ahead.keyVector())
+        try:
+            prior = behind.linearize(point).marginal([key for key in behind.keyVector() if key in staying])
+            n = ahead.size()
+            for i in range(prior.size()):
+                ahead.push_back(gtsam.LinearContainerFactor(prior.at(i), point))
+            isam = CheckpointedISAM2(self._params, first=first)
+            isam.update(ahead, _without(point, set(point.keys()) - staying), groups=groups)
+        except (RuntimeError, IndeterminateSystemError):
+            return False
+        self._marginalized.insert(_without(self.tree.calculateEstimate(), staying))
+        self._isam = isam
+        self._tree_slot = [place.get(there, IN_PRIOR) for there in self._tree_slot]
+        self._prior = list(range(n, ahead.size()))
+        assert self._auxiliary_slot is not None
+        self._auxiliary_slot = place[self._auxiliary_slot]
+        return True
+
+    def is_marginalized(self, key: int) -> bool:
+        """True where a variable is in the linear prior only."""
+        return bool(self._marginalized.exists(key))
+
+    def restore_all(self, groups: Mapping[int, int]) -> bool:
+        """Rebuild the tree over all frames; False, with the tree unchanged, if GTSAM fails.
+
+        `groups` are of elimination, as in `update`.
+        """
+        assert self._auxiliary_slot is not None
+        factors, place = gtsam.NonlinearFactorGraph(), list[int]()
+        for slot in range(self._graph.size()):
+            factor = self._graph.at(slot)
+            place.append(IN_PRIOR if factor is None else factors.size())
+            if factor is not None:
+                factors.push_back(factor)
+        tail = factors.size()
+        factors.push_back(self.tree.getFactorsUnsafe().at(self._auxiliary_slot))
+        point = gtsam.Values(self._marginalized)
+        point.insert(self.tree.getLinearizationPoint())
+        named = set(factors.keyVector())
+        without = [key for key in point.keys() if key not in named]  # noqa: SIM118
+        isam = CheckpointedISAM2(self._params)
+        try:
+            isam.update(factors, _without(point, without), groups=groups, relinearize=True)
+        except IndeterminateSystemError:
+            return False
+        self._isam, self._marginalized, self._tree_slot, self._prior, self._auxiliary_slot = (
+            isam,
+            gtsam.Values(),
+            place,
+            [],
+            tail,
+        )
+        return True
+
+    def _split(
+        self, factors: gtsam.NonlinearFactorGraph, first: int
+    ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.NonlinearFactorGraph, dict[int, int]]:
+        """What is on poses before `first`, with the landmarks that only they saw; the rest; the slots of the rest in
+        the tree, with those that they have in it."""
+        behind, ahead, place = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph(), dict[int, int]()
+
+        def goes_ahead(there: int) -> None:
+            place[there] = ahead.size()
+            ahead.push_back(factors.at(there))
+
+        for there in self._prior:
+            behind.push_back(factors.at(there))
+        assert self._auxiliary_slot is not None
+        goes_ahead(self._auxiliary_slot)
+        without_pose = []
+        for there, frame in zip(self._tree_slot, self._frame, strict=True):
+            if there == IN_PRIOR:
+                continue
+            if frame == NO_POSE:
+                without_pose.append(there)
+            elif frame < first:
+                behind.push_back(factors.at(there))
+            else:
+                goes_ahead(there)
+        staying = set(ahead.keyVector())
+        for there in without_pose:
+            if staying.issuperset(factors.at(there).keys()):
+                goes_ahead(there)
+            else:
+                behind.push_back(factors.at(there))
+        return behind, ahead, place
+
+    def estimate(self) -> gtsam.Values:
+        """Estimates of all variables, marginalized ones and the auxiliary pose included."""
+        values = gtsam.Values(self._marginalized)
+        values.insert(self.tree.calculateEstimate())
+        return values
+
+    def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        """Factors in their slots and the solution without the auxiliary pose; frees the tree."""
+        values = self.estimate()
+        values.erase(AUXILIARY_POSE)
+        del self._isam
+        return self._graph, values
+
+
+def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:
+    result = gtsam.Values(values)
+    for key in keys:
+        result.erase(key)
+    return result
+
+
+def marginalization_horizon(o: Observations, k: int) -> int:
+    """Oldest frame of the tracks observed at k - UNSEEN_FRAMES or later, from observations up to frame k.
+
+    Frame k + 1 where there is no such track.
+    """
+    recent, now = np.searchsorted(o.frame, [k - UNSEEN_FRAMES, k + 1])
+    alive = np.isin(o.landmark[:now], o.landmark[recent:now])
+    return int(o.frame[:now][alive].min(initial=k + 1))
