@@ -12,10 +12,11 @@ raise file.wrong(("limit", 0, "metric"), "there is no such metric")  # limits.to
 import difflib
 import json
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, get_args
+from typing import Any, Generic, TypeGuard, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -164,3 +165,8 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for argument in get_args(annotation):
         yield from _models(argument)
+
+
+def is_finite_number(value: object) -> TypeGuard[int | float]:
+    """Whether a value read from a file is a number within a double's range: no infinity, NaN or truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max

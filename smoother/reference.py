@@ -62,7 +62,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     poses, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _verdict(events)
-    used = problem.spread(smoother.used())
+    used = problem.scatter_mask(smoother.used())
     online = Estimate(
         name="isam2-online",
         world_T_imu=smoother.arrivals.path,

@@ -65,4 +65,4 @@ def determined_along(problem: Problem, world_T_imu: FloatArray, rule: EntryRule)
     weakest = np.sqrt(np.linalg.eigvalsh(found.covariance)[:, -1])
     good = (count >= rule.min_observations) & (weakest < rule.max_relative_deviation * distance[found.index])
     lost = o.select(taken).landmark[~seen_well(problem, o.select(taken), world_T_imu, found)]
-    return problem.spread(np.isin(o.landmark, np.setdiff1d(found.index[good], lost)))
+    return problem.scatter_mask(np.isin(o.landmark, np.setdiff1d(found.index[good], lost)))

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from glob import glob, has_magic
 from pathlib import Path
 
-from fgbaseline.data import read, read_repairs
+from fgbaseline.data import read
 from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 
 from .identity import content_of

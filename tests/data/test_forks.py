@@ -9,7 +9,7 @@ from types import FrameType
 
 import pytest
 
-from fgbaseline.data.forks import shared
+from fgbaseline.data.parallel import shared
 
 FORKS = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
 

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data import Diagnosis, Repairs, Sequence, TimeUnit, calibrated, diagnose
-from fgbaseline.data.diagnose import findings_of, known_units
-from fgbaseline.data.repairs import UnitsByHand
+from fgbaseline.data import Sequence, TimeUnit
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.time_unit import unit_of_stamps
+from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
+from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
 from fgbaseline.reports.job import RunSettings, pose_problem
 
@@ -140,7 +140,7 @@ def test_where_units_are_in_doubt_nothing_is_changed_and_an_option_settles_it() 
     assert "--time-unit" in found.cannot_tell
     with pytest.raises(InputError, match="in doubt"):
         calibrated(blind)
-    settled = calibrated(blind, repairs=Repairs(units=UnitsByHand(time="ms")))
+    settled = calibrated(blind, repairs=Repairs(units=UnitOverrides(time="ms")))
     np.testing.assert_allclose(settled.sequence.t, s.t)
 
 

@@ -14,7 +14,7 @@ import pytest
 from ..builders.commands import environment
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports")
 DESCRIBED = ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in")
 
 
@@ -114,6 +114,7 @@ class Environment:
 USERS_OWN = 'OWNER = "the user"\n'
 BOTH = """
 import compare as c, data as d, ekf as e
+from fgbaseline import diagnosis
 from fgbaseline import compare, data, ekf, geometry, reports, smoother
 from importlib.metadata import entry_points
 
@@ -124,7 +125,7 @@ for ours in (compare, data, ekf, geometry, reports, smoother):
 for estimator in entry_points(group="fgbaseline.estimators"):
     assert callable(estimator.load())
 sequence = data.read("drive.npz")
-problem = data.calibrated(sequence)
+problem = diagnosis.calibrated(sequence)
 assert len(compare.divergence(ekf.dead_reckoning(problem), smoother.isam2(problem), sequence.up)) == sequence.n_frames
 """
 

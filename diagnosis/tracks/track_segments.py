@@ -1,0 +1,100 @@
+"""Pairs of observations of one landmark in neighbouring frames: all that visual odometry needs of a recording."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, disparity
+from fgbaseline.geometry.measurement import measured_rows
+
+MIN_DISPARITY = 1.0
+"""px"""
+MAX_ROW_MISMATCH = 3.0
+"""px, |vL - vR|"""
+BLOCK = 8000
+"""links: few enough for their arrays to stay in a processor's cache while they are computed with"""
+REPEATED_SHARE = 0.8
+"""of the links of an interval, from which on its tracks count as copied"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TrackSegments:
+    """n links, sorted by frame: a landmark seen in a frame and in the next one."""
+
+    before: IntArray
+    """(n,) index of the observation in frame k"""
+    after: IntArray
+    """(n,) index of the observation in frame k + 1"""
+    frame: IntArray
+    """(n,) k"""
+    point: FloatArray
+    """(n, 3) m, the landmark in the left camera's frame at k, from its own disparity"""
+    pixel: FloatArray
+    """(n, 3) uL, uR and (vL + vR) / 2 at k + 1, px"""
+
+    def __len__(self) -> int:
+        return len(self.before)
+
+    def select(self, chosen: BoolArray | IntArray) -> "TrackSegments":
+        """The links where `chosen` is true, or those at increasing indices."""
+        return TrackSegments(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+    def blocks(self, size: int = BLOCK) -> Iterator[slice]:
+        """Slices of about `size` links, each with all those of its frames."""
+        ends = np.searchsorted(self.frame, self.frame[size - 1 :: size], side="right").tolist()
+        start = 0
+        for end in (*ends, len(self)):
+            if end > start:
+                yield slice(start, end)
+                start = end
+
+
+def sound(sequence: Sequence) -> BoolArray:
+    """(n,) the observations whose disparity and rows allow a triangulation."""
+    pixel = sequence.observations.pixel
+    rows = np.abs(pixel[:, 1] - pixel[:, 3]) <= MAX_ROW_MISMATCH
+    return np.asarray(rows & (disparity(pixel) > MIN_DISPARITY), dtype=np.bool_)
+
+
+def consecutive(sequence: Sequence) -> tuple[IntArray, IntArray]:
+    """Indices (n,) of observations, and (n,) those of the same landmarks one frame later, sorted by frame."""
+    o = sequence.observations
+    order = o.by_track()
+    before, after = order[:-1], order[1:]
+    linked = (o.landmark[before] == o.landmark[after]) & (o.frame[before] + 1 == o.frame[after])
+    before, after = before[linked], after[linked]
+    by_frame = np.argsort(o.frame[before], kind="stable")
+    return before[by_frame], after[by_frame]
+
+
+def repeated(sequence: Sequence) -> BoolArray:
+    """(T-1,) intervals over which the tracks were copied and not tracked: nearly every pixel is the same to the bit.
+
+    Such a frame says nothing of the motion, and what its tracks follow afterwards are other points than before. A
+    tracker's sub-pixel positions are never the same twice by chance, also where the camera stands.
+    """
+    o, n = sequence.observations, sequence.n_frames - 1
+    before, after = consecutive(sequence)
+    same = (o.pixel[before] == o.pixel[after]).all(axis=1)
+    count = np.bincount(o.frame[before], minlength=n)
+    equal = np.bincount(o.frame[before[same]], minlength=n)
+    return np.asarray((count >= 3) & (equal > REPEATED_SHARE * count), dtype=np.bool_)
+
+
+def track_segments(sequence: Sequence) -> TrackSegments:
+    """All links between sound observations in consecutive frames, but for those over repeated ones."""
+    o = sequence.observations
+    before, after = consecutive(sequence)
+    use = sound(sequence)
+    chosen = use[before] & use[after] & ~repeated(sequence)[o.frame[before]]
+    before, after = before[chosen], after[chosen]
+    return TrackSegments(
+        before=before,
+        after=after,
+        frame=o.frame[before],
+        point=sequence.camera.triangulate(o.pixel[before]),
+        pixel=measured_rows(o.pixel[after]),
+    )
