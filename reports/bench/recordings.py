@@ -17,7 +17,7 @@ from .suite import Entry, Suite, several
 def recordings(
     suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None
 ) -> Iterator[tuple[str, Recorded, float]]:
-    """Name, source and number of observations of each. Raises InputError naming the line."""
+    """Name, source and number of observations of each. Raises InputError naming the key path."""
     folder = (data or Path(suite.path).parent).absolute()
     found = _files(suite, index, entry, folder)
     truth = None if entry.truth is None else folder / entry.truth

@@ -7,8 +7,9 @@ import pytest
 
 from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.diagnosis import averaged_over_dropouts, calibrated, diagnose, dropout_intervals, findings_of
+from fgbaseline.diagnosis import calibrated, diagnose, findings_of
 from fgbaseline.diagnosis.conventions.integer_delay import integer_delay
+from fgbaseline.diagnosis.repairs.dropout import averaged_over_dropouts, dropout_intervals
 from fgbaseline.geometry import FloatArray
 
 RATE = 10.0

@@ -42,26 +42,26 @@ def file_with(tmp_path: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "said"),
+    ("text", "place", "said"),
     [
-        ("gyro_bias = [1, 2]", 1, "gyro_bias = [1, 2]: it should be three numbers of at most 10 rad/s"),
-        ("\ngyro_bias = [nan, 0, 0]", 2, "three numbers"),
-        ('linear_axes = "x,y,-z"', 1, "none of the 24 right-handed axis conventions"),
-        ("angular_axes = 3", 1, "none of the 24"),
-        ("time_offset_s = 0.1\nshift_intervals = 1", 2, "time_offset_s says the same in seconds"),
-        ("velocity_scale = 0", 1, "a number from 0.01 to 100, or 'as-recorded'"),
-        ("velocity_scale = true", 1, "a number from 0.01"),
-        ("[sigma]\npixel = -1", 2, "pixel = -1 in [sigma]"),
-        ("[mask]\nmin_track = 2.5", 2, "whole number"),
-        ("[mask]\nmin_track = 1", 2, "whole number"),
-        ("bias = [0, 0, 0]", 1, "did you mean 'gyro_bias'?"),
-        ('sigma.pixel = "as-recorded"', 1, "a number from"),
+        ("gyro_bias = [1, 2]", "gyro_bias", "gyro_bias = [1, 2]: it should be three numbers of at most 10 rad/s"),
+        ("\ngyro_bias = [nan, 0, 0]", "gyro_bias", "three numbers"),
+        ('linear_axes = "x,y,-z"', "linear_axes", "none of the 24 right-handed axis conventions"),
+        ("angular_axes = 3", "angular_axes", "none of the 24"),
+        ("time_offset_s = 0.1\nshift_intervals = 1", "shift_intervals", "time_offset_s says the same in seconds"),
+        ("velocity_scale = 0", "velocity_scale", "a number from 0.01 to 100, or 'as-recorded'"),
+        ("velocity_scale = true", "velocity_scale", "a number from 0.01"),
+        ("[sigma]\npixel = -1", "sigma.pixel", "sigma.pixel = -1"),
+        ("[mask]\nmin_track = 2.5", "mask.min_track", "whole number"),
+        ("[mask]\nmin_track = 1", "mask.min_track", "whole number"),
+        ("bias = [0, 0, 0]", "there is no key", "did you mean 'gyro_bias'?"),
+        ('sigma.pixel = "as-recorded"', "sigma.pixel", "a number from"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_line(tmp_path: Path, text: str, line: int, said: str) -> None:
+def test_what_cannot_be_is_told_with_its_key_path(tmp_path: Path, text: str, place: str, said: str) -> None:
     with pytest.raises(InputError) as told:
         read_repairs(file_with(tmp_path, text))
-    assert f"repairs.toml: line {line}: " in str(told.value)
+    assert f"repairs.toml: {place}" in str(told.value)
     assert said in str(told.value)
 
 

@@ -68,7 +68,7 @@ def test_a_fork_whose_parent_was_killed_ends() -> None:
     """What it computes fits into no pipe, so it would wait for a reader for ever."""
     script = """
 import os, signal, time
-from fgbaseline.data.forks import shared
+from fgbaseline.data.parallel import shared
 
 def large(_):
     time.sleep(0.5)
