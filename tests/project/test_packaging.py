@@ -114,12 +114,11 @@ class Environment:
 USERS_OWN = 'OWNER = "the user"\n'
 BOTH = """
 import compare as c, data as d, ekf as e
-from fgbaseline import diagnosis
-from fgbaseline import compare, data, ekf, geometry, reports, smoother
+from fgbaseline import compare, data, diagnosis, ekf, geometry, reports, smoother
 from importlib.metadata import entry_points
 
 assert {c.OWNER, d.OWNER, e.OWNER} == {"the user"}
-for ours in (compare, data, ekf, geometry, reports, smoother):
+for ours in (compare, data, diagnosis, ekf, geometry, reports, smoother):
     assert not hasattr(ours, "OWNER")
     print(ours.__file__)
 for estimator in entry_points(group="fgbaseline.estimators"):
