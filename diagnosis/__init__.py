@@ -4,15 +4,15 @@ from fgbaseline.data.problem import NoiseSettings
 
 from .calibrated import Calibration, calibrated
 from .conventions.units import Units, unit_findings
+from .estimation.pipeline import diagnose, known_units
+from .estimation.result import Diagnosis
 from .findings.json_report import to_json
 from .findings.track_statistics import TrackStatistics, track_statistics
 from .findings.velocity_findings import findings_of, not_identifiable
 from .held_out import hold_out
-from .pipeline import diagnose, known_units
 from .repair_overrides.settings import Repairs, read_repairs
 from .repair_overrides.template import repairs_text
 from .repairs.repaired_sequence import Repaired, repair
-from .result import Diagnosis
 from .tracks.unusable import unusable
 
 __all__ = [

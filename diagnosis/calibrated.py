@@ -13,14 +13,14 @@ from fgbaseline.data.problem.velocity_gaps import admit_gaps
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
+from .estimation.pipeline import diagnose
+from .estimation.result import Diagnosis
 from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
-from .pipeline import diagnose
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
 from .repairs.repaired_sequence import repair
-from .result import Diagnosis
 from .tracks.observation_mask import MaskSettings, exclusions
 
 

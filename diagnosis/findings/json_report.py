@@ -11,7 +11,7 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
-from ..result import Diagnosis
+from ..estimation.result import Diagnosis
 from .track_statistics import TrackStatistics, track_statistics
 from .velocity_findings import findings_of, not_identifiable
 

@@ -8,9 +8,9 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity
 
+from ..estimation.result import Diagnosis
 from ..odometry.ransac import TRUNCATION
 from ..repairs.repaired_sequence import Repaired, repair
-from ..result import Diagnosis
 from ..tracks.observation_mask import MaskSettings
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, sound
 

@@ -11,8 +11,8 @@ from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
 from ..conventions.units import LABELS, NAMES, unit_findings
+from ..estimation.result import Diagnosis
 from ..repairs.significance import SIGNIFICANT, significant_bias, significant_misalignment, significant_offset
-from ..result import Diagnosis
 from .phrases import listed, vector
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics

@@ -9,13 +9,13 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import InputError
 
 from ..conventions.axes import Axes
+from ..estimation.pipeline import diagnose
+from ..estimation.result import Diagnosis
+from ..estimation.velocity_calibration import calibrate_with_axes
 from ..noise.calibration_fit import CalibrationFit
 from ..noise.correlated_noise import Inflation
-from ..pipeline import diagnose
 from ..repairs.repaired_sequence import TrackRepairs
-from ..result import Diagnosis
 from ..tracks.observation_mask import MaskSettings
-from ..velocity_calibration import calibrate_with_axes
 from ..windows.residuals import OFFSET, SCALE, SHARED, TURN
 from .settings import Repairs
 

@@ -8,9 +8,9 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
+from ..estimation.result import Diagnosis
 from ..repairs.repaired_sequence import repair
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset, significant_scale
-from ..result import Diagnosis
 from ..tracks.observation_mask import MaskSettings
 
 

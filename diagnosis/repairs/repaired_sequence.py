@@ -12,8 +12,8 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence, Truth
 from fgbaseline.geometry import FloatArray, so3
 
+from ..estimation.result import Diagnosis
 from ..odometry.stereo_odometry import Odometry, odometry
-from ..result import Diagnosis
 from ..tracks.observation_mask import (
     GATE_RANGE,
     MaskSettings,

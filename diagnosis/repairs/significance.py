@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from ..result import Diagnosis
+from ..estimation.result import Diagnosis
 
 SIGNIFICANT = 4.0
 """standard errors, from which on an estimate is significant"""

@@ -12,7 +12,7 @@ from fgbaseline.diagnosis import calibrated, diagnose
 def test_a_diagnosis_that_breaks_says_so_and_the_recording_is_taken_as_it_is(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    module = importlib.import_module("fgbaseline.diagnosis.pipeline")
+    module = importlib.import_module("fgbaseline.diagnosis.estimation.pipeline")
 
     def breaks(_: data.Sequence) -> None:
         raise error

@@ -1,4 +1,4 @@
-"""No module imports one that imports it, imports inside functions included; layers are import-linter's (pyproject.toml)."""
+"""No module imports one that imports it, imports inside functions included; import-linter holds the layers."""
 
 import grimp
 import pytest

@@ -8,13 +8,13 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
-from .conventions.axes import Axes, angular_axes, linear_axes
-from .conventions.integer_delay import integer_delay
-from .conventions.time_delay import timing
-from .noise.calibration_fit import fit_windows, half_cost
-from .odometry.stereo_odometry import Odometry
+from ..conventions.axes import Axes, angular_axes, linear_axes
+from ..conventions.integer_delay import integer_delay
+from ..conventions.time_delay import timing
+from ..noise.calibration_fit import fit_windows, half_cost
+from ..odometry.stereo_odometry import Odometry
+from ..tracks.track_segments import repeated
 from .result import Diagnosis
-from .tracks.track_segments import repeated
 
 MIN_INTERVALS = 20
 """of which the cameras must tell the motion"""

@@ -10,11 +10,11 @@ from fgbaseline.data.axis_conventions import IDENTITY
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import se3
 
-from .conventions.axes import ENOUGH
-from .conventions.units import Units, rescaled, units_of, usual_baseline
-from .odometry.stereo_odometry import Odometry, odometry
+from ..conventions.axes import ENOUGH
+from ..conventions.units import Units, rescaled, units_of, usual_baseline
+from ..odometry.stereo_odometry import Odometry, odometry
+from ..tracks.unusable import unusable
 from .result import Diagnosis
-from .tracks.unusable import unusable
 from .velocity_calibration import calibrate_velocities
 
 TURNED = np.deg2rad(5.0)

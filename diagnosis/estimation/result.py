@@ -11,12 +11,12 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
-from .conventions.axes import Axes
-from .conventions.time_delay import TimeDelay
-from .conventions.units import Units
-from .noise.calibration_fit import CalibrationFit
-from .odometry.stereo_odometry import Odometry
-from .windows.residuals import OFFSET, TURN
+from ..conventions.axes import Axes
+from ..conventions.time_delay import TimeDelay
+from ..conventions.units import Units
+from ..noise.calibration_fit import CalibrationFit
+from ..odometry.stereo_odometry import Odometry
+from ..windows.residuals import OFFSET, TURN
 
 
 @dataclass(frozen=True, eq=False, slots=True)
