@@ -17,13 +17,13 @@ class HeldOut:
     observations: Observations
     """as recorded, with the recording's landmark numbers"""
     piece: IntArray
-    """(n,) the piece of a track that each belongs to, 0 to n_pieces - 1: consecutive sights of one point, as far as the
-    cameras alone can tell; -1 for those that are copies, jump, or are left in pieces shorter than `MIN_PIECE`"""
+    """(n,) piece of a track of each observation, 0 to n_pieces - 1: consecutive observations of one point by odometry
+    alone; -1 for copies, jumps and pieces shorter than `MIN_PIECE`"""
     n_pieces: int
     share: float
     seed: int
 
     @property
     def n_tracks(self) -> int:
-        """How many tracks were taken out."""
+        """The number of held-out tracks."""
         return len(np.unique(self.observations.landmark))

@@ -1,7 +1,7 @@
-"""Work shared with forks of this process, each taking the next piece that nobody has taken.
+"""Parallel map with forks of this process, each of which takes the next open item.
 
-Forks have the run and all that is imported, and need nothing sent; only Linux forks safely, elsewhere this process does
-everything. What a fork fails at, or had taken when it died, is done here again: so an error is this process' own.
+Forks share memory and imports, so that nothing is sent to them. Only Linux forks safely; elsewhere this process does
+all items. Items of a fork that fails or dies are computed here again, so that an error is raised in this process.
 """
 
 import os
@@ -19,16 +19,16 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 def cores() -> int:
-    """That this process may use, as far as `shared` can make use of them."""
+    """The number of cores of this process that `shared` can use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
 
 
 @contextmanager
 def shared(work: Callable[[int], T], n: int, processes: int) -> Iterator[Callable[[], list[T]]]:
-    """Begins `work` of the numbers 0 to n - 1 (at most 256) in `processes` - 1 forks, the last numbers first.
+    """Starts `work` on the numbers 0 to n - 1 (at most 256) in `processes` - 1 forks, the last numbers first.
 
-    What it gives takes part until nothing is left, and answers with all results, in the order of their numbers. Before
-    that there is time for something else. No fork is left when the block ends, however it does.
+    The yielded function joins the work until it is done, and returns all results in the order of their numbers. This
+    process may do something else first. All forks have ended when the block ends, also by an exception.
     """
     helpers = min(processes - 1, n) if sys.platform == "linux" else 0
     with _taken_in_turn(n) as numbers, _helping(work, numbers, helpers) as answers:
@@ -44,7 +44,7 @@ def shared(work: Callable[[int], T], n: int, processes: int) -> Iterator[Callabl
 
 
 def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
-    """What this process does of it."""
+    """Results by number of the items that this process takes."""
     done = {}
     while number := os.read(numbers, 1):
         done[number[0]] = work(number[0])
@@ -53,7 +53,7 @@ def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
 
 @contextmanager
 def _taken_in_turn(n: int) -> Iterator[int]:
-    """A pipe of the bytes n - 1 to 0, out of which whoever reads a byte has taken that number for himself."""
+    """A pipe of the bytes n - 1 to 0; a process takes the number that it reads."""
     numbers, into = os.pipe()
     os.write(into, bytes(reversed(range(n))))
     os.close(into)
@@ -65,7 +65,7 @@ def _taken_in_turn(n: int) -> Iterator[int]:
 
 @contextmanager
 def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[list[Connection]]:
-    """Where the answers of so many forks come from."""
+    """The pipes of results of so many forks."""
     answers, started = [], list[ForkProcess]()
     try:
         for _ in range(helpers):
@@ -88,7 +88,7 @@ def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """They come when the block ends: in the functions that Python calls around a fork, an exception is swallowed."""
+    """Interrupts delayed to the end of the block: Python swallows exceptions in its hooks around a fork."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
@@ -97,7 +97,7 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _help(work: Callable[[int], T], numbers: int, answer: Connection, into: Connection) -> None:
-    """In the fork. Interrupting is the parent's business; where the parent is gone, nobody reads, and sending fails."""
+    """The body of a fork. The parent handles interrupts; where the parent is gone, sending fails."""
     answer.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

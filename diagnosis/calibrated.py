@@ -1,4 +1,4 @@
-"""The `calibrated` preset: what the data support. Repaired, masked, with the noise that was found, without priors."""
+"""The `calibrated` preset: a repaired and masked recording with the estimated noise and without priors."""
 
 from dataclasses import dataclass, field, replace
 
@@ -26,7 +26,7 @@ from .tracks.observation_mask import MaskSettings, exclusions
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Settings in place of a diagnosis: the recording is taken as it is."""
+    """Settings in place of a diagnosis: the recording is taken as recorded."""
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     shift: float = Shift.AFTER
@@ -44,15 +44,14 @@ def calibrated(
     repairs: Repairs | None = None,
     processes: int = 1,
 ) -> Problem:
-    """The problem that the recording supports, the first pose held at the identity.
+    """The problem that the recording supports, with the first pose fixed at the identity.
 
-    Without `settings` the recording is diagnosed (unless a `diagnosis` of it is given) and repaired, and the noise is
-    what the diagnosis found; where it cannot tell, or with `settings`, the recording is taken as it is. What `repairs`
-    has is taken from there and not from the diagnosis. The noise of an increment is the standard deviation of a
-    velocity times dt. A fractional shift makes the errors of neighbouring increments correlated; that is not modelled.
-    `features` keeps only that many landmarks, those seen most often after masking. `processes` share the diagnosis,
-    which is the same however many. Raises InputError for repairs that cannot be, or that `settings` would leave without
-    effect, and where the units of the recording are in doubt.
+    Without `settings` the recording is diagnosed (unless its `diagnosis` is given) and repaired, with the estimated
+    noise. Where nothing can be estimated, or with `settings`, the recording is taken as recorded. Values in `repairs`
+    take precedence over the diagnosis. The noise of an increment is the standard deviation of a velocity times dt. A
+    fractional shift correlates the errors of neighboring increments, which is not modeled. `features` keeps that many
+    landmarks, those observed most often after masking. The number of `processes` does not change the result. Raises
+    InputError for impossible repairs, for repairs together with `settings`, and where the units are in doubt.
     """
     if settings is not None and repairs is not None:
         raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
@@ -100,7 +99,7 @@ def _origin(found: Diagnosis, repairs: Repairs) -> str:
 
 
 def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Problem:
-    """With the velocities of neighbours where the cameras are blind for a moment."""
+    """The problem with velocities averaged over neighbors in short visual dropouts."""
     sequence, odometry = problem.sequence, diagnosis.odometry
     blind = dropout_intervals(problem.observations(), problem.n_frames)
     if odometry is None or not blind.any():
@@ -113,7 +112,7 @@ def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Pr
     linear, angular = (np.sqrt(np.mean(found.deviation[found.blind, part] ** 2)) for part in (slice(3), slice(3, 6)))
     remark = (
         f"over {plural(len(found.blind), 'interval')} that the cameras do not see, velocities are averaged over "
-        f"neighbours: their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
+        f"neighbors: their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
     )
     return replace(
         problem,
@@ -138,7 +137,7 @@ def _shift_remark(shift: float) -> str:
     if shift == Shift.AFTER:
         return "velocities taken as recorded: the velocity of frame k moves frame k to k + 1"
     remark = f"velocities taken as recorded, shifted by {float(shift):+g} intervals"
-    correlated = "" if float(shift).is_integer() else "; the correlation of neighbouring increments is not modelled"
+    correlated = "" if float(shift).is_integer() else "; the correlation of neighboring increments is not modeled"
     return remark + correlated
 
 

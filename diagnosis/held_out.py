@@ -1,4 +1,4 @@
-"""Tracks kept from diagnosis and estimators, to judge paths by what none of them has seen."""
+"""Holding out of tracks, which diagnosis and estimators do not use, to validate paths by them."""
 
 from dataclasses import replace
 
@@ -19,10 +19,10 @@ from .tracks.track_segments import consecutive
 def hold_out(sequence: Sequence, share: float, seed: int = 0) -> tuple[Sequence, HeldOut]:
     """The sequence without a random `share` (0 to 1, exclusive) of its tracks, and these tracks.
 
-    Which ones depends on the seed and on which landmarks are observed, on no pixel. Nothing of them is left in the
-    sequence but their numbers. They are cut into pieces where they jump, or are copied from the frame before: against
-    frame-to-frame odometry of all tracks, which knows neither velocities nor estimators. Raises InputError for another
-    share, or where there are no two tracks.
+    The choice depends on the seed and on the observed landmarks, on no pixel. The sequence keeps only their numbers.
+    Held-out tracks are cut into pieces where they jump or are copied from the frame before. The test for this is
+    frame-to-frame odometry of all tracks, which uses neither velocities nor estimators. Raises InputError for another
+    share, and for fewer than two tracks.
     """
     if not 0.0 < share < 1.0:
         raise InputError(f"held-out: expected a share above 0 and below 1, got {share:g}; 0.2 is usual")
@@ -42,7 +42,7 @@ def _pieces(sequence: Sequence, out: Observations) -> tuple[IntArray, int]:
     """The piece (n,) of each observation of the tracks `out`, and how many there are."""
     seen = odometry(sequence)
     path = se3.compose(np.where(seen.known[:, None, None], seen.motion, np.eye(4)))
-    stretch = np.concatenate([[0], np.cumsum(~seen.known)])  # of frames whose motion the cameras tell
+    stretch = np.concatenate([[0], np.cumsum(~seen.known)])  # of frames whose motion the odometry determines
     number, landmark = np.unique(out.landmark * (stretch[-1] + 1) + stretch[out.frame], return_inverse=True)
     cut = Observations(out.frame, landmark.astype(np.int64), out.pixel)
     alone = replace(sequence, observations=cut, n_landmarks=len(number), truth=None)

@@ -70,7 +70,7 @@ class LandmarkPrior:
 class Problem:
     """A state estimation problem over T frames: world_T_imu of every frame and the positions of m landmarks.
 
-    Minimise the sum of squared whitened residuals of the increments (right perturbation [v, w], covariance
+    Minimize the sum of squared whitened residuals of the increments (right perturbation [v, w], covariance
     `increment_covariance`), of the stereo observations (each of the four rows with variance `pixel_variance`,
     under `kernel`) and of `landmark_prior`, with the first pose at `initial_pose` with `initial_covariance`
     (zero: held).

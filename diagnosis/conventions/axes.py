@@ -1,4 +1,4 @@
-"""In which axes were the velocities recorded? Every right-handed convention against what the cameras see."""
+"""Axis conventions of the recorded velocities: all 24 right-handed ones scored against odometry."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -33,24 +33,24 @@ Design = Callable[[FloatArray, BoolArray], FloatArray]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Axes:
-    """The convention of one velocity."""
+    """The estimated convention of one velocity."""
 
     name: str
     """such as 'x,-y,-z'"""
     seen: tuple[bool, bool, bool]
-    """which axes of imu_T_cam the data decide on"""
+    """axes of imu_T_cam that the data determine"""
     margin: float
-    """log-likelihood by which it leads the best convention that differs on an axis that is seen"""
+    """log-likelihood lead over the best convention that differs on a determined axis"""
     before: float
-    """median error against the cameras as recorded, m/s or rad/s"""
+    """median error against odometry as recorded, m/s or rad/s"""
     after: float
-    """and in this convention"""
+    """median error in this convention"""
     scores: dict[str, float] = field(default_factory=dict)
     """log-likelihood of each of the 24 conventions, at its best lag"""
 
     @property
     def matrix(self) -> FloatArray:
-        """(3, 3) takes recorded components to the axes of imu_T_cam."""
+        """(3, 3) rotation of recorded components to the axes of imu_T_cam."""
         return axes_matrix(self.name)
 
     @property
@@ -60,7 +60,7 @@ class Axes:
 
 
 def angular_axes(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Axes:
-    """The convention of the angular velocity: `seen` (T-1, 3) by the cameras, `recorded` (T-1, 3), rad/s."""
+    """The convention of the angular velocity: `seen` (T-1, 3) by odometry, `recorded` (T-1, 3), rad/s."""
 
     def design(x: FloatArray, _: BoolArray) -> FloatArray:
         return np.concatenate([-so3.hat3(x), np.tile(np.eye(3), (len(x), 1, 1))], axis=2)
@@ -74,12 +74,12 @@ def angular_axes(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Ax
 def linear_axes(
     seen: FloatArray, recorded: FloatArray, rate: FloatArray, known: BoolArray, angular: str, baseline: float
 ) -> Axes:
-    """The convention of the linear velocity, m/s; `rate` (T-1, 3) is the angular velocity that the cameras see,
-    `baseline` their distance in m.
+    """The convention of the linear velocity, m/s; `rate` (T-1, 3) is the angular velocity of the odometry,
+    `baseline` that of the stereo camera in m.
 
-    A car shows only which axis is forward: its small components are explained as well by a slightly wrong extrinsic.
-    An axis therefore counts as seen only where its component is larger than that, and follows the cameras' with a gain
-    near one. What is left open stays as recorded, or else follows the `angular` convention.
+    A car excites only its forward axis: the small components are explained as well by a slightly wrong extrinsic. An
+    axis therefore counts as determined only where its component is larger than that, and follows the odometry with a
+    gain near one. An undetermined axis stays as recorded, or follows the `angular` convention.
     """
 
     def design(x: FloatArray, chosen: BoolArray) -> FloatArray:

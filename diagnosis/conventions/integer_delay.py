@@ -1,7 +1,7 @@
-"""To which interval does a velocity belong, where turns are too few to tell? By how well windows can be fitted.
+"""Integer delay of the velocities by the cost of fitted windows, where turns are too few for a cross-correlation.
 
-All that the velocities say takes part, linear ones too. Only whole shifts compete: between them, two samples are
-averaged, and less noise would pass for better agreement.
+Linear velocities count too. Only integer shifts compete: between them two samples are averaged, and the lower noise
+would be taken for a better fit.
 """
 
 from collections.abc import Callable
@@ -15,14 +15,16 @@ from .time_delay import TimeDelay
 SHIFTS = (-2.0, -1.0, 0.0, 1.0)
 """intervals"""
 ENOUGH = 25.0
-"""log-likelihood by which one shift must lead all others; errors of the cameras last, so that it counts too much"""
+"""log-likelihood lead over all other shifts; high, since time-correlated pixel errors exaggerate it"""
 INFLATION = 3.0
 """of the standard error, for the same reason"""
 
 
 def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None:
-    """The shift by a parabola through the half cost (log-likelihood) at the best of a few and next to it; None where
-    the recording does not tell, or where the best is the outermost of those tried."""
+    """The delay by a parabola through half the cost (negative log-likelihood) at the best shift and its neighbors.
+
+    None where no shift leads, or where the best one is at the edge of the range.
+    """
     tried = np.array(SHIFTS)
     costs = np.array([cost(shift) for shift in SHIFTS])
     best = int(np.argmin(costs))

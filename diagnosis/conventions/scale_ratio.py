@@ -1,6 +1,6 @@
-"""How many times larger than recorded is what the cameras see? A ratio of two motions, in whatever axes and unit.
+"""Scale ratio of odometry to recorded velocities, in any axes and units.
 
-Neither axes nor delay are known yet: the ratio is taken in the convention and at the lag at which both correlate best.
+Axes and delay are still unknown: the ratio is that of the convention and the lag of highest correlation.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ MATRICES = np.stack([axes_matrix(name) for name in AXIS_CONVENTIONS])
 
 
 class ScaleRatio(NamedTuple):
-    """Size of what is seen over size of what is recorded."""
+    """RMS of the odometry over RMS of the recorded velocity."""
 
     ratio: float
     """NaN without a sample"""
@@ -34,10 +34,10 @@ class ScaleRatio(NamedTuple):
     """whether both correlate, so that it is more than the ratio of two noises"""
 
 
-def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, centred: bool) -> ScaleRatio:
-    """The ratio of velocities: `seen` (T-1, 3) by the cameras, where `known` (T-1,), over `recorded` (T-1, 3).
+def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, centered: bool) -> ScaleRatio:
+    """The ratio of velocities: `seen` (T-1, 3) by odometry, where `known` (T-1,), over `recorded` (T-1, 3).
 
-    `centred` takes the mean of each off first, which a bias may be.
+    `centered` subtracts the median of each first, since it may be a bias.
     """
     best = ScaleRatio(np.nan, known=False)
     most = 0.0
@@ -46,7 +46,7 @@ def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, cen
             y, x = _samples(seen, np.roll(recorded, -lag, axis=0), known & _inside(len(known), lag), window)
             if len(y) < MIN_SAMPLES:
                 continue
-            y, x = (_clipped(signal - np.median(signal, axis=0) if centred else signal) for signal in (y, x))
+            y, x = (_clipped(signal - np.median(signal, axis=0) if centered else signal) for signal in (y, x))
             size_y, size_x = (float(np.sqrt(np.mean(signal**2))) for signal in (y, x))
             if size_y == 0.0 or size_x == 0.0:
                 continue

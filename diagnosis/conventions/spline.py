@@ -1,6 +1,6 @@
-"""The cubic through samples: what the cameras see, between frames.
+"""Cubic spline interpolation of odometry between frames.
 
-That of `scipy.interpolate.CubicSpline`, to which a test holds it, without what that package imports beside it.
+Equal to `scipy.interpolate.CubicSpline`, by a test, without the imports of that package.
 """
 
 from dataclasses import dataclass

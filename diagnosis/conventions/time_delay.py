@@ -1,4 +1,4 @@
-"""When was a velocity valid? The shift between velocities and images, from the turns that both show."""
+"""Time delay between velocities and images, by cross-correlation of angular velocities."""
 
 from dataclasses import dataclass, field
 
@@ -20,12 +20,12 @@ GRID = 0.02
 NOT_KNOWN = 0.2
 """frames: a standard error beyond which the shift is not identifiable"""
 INFLATION = 2.0
-"""of the standard error: residuals of neighbouring frames are correlated"""
+"""of the standard error: residuals of neighboring frames are correlated"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimeDelay:
-    """The shift of the velocities."""
+    """The estimated delay of the velocities."""
 
     shift: float
     """s: sample k, held for one interval, describes the motion from t_k + shift on; 0 is 'the interval after'"""
@@ -39,11 +39,11 @@ class TimeDelay:
 
 
 def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) -> TimeDelay:
-    """The shift at which `recorded` samples (T-1, c) follow best what the cameras see (T-1, c) over the intervals.
+    """The delay at which `recorded` samples (T-1, c) correlate best with odometry `seen` (T-1, c).
 
-    Meant for rates: speed changes too slowly to tell. By the peak of their cross-correlation, which the noise of
-    neither moves: a least-squares fit at a fractional shift would prefer the one that averages most noise away.
-    Channels are weighted by their residuals.
+    Meant for angular rates, since speed changes too slowly. The peak of the cross-correlation is unbiased by noise; a
+    least-squares fit at a fractional shift would prefer the shift that averages most noise. Channels are weighted by
+    their residuals.
     """
     k = np.arange(len(seen), dtype=np.float64)
     if known.sum() < 20:

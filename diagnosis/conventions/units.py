@@ -1,13 +1,13 @@
-"""In which units are stamps, velocities and baseline? By the motion that the cameras see, which has none.
+"""Units of stamps, velocities and baseline, from the motion of the odometry, which has none.
 
-A rotation is seen as it is, a translation in baselines. Over an interval dt of the file, with velocities v, w and a
-baseline b of the file, the cameras see
+Odometry measures rotations absolutely and translations in baselines. Over an interval dt of the file, with velocities
+v, w and a baseline b of the file, it measures
 
     rotation / (w dt)    = time * angular
     translation / (v dt) = time * linear / baseline
 
-where each factor takes a unit of the file to SI. The hypothesis with the fewest wrong units, of intervals and baselines
-that exist, is the explanation; where it does not lead, nothing is changed.
+where each factor converts a unit of the file to SI. The hypothesis with the fewest wrong units, and with plausible
+intervals and baselines, is chosen; where it does not lead, nothing is changed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -53,7 +53,7 @@ NOUNS = {
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """By what each is multiplied to be in SI; `doubt` says what the recording leaves open."""
+    """Factors that convert each recorded quantity to SI; `doubt` states an ambiguity that remains."""
 
     time: float = 1.0
     """s"""
@@ -69,14 +69,14 @@ class Units:
 
     @property
     def wrong(self) -> int:
-        """How many are not 1."""
+        """The number of factors other than 1."""
         return sum(factor != 1.0 for factor in (self.time, self.angular, self.linear, self.baseline))
 
 
 def usual_baseline(sequence: Sequence) -> Sequence:
-    """The recording for an odometry that works at any scale: a baseline that no rig has is brought to one that exists.
+    """The recording with an implausible baseline scaled to a plausible one, for odometry, which works at any scale.
 
-    The camera then lies at the IMU, since nothing is known of the unit of its place.
+    The camera is then placed at the IMU, since the unit of its position is unknown.
     """
     b = sequence.camera.baseline
     if BASELINES[0] <= b <= BASELINES[1]:
@@ -139,8 +139,8 @@ def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleR
         return unknown, unknown
     seen, recorded = seen_by_cameras.twist(sequence.dt), held_twist(sequence)
     scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
-    angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centred=True)
-    linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centred=False)
+    angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
+    linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
     return angular, linear._replace(ratio=linear.ratio * scale)
 
 
@@ -171,7 +171,7 @@ def _fits(units: Units, ratios: tuple[float | None, float | None]) -> bool:
 
 
 def rescaled(sequence: Sequence, units: Units) -> Sequence:
-    """The recording in SI units; the camera's place goes with the baseline where it would be far from the IMU."""
+    """The recording in SI units; the camera's position is scaled along where it would be far from the IMU."""
     if units.wrong == 0:
         return sequence
     imu_T_cam = sequence.imu_T_cam.copy()
@@ -192,7 +192,7 @@ def _takes_camera_along(sequence: Sequence, units: Units) -> bool:
 
 
 def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
-    """A finding for each unit of the recording `sequence` (as recorded) that is wrong."""
+    """A finding for each wrong unit of `sequence`, as recorded."""
     interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
@@ -216,7 +216,7 @@ def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
 
 
 def evidence(units: Units) -> str:
-    """What the cameras say of the units."""
+    """The evidence of the odometry for the units, in words."""
     assert units.scale_ratios is not None
     words = [
         f"{what} {g.ratio:.3g} times as large as recorded"

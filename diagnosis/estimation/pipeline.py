@@ -1,4 +1,4 @@
-"""A diagnosis from its beginning: units, use of the observations, direction of the extrinsic, velocities."""
+"""The pipeline of a diagnosis: units, usability of observations, direction of the extrinsic, velocities."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,7 +18,7 @@ from .result import Diagnosis
 from .velocity_calibration import calibrate_velocities
 
 TURNED = np.deg2rad(5.0)
-"""by which an extrinsic that was calibrated is not turned against the velocities"""
+"""rad, misalignment against the velocities that a calibrated extrinsic does not have"""
 SURE = 16.0
 """squared standard errors of the misalignment by which one direction of the extrinsic must lead the other"""
 
@@ -29,10 +29,10 @@ def diagnose(
     units: Mapping[str, float] | None = None,
     inverted: bool | None = None,
 ) -> Diagnosis:
-    """Finds units, axes, bias, scale, delay, misalignment, noise and the state of the tracks; never looks at truth.
+    """Estimates units, axes, bias, scale, delay, misalignment and noise from the recording alone, without its truth.
 
-    `processes`, forks of this one, share what takes longest. `units` are those that are known, by the names of `Units`;
-    `inverted` says, where it is known, whether imu_T_cam was recorded as its inverse.
+    `processes` is the number of processes for the windows, forks of this one. `units` are known factors, by the names
+    of `Units`; `inverted`, where known, whether imu_T_cam was recorded as its inverse.
     """
     try:
         with threadpool_limits(limits=1, user_api="blas"):
@@ -42,7 +42,7 @@ def diagnose(
 
 
 def known_units(sequence: Sequence, units: Mapping[str, float] | None = None) -> Units:
-    """The units of a recording, as `diagnose` finds them; those in `units` are known."""
+    """The units of a recording as `diagnose` estimates them; factors in `units` are known."""
     with threadpool_limits(limits=1, user_api="blas"):
         return units_of(sequence, _seen(usual_baseline(sequence)), units)
 
@@ -81,9 +81,9 @@ def _may_be_inverse(given: Diagnosis) -> bool:
 
 
 def _leads(inverse: Diagnosis, given: Diagnosis) -> bool:
-    """Whether the inverse explains with one cause, and better, what takes several as recorded.
+    """Whether the inverse explains as one cause, and better, what takes several causes as recorded.
 
-    Other axes of both velocities explain as much up to the calibration's small angles, which these do not have.
+    Other axes of both velocities explain as much but for the small angles of a calibration, which they lack.
     """
     if inverse.fit is None or inverse.angular.changed or inverse.linear.changed:
         return False

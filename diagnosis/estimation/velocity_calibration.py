@@ -17,13 +17,13 @@ from ..tracks.track_segments import repeated
 from .result import Diagnosis
 
 MIN_INTERVALS = 20
-"""of which the cameras must tell the motion"""
+"""with a motion from odometry"""
 SNAP = 0.15
 """intervals: a shift this near to a usual one (`Shift`) is taken for it"""
 
 
 def calibrate_velocities(sequence: Sequence, seen_by_cameras: Odometry, processes: int) -> Diagnosis:
-    """What the cameras say of the velocities of a recording in SI units."""
+    """The calibration of the velocities of a recording in SI units against its stereo odometry."""
     copies = repeated(sequence)
     known = seen_by_cameras.known
     if known.sum() < MIN_INTERVALS:
@@ -34,7 +34,7 @@ def calibrate_velocities(sequence: Sequence, seen_by_cameras: Odometry, processe
 
 
 def _axes_of(sequence: Sequence, seen_by_cameras: Odometry) -> tuple[Axes, Axes]:
-    """The conventions of angular and linear velocity."""
+    """The axis conventions of angular and linear velocity."""
     seen, recorded, known = (
         seen_by_cameras.twist(sequence.dt),
         held_twist(sequence, Shift.MIDDLE),
@@ -55,7 +55,7 @@ def calibrate_with_axes(
     given_shift: float | None = None,
     processes: int = 1,
 ) -> Diagnosis:
-    """Delay, bias, scale, misalignment and noise of velocities in these axes; a shift that is given is taken."""
+    """Delay (unless `given_shift`), bias, scale, misalignment and noise of velocities in given axes."""
     seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
     dt = float(np.median(sequence.dt))
     when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)

@@ -1,4 +1,4 @@
-"""`diagnosis.json` as a plain dict: a diagnosis for programs."""
+"""The contents of `diagnosis.json`: a diagnosis as a plain dict."""
 
 from dataclasses import asdict
 from importlib.metadata import version
@@ -22,9 +22,11 @@ SCHEMA = "fgbaseline/diagnosis/1"
 def to_json(
     diagnosis: Diagnosis, tracks: TrackStatistics | None = None, findings: tuple[Finding, ...] | None = None
 ) -> dict[str, Any]:
-    """The contents of `diagnosis.json`: numbers, texts, lists and dicts alone, and None, with its reason under `notes`,
-    for what is not a number. `tracks` and `findings` are computed where they are not given. docs/diagnosis.md says what
-    each key means."""
+    """The contents of `diagnosis.json`, whose keys docs/diagnosis.md describes: numbers, texts, lists and dicts.
+
+    None stands for a value that is not finite, with its reason under `notes`. `tracks` and `findings` are computed
+    where they are not given.
+    """
     tracks = tracks or track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks) if findings is None else findings
     report = _sequence(diagnosis) | {

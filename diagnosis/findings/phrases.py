@@ -1,4 +1,4 @@
-"""Findings, and how figures stand in sentences."""
+"""Lists, vectors and ranges of frames formatted for sentences."""
 
 from collections.abc import Iterable
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What is wrong with the tracks and the time stamps, in sentences."""
+"""Findings on tracks and time stamps, in sentences."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ MIN_DEPTHLESS, MIN_TINY, MIN_ROWS, MIN_MOVING = 0.0075, 0.02, 0.01, 0.01
 
 
 def track_findings(sequence: Sequence, repeated: BoolArray, tracks: TrackStatistics) -> tuple[Finding, ...]:
-    """Copied frames, wrong matches, moving things, unusable observations, cuts, and times without images."""
+    """Copied frames, wrong matches, dynamic landmarks, unusable observations, cuts and gaps."""
     counts = (
         _copies(repeated, tracks),
         _wrong_matches(tracks),

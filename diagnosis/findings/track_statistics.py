@@ -1,4 +1,4 @@
-"""The state of the tracks: what each observation is worth, and which links contradict the motion of their frames."""
+"""Statistics of tracks: unusable observations, and track segments that contradict the odometry of their interval."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,11 @@ BURST = 1.0 / 3.0
 BURST_LINKS = 5
 """that must contradict it, so that few features are not taken for many errors"""
 WRONG_PIXEL = 0.5
-"""px: noise of the rows that is nobody's mistake; links that it explains (at four sigmas) are not wrong"""
+"""px: usual noise of the rows; segments within four sigmas of it are not wrong"""
 MOVING_LINKS = 5
 """of a track in succession that contradict the motion: a wrong match contradicts it once or twice"""
 MIN_USABLE = 6
-"""features of a frame: with fewer its motion is not told by the cameras"""
+"""features of a frame, below which odometry has no motion"""
 GAP = 2.5
 """times the median interval"""
 
@@ -72,7 +72,7 @@ class TrackStatistics:
 
 
 def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> TrackStatistics:
-    """Counts what the tracks of a diagnosed recording are like; `repaired` is `repair(diagnosis, MaskSettings())`."""
+    """Statistics of the tracks of a diagnosed recording; `repaired` is `repair(diagnosis, MaskSettings())`."""
     sequence = diagnosis.sequence
     o, n = sequence.observations, sequence.n_frames - 1
     apart = disparity(o.pixel)

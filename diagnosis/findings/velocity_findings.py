@@ -1,4 +1,4 @@
-"""What a diagnosis comes to, in sentences: what is surely wrong, and what the recording cannot tell."""
+"""Findings on units, velocities and calibration, and parameters that are not identifiable, in sentences."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
 
 
 def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> tuple[Finding, ...]:
-    """What is surely wrong, velocities first; none for a clean recording. `tracks` is `track_statistics(diagnosis)`."""
+    """Significant faults, velocities first; none for a clean recording. `tracks` is `track_statistics(diagnosis)`."""
     told: list[Finding] = [*diagnosis.sequence.findings]
     if diagnosis.recorded is not None:
         told += unit_findings(diagnosis.units, diagnosis.recorded)
@@ -49,7 +49,7 @@ def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> 
 
 
 def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """What was done to a recording before anything else: units, and an extrinsic inverted; one sentence each."""
+    """Conversions of units and an inverted extrinsic, which precede all else; one sentence each."""
     done = [f"{LABELS[name]} multiplied by {f:.6g}" for name in NAMES if (f := getattr(diagnosis.units, name)) != 1.0]
     return (*done, *(["extrinsic imu_T_cam inverted"] if diagnosis.inverted else []))
 
@@ -67,7 +67,7 @@ def _extrinsic_inverse(before: float, after: float) -> Finding:
 
 
 def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """What the recording cannot tell, one sentence each."""
+    """Parameters that the recording does not determine, one sentence each."""
     if diagnosis.cannot_tell:
         return (f"Nothing about the velocities: {diagnosis.cannot_tell}.",)
     told = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
@@ -87,7 +87,7 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def rate_error(diagnosis: Diagnosis, shift: float, bias: FloatArray, convention: str) -> float:
-    """rad/s: median distance of the recorded angular velocity, so repaired, from what the cameras see."""
+    """Median error in rad/s of the angular velocity against odometry, with this shift, bias and convention."""
     assert diagnosis.odometry is not None
     known = diagnosis.odometry.known
     recorded = held_twist(diagnosis.sequence, shift)

@@ -1,4 +1,4 @@
-"""Noise, bias and calibration errors from bundle adjustments of many short windows."""
+"""Variance components and calibration errors from bundle adjustments of many short windows."""
 
 from dataclasses import dataclass, replace
 
@@ -28,29 +28,28 @@ its residual is no evidence of noise"""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationFit:
-    """What the windows agree on."""
+    """Noise and calibration parameters in common to all windows."""
 
     sigmas: NoiseSettings
-    """the noise that a filter may believe"""
+    """noise for a filter, correlated errors included"""
     shared: FloatArray
     """(8,) see `residuals.SHARED`"""
     deviation: FloatArray
-    """(8,) standard errors, from the spread between windows where that is larger than what each claims"""
+    """(8,) standard errors, from the spread between windows where that is larger than the formal ones"""
     windows: int
     inflation: Inflation
     white: NoiseSettings
-    """the noise as it seems within a window: `sigmas` without what lasts"""
+    """white noise within a window: `sigmas` without time-correlated errors"""
     motion: FloatArray
     """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
     unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
 
 
 def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> CalibrationFit | None:
-    """The common answer of windows spread over the recording; None where no window has enough observations.
+    """The fit of windows spread over the recording; None where no window has enough observations.
 
-    `twist` (T-1, 6) is the recorded velocity of each interval, turned to the axes of imu_T_cam. The sigmas are the
-    variance components at which residuals are as large as their degrees of freedom say; medians over axes and windows
-    keep a bad window from deciding.
+    `twist` (T-1, 6) is the recorded velocity of each interval in the axes of imu_T_cam. The sigmas are the variance
+    components at which squared residuals match their degrees of freedom, as medians over axes and windows.
     """
     windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames))
     if not windows:
@@ -111,9 +110,9 @@ def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
     """The information-weighted mean (8,) of the shared parameters, windows far off left out, and its deviation."""
     information = np.array([fit.shared_information for fit in fits])
     values = np.array([fit.shared for fit in fits])
-    centre = np.median(values, axis=0)
-    spread = 1.4826 * np.median(np.abs(values - centre), axis=0) + 1e-9
-    keep = (np.abs(values - centre) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
+    center = np.median(values, axis=0)
+    spread = 1.4826 * np.median(np.abs(values - center), axis=0) + 1e-9
+    keep = (np.abs(values - center) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
     total = information[keep].sum(axis=0) + SHARED_PRIOR
     mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))
     claimed = np.sqrt(np.diag(np.linalg.inv(total)))

@@ -1,9 +1,9 @@
-"""Errors that last: what accumulates between cameras and velocities beyond white noise, and whom to blame for it.
+"""Time-correlated noise: inflation factors of white noise, for pixels or for velocities.
 
-Pixel errors last along a track, and some are common to all tracks: averaging over many frames helps less than for white
-noise. A filter that takes them for white believes its cameras too much, and its path wanders away from velocities that
-are better. Or the velocities are the ones that drift. Experiments over windows of the recording say how much there is;
-that two halves of the tracks disagree says that it is the cameras.
+Pixel errors are correlated along a track, and some are common to all tracks, so that averaging over frames helps less
+than for white noise. A filter that assumes white noise is then overconfident in its cameras. Or the velocities drift.
+Windows of the recording give the excess of the difference between both over white noise; a disagreement between two
+halves of the tracks attributes it to the cameras.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from ..windows.bundle_adjustment import fit_windows_alike
 from ..windows.residuals import SCALE, TURN, Window, WindowData
 
 LOOSE = 30.0
-"""times the velocity noise, with which a window is fitted so that the cameras decide"""
+"""times the velocity noise, for fits that the cameras dominate"""
 MIN_LANDMARKS = 8
-"""of a fit that the cameras decide"""
+"""of a fit that the cameras dominate"""
 MIN_WINDOWS = 3
 LASTING = 1.5
-"""factor between halves of the tracks from which on the errors of the cameras are seen to last"""
+"""factor between halves of the tracks from which on pixel errors count as time-correlated"""
 MAX_FACTOR = 20.0
 CHI_SQUARE_6_MEDIAN = 5.3481
 ITERATIONS = 4
@@ -31,22 +31,21 @@ ITERATIONS = 4
 
 @dataclass(frozen=True, slots=True)
 class Inflation:
-    """Factors of white noise, at least 1."""
+    """Factors on white noise, at least 1."""
 
     halves: float = 1.0
-    """of the pixels: between the motions over a window that two halves of the tracks tell, for errors that each track
-    has of its own"""
+    """of the pixels, for errors independent between tracks: from the motions by two halves of the tracks"""
     pixel: float = 1.0
-    """of the pixels, all told; where it is above `halves`, tracks share errors too: what accumulates between cameras
-    and velocities is blamed on the cameras if their errors are seen to last"""
+    """of the pixels, in total; above `halves` where tracks share errors: the excess against velocities is attributed to
+    cameras whose errors are time-correlated"""
     velocity: float = 1.0
-    """of the velocities: else it is blamed on them"""
+    """of the velocities, to which the excess is attributed otherwise"""
 
 
 def inflation_of(
     sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: NoiseSettings, processes: int = 1
 ) -> Inflation:
-    """From windows without gaps; `shared` is what they agree on, `sigmas` the noise as it seems within them."""
+    """Inflation from windows without gaps, with their common `shared` parameters (8,) and white noise `sigmas`."""
     loose = NoiseSettings(sigmas.pixel, LOOSE * sigmas.linear_velocity, LOOSE * sigmas.angular_velocity)
     pairs = [window for window in windows if len(window[2]) >= 2 * MIN_LANDMARKS]
     both = [_half(window, parity) for window in pairs for parity in (0, 1)]

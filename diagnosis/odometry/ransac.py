@@ -1,4 +1,4 @@
-"""Motions between two frames that three links each would have, and which of them agrees with most of the others.
+"""RANSAC over motions between two frames, with minimal samples of three track segments and MSAC's truncated cost.
 
 Each coordinate is in an array of its own, over all pairs of frames: stacks of small matrices take ten times as long.
 """
@@ -11,7 +11,7 @@ from fgbaseline.geometry import FloatArray, StereoCamera
 from ..tracks.track_segments import BLOCK, TrackSegments
 
 HYPOTHESES = 48
-"""per pair of frames; with half of the links wrong, one of them is right with probability 0.998"""
+"""per pair of frames; with half of the segments wrong, one of them is right with probability 0.998"""
 TRUNCATION = 16.0
 """of a squared whitened residual of three rows"""
 SEED = 20260
@@ -20,9 +20,9 @@ SEED = 20260
 def best_hypotheses(
     camera: StereoCamera, links: TrackSegments, n_pairs: int, count: IntArray, known: BoolArray
 ) -> FloatArray:
-    """(n_pairs, 4, 4) the motion of least truncated cost among three-link hypotheses and standing still.
+    """(n_pairs, 4, 4) the motion of least truncated cost among three-point hypotheses and the identity.
 
-    `links` are those of the `known` pairs, sorted by pair, `count` (n_pairs,) how many each pair has.
+    `links` are the segments of the `known` pairs, sorted by pair, `count` (n_pairs,) their number in each pair.
     """
     pairs = np.flatnonzero(known)
     best = np.tile(np.eye(4), (n_pairs, 1, 1))
@@ -41,7 +41,7 @@ def best_hypotheses(
     start = (np.cumsum(count[pairs]) - count[pairs])[:, None]
     pick = np.concatenate([start + _three_of(rng, count[pairs]) for _ in range(HYPOTHESES)])
     compete(_through_three(point[:, pick.T], after[:, pick.T]).reshape(3, 4, HYPOTHESES, len(pairs)))
-    for shift in (1, -1):  # a neighbour's motion is a good guess where few links are right
+    for shift in (1, -1):  # a neighbor's motion is a good guess where few links are right
         compete(_columns(np.roll(best, shift, axis=0)[pairs]))
     return best
 
@@ -71,11 +71,11 @@ def _through_three(points: FloatArray, moved: FloatArray) -> FloatArray:
     """
     weight = 1.0 / (np.sqrt((points**2).sum(axis=0)) + np.sqrt((moved**2).sum(axis=0))) ** 2
     weight /= weight.sum(axis=0)
-    centre, moved_centre = (weight * points).sum(axis=1), (weight * moved).sum(axis=1)
+    center, moved_center = (weight * points).sum(axis=1), (weight * moved).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         axes, moved_axes = _axes_of_plane(points), _axes_of_plane(moved)
-        a = (axes[:2, :, None] * (points - centre[:, None])).sum(axis=1)
-        b = (moved_axes[:2, :, None] * (moved - moved_centre[:, None])).sum(axis=1)
+        a = (axes[:2, :, None] * (points - center[:, None])).sum(axis=1)
+        b = (moved_axes[:2, :, None] * (moved - moved_center[:, None])).sum(axis=1)
         cosine = (weight * (a * b).sum(axis=0)).sum(axis=0)
         sine = (weight * (a[0] * b[1] - a[1] * b[0])).sum(axis=0)
         length = np.hypot(cosine, sine)
@@ -84,7 +84,7 @@ def _through_three(points: FloatArray, moved: FloatArray) -> FloatArray:
     turned = np.stack([cosine * f + sine * g, cosine * g - sine * f, normal])
     M = np.empty((3, 4, points.shape[2]))
     M[:, :3] = (turned[:, :, None] * axes[:, None]).sum(axis=0)
-    M[:, 3] = moved_centre - (M[:, :3] * centre).sum(axis=1)
+    M[:, 3] = moved_center - (M[:, :3] * center).sum(axis=1)
     return M
 
 

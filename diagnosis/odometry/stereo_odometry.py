@@ -1,9 +1,8 @@
-"""Stereo visual odometry from frame to frame: what the cameras alone say of the motion. Robust, and vectorised over
-all pairs of frames at once.
+"""Stereo visual odometry from frame to frame, robust and vectorized over all pairs of frames.
 
-Every pair of frames has its own motion. Hypotheses come from three links each (Kabsch), the one with the least
-truncated cost wins (MSAC, Torr and Zisserman 2000) and is refined by iteratively reweighted least squares on the pixels
-of the second frame, each whitened by its own noise and by that of the point it is predicted from.
+Hypotheses of a pair's motion come from three track segments each (Kabsch); the one of least truncated cost (MSAC, Torr
+and Zisserman 2000) is refined by iteratively reweighted least squares. Residuals are pixels of the second frame,
+whitened by their own noise and by that of the point from which they are predicted.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from ..tracks.track_segments import TrackSegments, track_segments
 from .ransac import TRUNCATION, best_hypotheses
 
 MIN_LINKS = 6
-"""per pair of frames, for a motion to be told"""
+"""per pair of frames, for a motion to be estimated"""
 REFINEMENTS = 12
 SINGULAR_CONDITION = 1e12
 """of a motion's information in baselines and radians: beyond it the motion is not determined"""
@@ -45,7 +44,7 @@ class Odometry:
 
     @property
     def inlier(self) -> BoolArray:
-        """(n,) links that agree with the motion of their pair."""
+        """(n,) segments that agree with the motion of their pair."""
         return np.asarray(self.whitened < TRUNCATION, dtype=np.bool_)
 
     def twist(self, dt: FloatArray) -> FloatArray:
@@ -56,7 +55,7 @@ class Odometry:
 
 
 def odometry(sequence: Sequence) -> Odometry:
-    """The motion of every pair of consecutive frames that enough links tell of."""
+    """The motion of every pair of consecutive frames with enough track segments."""
     links, camera, n_pairs = track_segments(sequence), sequence.camera, sequence.n_frames - 1
     count = np.bincount(links.frame, minlength=n_pairs)
     known = count >= MIN_LINKS

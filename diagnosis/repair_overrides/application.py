@@ -1,4 +1,4 @@
-"""A diagnosis with what somebody knows better in place of what it found, and how that is told and written."""
+"""Application of user-specified repairs to a diagnosis."""
 
 from dataclasses import replace
 
@@ -24,10 +24,11 @@ SAME = 1e-3
 
 
 def with_overrides(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
-    """The diagnosis that has the given values where `repairs` has some.
+    """The diagnosis with the values of `repairs` in place of its estimates.
 
-    Axes and shift are given before bias, misalignment and noise are found, which depend on them. Where nothing could be
-    found, the rest is `ASSUMED` noise and no fault. Raises InputError for a shift beyond the recording.
+    Axes and shift are applied before bias, misalignment and noise are estimated, which depend on them. Where nothing
+    could be estimated, the rest is the default `NoiseSettings` and no fault. Raises InputError for a shift beyond the
+    recording.
     """
     apart = ("sigma", "mask", "units", "extrinsic_inverted")
     given = frozenset(name for name, value in repairs if name not in apart and value is not None)
@@ -48,7 +49,7 @@ def with_overrides(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
 
 
 def with_given_units(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
-    """The diagnosis of the recording in the units, and with the extrinsic, that are given."""
+    """The diagnosis with the units and the direction of the extrinsic of `repairs`, computed anew where they differ."""
     units, inverted = repairs.units.given(), repairs.extrinsic_inverted
     same = not diagnosis.units.doubt and all(getattr(diagnosis.units, name) == units[name] for name in units)
     if same and inverted in (None, diagnosis.inverted):
@@ -92,7 +93,7 @@ def _fit(found: Diagnosis, repairs: Repairs) -> CalibrationFit:
 
 
 def mask_settings(repairs: Repairs) -> tuple[MaskSettings, TrackRepairs]:
-    """What an observation must satisfy, and what is done to tracks."""
+    """Mask settings and track repairs with the values of `repairs`."""
     mask, default = repairs.mask, MaskSettings()
     given = mask.model_dump(exclude_none=True, include={"min_disparity", "max_row_mismatch", "min_track"})
     tracks = TrackRepairs(
@@ -102,7 +103,7 @@ def mask_settings(repairs: Repairs) -> tuple[MaskSettings, TrackRepairs]:
 
 
 def override_sentences(repairs: Repairs) -> tuple[str, ...]:
-    """What was set by hand, one sentence each."""
+    """The user-specified values, one sentence each."""
     values = repairs.model_dump(exclude_none=True)
     flat = {name: value for name, value in values.items() if not isinstance(value, dict)}
     flat |= {f"{table}.{name}": value for table in ("units", "sigma", "mask") for name, value in values[table].items()}

@@ -1,4 +1,4 @@
-"""Repairs set by hand in a TOML file, in place of what the diagnosis finds."""
+"""User-specified repairs, read from a TOML file, in place of the estimates of the diagnosis."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
@@ -11,12 +11,12 @@ from fgbaseline.data.time_unit import TimeUnit
 from fgbaseline.data.toml_file import is_finite_number, read_toml
 
 AS_RECORDED = "as-recorded"
-"""the word that turns a repair off"""
+"""keyword that disables a repair"""
 Vector: TypeAlias = tuple[float, float, float]
 
 
 def read_repairs(path: FilePath) -> "Repairs":
-    """The repairs in a TOML file. Raises InputError with file, line and key for what cannot be."""
+    """The repairs in a TOML file. Raises InputError with file and key path for an invalid value."""
     return read_toml(path, Repairs).content
 
 
@@ -74,7 +74,7 @@ class _Overrides(BaseModel):
 
 
 class SigmaOverrides(_Overrides):
-    """Standard deviations in place of those found."""
+    """Standard deviations in place of the estimated ones."""
 
     linear_velocity: Annotated[float, PlainValidator(_between(1e-6, 1e3))] | None = None
     """m/s, of the velocity held over an interval"""
@@ -85,7 +85,7 @@ class SigmaOverrides(_Overrides):
 
 
 class MaskOverrides(_Overrides):
-    """What an observation must satisfy, in place of `track_mask.MaskSettings` and of the gate found."""
+    """Thresholds in place of `MaskSettings` and of the adaptive gate."""
 
     prediction_gate: Annotated[float, PlainValidator(_between(0.01, 1e4))] | None = None
     """px"""
@@ -102,7 +102,7 @@ class MaskOverrides(_Overrides):
 
 
 class UnitOverrides(_Overrides):
-    """What one unit of the recorded values is in SI; 'as-recorded' for 1."""
+    """Factors that convert recorded values to SI; 'as-recorded' for 1."""
 
     time: Annotated[float, PlainValidator(_time_unit)] | None = None
     """s, or the name of the unit: s, ms, us, ns"""
@@ -114,15 +114,15 @@ class UnitOverrides(_Overrides):
     """m"""
 
     def given(self) -> dict[str, float]:
-        """Those that are set, by the names of `diagnose.units.Units`."""
+        """The specified factors, by the names of `Units`."""
         return {name.partition("_")[0]: value for name, value in self if value is not None}
 
 
 class Repairs(_Overrides):
-    """Each replaces what the diagnosis finds; None leaves it to the diagnosis, 'as-recorded' turns it off."""
+    """Values in place of the estimates of the diagnosis; None keeps the estimate, 'as-recorded' disables a repair."""
 
     angular_axes: Annotated[str, PlainValidator(_axes)] | None = None
-    """convention (`data.axes`) of the recorded angular velocity"""
+    """convention (`data.axis_conventions`) of the recorded angular velocity"""
     linear_axes: Annotated[str, PlainValidator(_axes)] | None = None
     """convention of the recorded linear velocity"""
     gyro_bias: Annotated[Vector, PlainValidator(_vector(10.0, "rad/s"))] | None = None

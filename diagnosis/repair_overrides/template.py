@@ -1,4 +1,4 @@
-"""What a diagnosis found, as a TOML file of repairs to edit."""
+"""The estimates of a diagnosis as a TOML file of repairs to edit."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ from ..tracks.observation_mask import MaskSettings
 
 
 def repairs_text(diagnosis: Diagnosis) -> str:
-    """The file that `read_repairs` reads: what the calibrated problem uses, and beside it how well it is known."""
+    """The text of a file for `read_repairs`: the values of the calibrated problem, with their uncertainties."""
     return "\n".join(_lines(diagnosis)) + "\n"
 
 

@@ -1,9 +1,8 @@
-"""Over an interval that the cameras do not see, the velocities of its neighbours tell more than its own noisy sample.
+"""Velocities over visual dropouts, averaged over neighboring intervals.
 
-The velocity of a body changes little within a few intervals; where its measurement has more noise than that, an average
-over the neighbours is nearer to the truth. Where the cameras see the motion this is not needed, and would make the
-errors of neighbouring increments depend on each other; where they are blind for an interval or two, everything that
-follows hangs on that one sample.
+The velocity of a body changes little within a few intervals. Where its measurement noise is larger than that change, an
+average over neighbors is more accurate. Elsewhere the average would only correlate neighboring increments.
+In a dropout the whole path after it depends on a single noisy sample.
 """
 
 from dataclasses import dataclass
@@ -19,25 +18,25 @@ from ..odometry.stereo_odometry import MIN_LINKS
 MAX_MARGIN = 8
 """intervals to each side"""
 MIN_SAMPLES = 20
-"""stretches of seen motion from which to tell how much a velocity changes"""
+"""stretches of odometry from which the change of a velocity is estimated"""
 LONGEST = 10
-"""intervals: a longer blind stretch is left to its own samples, whose noise averages by itself"""
+"""intervals: the noise of a longer dropout averages out by itself"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DropoutVelocities:
-    """Velocities of all intervals, and what is known of them."""
+    """Velocities of all intervals, with their standard deviations."""
 
     twist: FloatArray
     """(T-1, 6) m/s and rad/s"""
     deviation: FloatArray
     """(T-1, 6) of independent errors of the intervals"""
     blind: IntArray
-    """the intervals that take their velocity from their neighbours"""
+    """the intervals with averaged velocities"""
 
 
 def dropout_intervals(observations: Observations, n_frames: int) -> BoolArray:
-    """(T-1,) those whose two frames have too few landmarks in common to tell the motion between them."""
+    """(T-1,) intervals whose two frames have too few common landmarks for odometry."""
     order = observations.by_track()
     frame, landmark = observations.frame[order], observations.landmark[order]
     linked = (landmark[:-1] == landmark[1:]) & (frame[:-1] + 1 == frame[1:])
@@ -48,11 +47,11 @@ def dropout_intervals(observations: Observations, n_frames: int) -> BoolArray:
 def averaged_over_dropouts(
     twist: FloatArray, seen: FloatArray, blind: BoolArray, sigma: FloatArray
 ) -> DropoutVelocities:
-    """Recorded velocities (T-1, 6) of noise `sigma` (6,), those of `blind` intervals averaged over their neighbours.
+    """Recorded velocities (T-1, 6) of noise `sigma` (6,), those of `blind` intervals averaged over neighbors.
 
-    How many neighbours is decided for each component and length of a blind stretch: the noise of the average against
-    how far the mean over a stretch is from that over stretch and neighbours, in what the cameras have `seen` (T-1, 6,
-    NaN where nothing). The intervals of a stretch share their error, which is spread over them.
+    The number of neighbors minimizes, for each component and length of a dropout, the noise of the average plus its
+    bias. The bias is the difference of the mean over a stretch from that over stretch and neighbors in the odometry
+    `seen` (T-1, 6, NaN where unknown). The intervals of a dropout share their error, which is divided among them.
     """
     result, deviation = twist.copy(), np.tile(sigma, (len(twist), 1))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], blind, [False]]).astype(np.int8)))
@@ -74,7 +73,7 @@ def averaged_over_dropouts(
 
 
 def _best_margins(seen: FloatArray, length: int, sigma: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For each component how many neighbours to either side (6,), and the deviation (6,) of each interval then."""
+    """For each component how many neighbors to either side (6,), and the deviation (6,) of each interval then."""
     variance = np.full((MAX_MARGIN + 1, len(sigma)), np.inf)
     variance[0] = sigma**2
     for margin in range(1, MAX_MARGIN + 1):

@@ -1,4 +1,4 @@
-"""Points that no standing landmark explains, and points that no observation fixes: out of the mask for everybody."""
+"""Exclusion of landmarks that are dynamic, or whose position the observations do not determine."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,9 @@ from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 PIECE = 8
-"""observations of a track that are judged together: short enough for the odometry to have hardly drifted"""
+"""observations of a track that are tested together: few, so that odometry has hardly drifted"""
 MOVING = 6.0
-"""times the usual error of a piece, from which on its point moved"""
+"""times the median error of a piece, from which on its point is dynamic"""
 MOVING_LEAST = 2.0
 """px"""
 UNDETERMINED = 2.0
@@ -23,11 +23,11 @@ UNDETERMINED = 2.0
 def exclude_landmarks(
     sequence: Sequence, world_T_imu: FloatArray, excluded: NDArray[np.uint8], sigma: float
 ) -> NDArray[np.uint8]:
-    """`excluded` (n,) with the observations of moving and of undetermined points out.
+    """The mask `excluded` (n,) with observations of dynamic and of undetermined landmarks excluded too.
 
-    Landmarks are triangulated along a path (T, 4, 4) that is right locally. One moves where most of its track does not
-    fit a standing point: in pieces, whose errors are compared with those of all. One is undetermined where `sigma`
-    (px) leaves its distance open, or where it lies behind a camera that saw it.
+    Landmarks are triangulated along a locally accurate path (T, 4, 4). A landmark is dynamic where most pieces of its
+    track do not fit a static point, compared with the errors of all pieces. It is undetermined where `sigma` (px)
+    leaves its distance open, or where it violates cheirality.
     """
     chosen = np.flatnonzero(excluded == Excluded.NO)
     if len(chosen) == 0:

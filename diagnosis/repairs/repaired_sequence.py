@@ -1,4 +1,4 @@
-"""The recording as it should have been: what the diagnosis is sure of, put right."""
+"""Repair of a recording by the significant estimates of its diagnosis."""
 
 from dataclasses import dataclass, replace
 
@@ -29,10 +29,10 @@ from .significance import significant_bias, significant_misalignment, significan
 
 @dataclass(frozen=True, slots=True)
 class TrackRepairs:
-    """What is done to tracks."""
+    """Settings for the repair of tracks."""
 
     gate: float | None = None
-    """px, of a link's prediction; None for `GATE` times the median error"""
+    """px, of a prediction along a track; None for `prediction_gate`"""
     split: bool = True
     """whether every run of a track that jumps becomes a landmark of its own, or only the longest takes part"""
     mask_copies: bool = True
@@ -40,7 +40,7 @@ class TrackRepairs:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Repaired:
-    """A repaired recording, which of its observations can be trusted, and what was done."""
+    """A repaired recording, the mask of its observations, and the repairs in sentences."""
 
     sequence: Sequence
     excluded: NDArray[np.uint8]
@@ -51,8 +51,8 @@ class Repaired:
 
 
 def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None = None) -> Repaired:
-    """Velocities in the axes of imu_T_cam without their bias, the extrinsic turned, disparities without their offset,
-    broken tracks split."""
+    """The recording with velocities in the axes of imu_T_cam and without bias, the extrinsic aligned, disparities
+    without offset, and broken tracks split."""
     sequence, done = diagnosis.sequence, []
     linear, angular = diagnosis.linear, diagnosis.angular
     bias, angle = significant_bias(diagnosis), significant_misalignment(diagnosis)

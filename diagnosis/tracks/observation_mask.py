@@ -1,4 +1,4 @@
-"""Which observations a track can be trusted with: the mask, computed once and before any estimator."""
+"""The mask of observations that are consistent along their tracks, computed once and before any estimator."""
 
 from dataclasses import dataclass
 
@@ -14,30 +14,30 @@ from fgbaseline.geometry.measurement import measured_rows
 GATE_RANGE = (3.0, 12.0)
 """px"""
 GATE = 6.0
-"""times the median error of a link"""
+"""times the median prediction error"""
 
 
 @dataclass(frozen=True, slots=True)
 class MaskSettings:
-    """What an observation must satisfy to take part."""
+    """Thresholds for an observation to be used."""
 
     min_disparity: float = 1.0
     """px; below it depth is not determined"""
     max_row_mismatch: float = 3.0
     """px; |vL - vR| of a rectified pair"""
     prediction_gate: float = 12.0
-    """px; norm of (uL, uR, v) against the track's observation before, carried along by the velocities"""
+    """px; norm of (uL, uR, v) against the prediction from the track's observation before"""
     min_track: int = 3
-    """observations a track must have left, so that one can be checked against two others"""
+    """observations of a track after masking, so that each can be checked against two others"""
 
 
 def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings) -> NDArray[np.uint8]:
     """An `Excluded` (n,) for each observation, from the tracks and the dead-reckoned path (T, 4, 4) alone.
 
-    Along each track every observation is predicted from the one before it by stereo triangulation and the relative
-    motion of the path. Observations whose prediction holds form runs. A single bad one between two that agree is
-    taken out and the run goes on; of the runs that remain the longest (ties: the first) takes part, since a track
-    that jumps has changed its point.
+    Every observation of a track is predicted from the one before by stereo triangulation and the relative motion of the
+    path. Consistent observations form runs. A single outlier between two consistent observations is excluded and the
+    run continues. Of each track the longest run is used (ties: the first), since a track that jumps has changed its
+    point.
     """
     runs = _runs(sequence, world_T_imu, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark
@@ -51,7 +51,7 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SplitTracks:
-    """Tracks cut where they jump to another point."""
+    """Tracks split where they jump to another point."""
 
     landmark: IntArray
     """(n,) the landmark of each observation; pieces after a cut have new numbers from n_landmarks of the sequence on"""
@@ -61,10 +61,9 @@ class SplitTracks:
 
 
 def split_tracks(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
-    """As `exclusions`, but every run that is long enough takes part, as a landmark of its own.
+    """The mask of `exclusions`, but every run that is long enough is used, as a landmark of its own.
 
-    `copied` (n,) are observations that repeat the frame before and were never tracked. The longest run of a track
-    keeps its number.
+    `copied` (n,) marks observations that repeat the frame before. The longest run of a track keeps its number.
     """
     runs = _runs(sequence, world_T_imu, settings, copied)
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark.copy()
@@ -112,7 +111,7 @@ def prediction_gate(errors: FloatArray) -> float:
 
 
 class TrackConsistency:
-    """Tells whether two observations of a track agree on one standing point, given the motion between them."""
+    """The test whether two observations of a track agree on one static point, given the motion between them."""
 
     def __init__(self, sequence: Sequence, world_T_imu: FloatArray, gate: float) -> None:
         self.sequence = sequence
@@ -141,7 +140,7 @@ class TrackConsistency:
 
 
 def _without_lone_outliers(links: TrackConsistency, landmark: IntArray, order: IntArray) -> tuple[IntArray, IntArray]:
-    """`order` without the observations that disagree with both neighbours while these agree, and those taken out."""
+    """`order` without the observations that disagree with both neighbors while these agree, and those taken out."""
     taken_out: list[IntArray] = []
     while len(order) >= 3:
         before, middle, after = order[:-2], order[1:-1], order[2:]

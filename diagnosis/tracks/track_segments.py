@@ -1,4 +1,4 @@
-"""Pairs of observations of one landmark in neighbouring frames: all that visual odometry needs of a recording."""
+"""Track segments: pairs of observations of one landmark in consecutive frames."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ MIN_DISPARITY = 1.0
 MAX_ROW_MISMATCH = 3.0
 """px, |vL - vR|"""
 BLOCK = 8000
-"""links: few enough for their arrays to stay in a processor's cache while they are computed with"""
+"""segments, whose arrays fit into a processor's cache"""
 REPEATED_SHARE = 0.8
-"""of the links of an interval, from which on its tracks count as copied"""
+"""of the segments of an interval, from which on its tracks count as copied"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrackSegments:
-    """n links, sorted by frame: a landmark seen in a frame and in the next one."""
+    """n segments sorted by frame: a landmark observed in a frame and in the next one."""
 
     before: IntArray
     """(n,) index of the observation in frame k"""
@@ -39,11 +39,11 @@ class TrackSegments:
         return len(self.before)
 
     def select(self, chosen: BoolArray | IntArray) -> "TrackSegments":
-        """The links where `chosen` is true, or those at increasing indices."""
+        """The segments where `chosen` is true, or those at increasing indices."""
         return TrackSegments(*(getattr(self, name)[chosen] for name in self.__slots__))
 
     def blocks(self, size: int = BLOCK) -> Iterator[slice]:
-        """Slices of about `size` links, each with all those of its frames."""
+        """Slices of about `size` segments, each with all segments of its frames."""
         ends = np.searchsorted(self.frame, self.frame[size - 1 :: size], side="right").tolist()
         start = 0
         for end in (*ends, len(self)):
@@ -53,14 +53,14 @@ class TrackSegments:
 
 
 def sound(sequence: Sequence) -> BoolArray:
-    """(n,) the observations whose disparity and rows allow a triangulation."""
+    """(n,) observations whose disparity and rows allow a triangulation."""
     pixel = sequence.observations.pixel
     rows = np.abs(pixel[:, 1] - pixel[:, 3]) <= MAX_ROW_MISMATCH
     return np.asarray(rows & (disparity(pixel) > MIN_DISPARITY), dtype=np.bool_)
 
 
 def consecutive(sequence: Sequence) -> tuple[IntArray, IntArray]:
-    """Indices (n,) of observations, and (n,) those of the same landmarks one frame later, sorted by frame."""
+    """Indices (n,) of observations and (n,) of those of the same landmark one frame later, sorted by frame."""
     o = sequence.observations
     order = o.by_track()
     before, after = order[:-1], order[1:]
@@ -71,10 +71,10 @@ def consecutive(sequence: Sequence) -> tuple[IntArray, IntArray]:
 
 
 def repeated(sequence: Sequence) -> BoolArray:
-    """(T-1,) intervals over which the tracks were copied and not tracked: nearly every pixel is the same to the bit.
+    """(T-1,) intervals with copied tracks: nearly every pixel is bitwise equal to the frame before.
 
-    Such a frame says nothing of the motion, and what its tracks follow afterwards are other points than before. A
-    tracker's sub-pixel positions are never the same twice by chance, also where the camera stands.
+    A copied frame holds no motion, and its tracks often continue as other points. Sub-pixel positions of a tracker are
+    never equal by chance, even for a camera at rest.
     """
     o, n = sequence.observations, sequence.n_frames - 1
     before, after = consecutive(sequence)
@@ -85,7 +85,7 @@ def repeated(sequence: Sequence) -> BoolArray:
 
 
 def track_segments(sequence: Sequence) -> TrackSegments:
-    """All links between sound observations in consecutive frames, but for those over repeated ones."""
+    """All segments between sound observations, without intervals of copied tracks."""
     o = sequence.observations
     before, after = consecutive(sequence)
     use = sound(sequence)

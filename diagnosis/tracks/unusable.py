@@ -1,4 +1,4 @@
-"""Why a recording's observations can be of no use at all, by the mistake that makes them so."""
+"""Faults that make all observations of a recording unusable, by their cause."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from fgbaseline.geometry import disparity
 SWAPPED = 0.9
 """share of the disparities that are negative"""
 MIN_OBSERVATIONS = 20
-"""from which on a share means something"""
+"""from which on a share is meaningful"""
 
 
 def unusable(sequence: Sequence) -> str:
-    """The reason and the remedy, in a sentence without its full stop; empty where there are observations of use."""
+    """Cause and remedy, in a sentence without its full stop; empty where observations are usable."""
     o = sequence.observations
     n = len(o)
     if n == 0:

@@ -1,7 +1,7 @@
 """Bundle adjustment of a short window of frames: poses and landmarks from pixels and velocities together.
 
-Dense and exact: landmarks are eliminated by the Schur complement, poses are few. It gives what frame-to-frame odometry
-cannot, residuals with the right number of degrees of freedom, so that noise can be told from error.
+Dense and exact: landmarks are eliminated by the Schur complement, poses are few. Unlike frame-to-frame odometry it has
+residuals with the right number of degrees of freedom, from which noise can be estimated.
 """
 
 from collections.abc import Sequence
@@ -17,23 +17,23 @@ from .normal_equations import Landmarks, Reduced, around_intervals, landmark_ste
 from .residuals import SHARED, Joined, MotionTerms, Window, joined, motion_terms, pixel_terms
 
 TOGETHER = 8000
-"""observations, from which on windows are not computed any more together: what they need should stay in a cache"""
+"""observations, up to which windows are computed together: their arrays should fit into a cache"""
 SHARED_PRIOR = np.diag(1.0 / np.array([0.1] * 3 + [0.3] + [0.1] * 3 + [1.0]) ** 2)
-"""keeps what a window cannot know (a rotation about the direction of travel) from running away"""
+"""regularizes parameters that a window does not determine (a rotation about the direction of travel)"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WindowFit:
-    """The solution, and what is left of every measurement."""
+    """The solution of a window, with residuals and redundancy."""
 
     poses: FloatArray
     """(W, 4, 4) of the IMU, the first being the identity"""
     points: FloatArray
     """(m, 3) m"""
     shared: FloatArray
-    """(8,) what all windows share: see `residuals.SHARED`"""
+    """(8,) calibration parameters: see `residuals.SHARED`"""
     shared_information: FloatArray
-    """(8, 8) what the window knows of it, the poses and landmarks being unknown too, without any prior"""
+    """(8, 8) information about `shared`, marginal over poses and landmarks, without the prior"""
     motion_residual: FloatArray
     """(W-1, 6) velocity residuals, m/s and rad/s"""
     motion_redundancy: FloatArray
@@ -55,7 +55,7 @@ def fit_windows_alike(
     iterations: int,
     processes: int = 1,
 ) -> list[WindowFit]:
-    """Gauss-Newton of each window by itself; its `shared` (8,) is free too, under a wide prior."""
+    """Gauss-Newton on each window by itself, with its own `shared` (8,) under a wide prior."""
     groups: list[list[int]] = [[]]
     for i in range(len(windows)):
         if sum(len(windows[j][0].frame) for j in groups[-1]) >= TOGETHER:

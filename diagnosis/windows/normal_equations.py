@@ -20,7 +20,7 @@ DAMPING = 3e-10
 
 
 class Landmarks(NamedTuple):
-    """What pixels say of m landmarks and, to be eliminated with them, of poses and offsets."""
+    """Landmark blocks of the normal equations, for the elimination of m landmarks."""
 
     factor: FloatArray
     """(6, m) Cholesky factors of their information, row after row"""
@@ -33,7 +33,7 @@ class Landmarks(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """What the rest says of F poses (right perturbations) and the shared parameters; of held ones there is no use."""
+    """Pose blocks of the normal equations of F poses (right perturbations) and the shared parameters."""
 
     H: FloatArray
     """(F, 6, 6)"""
@@ -46,7 +46,7 @@ class Frames(NamedTuple):
 
 
 class Reduced(NamedTuple):
-    """The equations of K = W-1 poses and the shared parameters of one window, and what leads back to its landmarks."""
+    """The Schur complement of one window on K = W-1 poses and shared parameters, with its back-substitution."""
 
     H: FloatArray
     """(6K + 8, 6K + 8)"""

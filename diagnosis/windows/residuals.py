@@ -1,4 +1,4 @@
-"""What a window of frames is fitted to: its data, and the residuals of pixels and velocities with their derivatives."""
+"""Data of windows, and whitened residuals of pixels and velocities with their Jacobians."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ OFFSET = 7
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WindowData:
-    """What a window of W frames with n observations of m landmarks has to explain."""
+    """Measurements of a window of W frames with n observations of m landmarks."""
 
     frame: IntArray
     """(n,) 0..W-1, sorted"""
@@ -44,7 +44,7 @@ Window = tuple[WindowData, FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Joined:
-    """Several windows in one another's succession, so that their terms are computed together."""
+    """Several windows concatenated, so that their terms are computed together."""
 
     frame: IntArray
     """(n,) of all F frames"""
@@ -70,16 +70,16 @@ class Joined:
 
     @property
     def n_points(self) -> int:
-        """How many landmarks all windows have."""
+        """The number of landmarks of all windows."""
         return int(self.points[-1].stop)
 
     def intervals(self, window: int) -> slice:
-        """Those of one window."""
+        """The slice of intervals of one window."""
         return slice(self.frames[window].start - window, self.frames[window].stop - window - 1)
 
 
 def joined(windows: Sequence[Window]) -> Joined:
-    """The windows one after the other."""
+    """The windows concatenated."""
     data = [window[0] for window in windows]
     observations = _slices([len(d.frame) for d in data])
     frames, points = _slices([len(d.dt) + 1 for d in data]), _slices([len(window[2]) for window in windows])
@@ -102,8 +102,10 @@ def _slices(lengths: list[int]) -> tuple[slice, ...]:
 
 
 class PixelTerms(NamedTuple):
-    """Of n observations the three rows, whitened; each coordinate is in an array of its own, since stacks of small
-    matrices take far longer."""
+    """Whitened residuals of the three rows of n observations, with their Jacobians.
+
+    Each coordinate is in an array of its own, since stacks of small matrices take far longer.
+    """
 
     residual: FloatArray
     """(3, n)"""
@@ -119,7 +121,7 @@ class PixelTerms(NamedTuple):
 
 
 class MotionTerms(NamedTuple):
-    """Of k intervals the velocities, whitened."""
+    """Whitened velocity residuals of k intervals, with their Jacobians."""
 
     residual: FloatArray
     """(k, 6) recorded minus that of the poses"""
@@ -139,7 +141,7 @@ def pixel_terms(
     points: FloatArray,
     shared: FloatArray,
 ) -> PixelTerms:
-    """At poses (F, 4, 4) and points (m, 3), for each window's `shared` parameters (w, 8)."""
+    """Pixel terms at poses (F, 4, 4) and points (m, 3), for each window's `shared` parameters (w, 8)."""
     point = np.take(np.ascontiguousarray(points.T), data.row, axis=1)
     world_T_cam = np.ascontiguousarray(np.moveaxis((poses @ imu_T_cam)[:, :3], 0, 2))
     of_frame = np.take(world_T_cam, data.frame, axis=2)
@@ -158,7 +160,7 @@ def pixel_terms(
 
 
 def motion_terms(data: Joined, poses: FloatArray, sigmas: NoiseSettings, shared: FloatArray) -> MotionTerms:
-    """At poses (F, 4, 4) and each window's `shared` parameters (w, 8)."""
+    """Velocity terms at poses (F, 4, 4) and each window's `shared` parameters (w, 8)."""
     whiten = 1.0 / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
     shared = np.repeat(shared, [f.stop - f.start - 1 for f in data.frames], axis=0)
     back = se3.inverse(poses[data.interval])

@@ -26,7 +26,7 @@ Span = tuple[int, int]
 
 
 def spread_spans(n_frames: int) -> list[Span]:
-    """Windows spread evenly over the recording; neighbours share a frame, so that no interval is left out."""
+    """Windows spread evenly over the recording; neighbors share a frame, so that no interval is left out."""
     size = min(FRAMES, n_frames)
     count = max(1, min(MAX_WINDOWS, -(-(n_frames - 1) // (size - 1))))
     return [(int(start), size) for start in np.unique(np.linspace(0, n_frames - size, count).astype(int))]
