@@ -23,15 +23,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from fgbaseline import compare, data
-from fgbaseline.data import Calibration, Estimate, Problem, Sequence, Status, estimator_names
+from fgbaseline import compare, data, diagnosis
+from fgbaseline.data import Estimate, Problem, Sequence, Status, estimator_names
+from fgbaseline.diagnosis import Calibration
 from fgbaseline.reports.solving import solve_all
 
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 KITTI_07 = ("ece276a_2020/0027.npz", "ground_truth/kitti_odometry_07.txt")
 """a recording without truth, and its truth: poses of the left camera"""
 POSED = {"diagnosed": None, "as recorded": Calibration()}
-"""the settings of `data.calibrated`"""
+"""the settings of `diagnosis.calibrated`"""
 FIRST = ("dead-reckoning", "isam2", "isam2-online", "batch")
 """in this order, so that iSAM2 runs once"""
 Figures: TypeAlias = dict[str, float | int | str | None]
@@ -118,7 +119,7 @@ def main(recordings: Path, only: str, estimators: str, out: Path | None, before:
             continue
         for posed, settings in POSED.items():
             start = time.monotonic()
-            problem = data.calibrated(sequence, settings=settings)
+            problem = diagnosis.calibrated(sequence, settings=settings)
             answers = solve_all(problem, names)
             found[f"{sequence.name}, {posed}"] = {name: figures(problem, answers[name]) for name in names}
             click.echo(f"{sequence.name}, {posed}: {time.monotonic() - start:.0f} s", err=True)

@@ -26,11 +26,12 @@ from matplotlib import pyplot as plt
 from rich.console import Console
 from rich.table import Table
 
-from fgbaseline import compare, data, ekf, smoother
-from fgbaseline.data import Calibration, Estimate, HuberKernel, NoiseSettings, Problem, Sequence, Truth
+from fgbaseline import compare, diagnosis, ekf, smoother
+from fgbaseline.data import Estimate, HuberKernel, Problem, Sequence, Truth
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.track_mask import MaskSettings
+from fgbaseline.diagnosis import Calibration, NoiseSettings
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearization
 from fgbaseline.reports.figures.palette import OWN
 
@@ -58,7 +59,7 @@ class Study:
     def problem(self, sequence: Sequence) -> Problem:
         """The problem that is told all that the simulation did."""
         drive = self.drive
-        return data.calibrated(
+        return diagnosis.calibrated(
             sequence,
             settings=Calibration(
                 noise=NoiseSettings(drive.sigma_pixel, drive.sigma_linear, drive.sigma_angular),

@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.data import Diagnosis, diagnose
-from fgbaseline.data.axes import AXIS_CONVENTIONS
-from fgbaseline.data.diagnose import findings_of
+from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of
 
 RATE = 10.0
 """frames a second"""

@@ -23,7 +23,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.measured import Row, row, table
-from fgbaseline import data, ekf
+from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Problem, Sequence
 from tests.builders.dense_filter import DenseFilter
 
@@ -121,7 +121,7 @@ def documented(sequence: Sequence, runs: int) -> list[Row]:
 
 def joint(sequence: Sequence, runs: int) -> list[Row]:
     """The joint filter, against the time that the recording took."""
-    problem = data.calibrated(sequence)
+    problem = diagnosis.calibrated(sequence)
     duration = float(sequence.t[-1] - sequence.t[0])
     seconds = [cpu_seconds(lambda: ekf.joint_ekf(problem)) for _ in range(runs)]
     return [

@@ -13,10 +13,11 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fgbaseline import data
-from fgbaseline.data import Calibration, NoiseSettings, Problem, Status, find_estimator
+from fgbaseline import data, diagnosis
+from fgbaseline.data import Problem, Status, find_estimator
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import Calibration, NoiseSettings
 
 from .apart import StoppedError, apart, forget_peak, memory, peak_memory
 
@@ -96,7 +97,7 @@ def measured(quick: bool = False) -> list[Point]:
 def posed(drive: Simulation) -> Problem:
     """The problem of a drive with the noise that it has: nothing is diagnosed."""
     noise = NoiseSettings(drive.sigma_pixel, drive.sigma_linear, drive.sigma_angular)
-    return data.calibrated(simulate(drive), settings=Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(drive), settings=Calibration(noise, shift=Shift.AFTER))
 
 
 def _size(axis: str, problem: Problem) -> float:

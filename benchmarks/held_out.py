@@ -28,8 +28,9 @@ from scipy.stats import kendalltau
 
 from fgbaseline import compare
 from fgbaseline.compare.held_out import half_errors
-from fgbaseline.data import HeldOut, Sequence, calibrated, find_estimator, hold_out, read
+from fgbaseline.data import HeldOut, Sequence, find_estimator, read
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import calibrated, hold_out
 from fgbaseline.geometry import FloatArray, se3, so3
 
 NAMES = ("dead-reckoning", "ekf", "joint-ekf", "isam2")

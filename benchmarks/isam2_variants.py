@@ -14,7 +14,7 @@ import click
 import gtsam
 import numpy as np
 
-from fgbaseline import data, smoother
+from fgbaseline import data, diagnosis, smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother.initialization.initial_values import restricted_problem
@@ -137,7 +137,7 @@ def _apart(a: Estimate | None, b: Estimate | None) -> str:
 def main(recordings: tuple[Path, ...]) -> None:
     """Print a table for each recording."""
     for recording in recordings:
-        problem = data.calibrated(data.read(recording))
+        problem = diagnosis.calibrated(data.read(recording))
         click.echo(f"\n{recording.name}:\n\n| variant | s | in updates | final path, m | online path, m |")
         click.echo("|---|---|---|---|---|")
         first: Estimate | None = None

@@ -21,7 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from fgbaseline import compare, data, ekf, smoother
+from fgbaseline import compare, data, diagnosis, ekf, smoother
 from fgbaseline.data import Estimate, Excluded, Problem, Sequence, Status
 from fgbaseline.ekf import JointSettings, Linearization
 from fgbaseline.smoother import ISAM2Settings
@@ -130,7 +130,7 @@ def main(files: tuple[Path, ...], truth: Path | None, truth_frame: str | None) -
     """Split the joint filter's distance from isam2."""
     for file in files:
         sequence = data.read(file, truth, truth_frame)  # type: ignore[arg-type]
-        Console(width=140).print(shown(sequence, steps(data.calibrated(sequence))))
+        Console(width=140).print(shown(sequence, steps(diagnosis.calibrated(sequence))))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from fgbaseline import compare, data, smoother
+from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.compare.cost import cost
 from fgbaseline.data import Estimate, Problem, Sequence, Status
 from fgbaseline.data.simulate import Simulation, simulate
@@ -87,7 +87,7 @@ def main(files: tuple[Path, ...], kernels: str) -> None:
         table.add_column(title, justify="right")
     all_hold = True
     for sequence in recordings(files):
-        posed = data.calibrated(sequence)
+        posed = diagnosis.calibrated(sequence)
         variants = {"with": posed, "without": replace(posed, kernel=None)}
         for kernel, problem in variants.items():
             if kernels in ("both", kernel):

@@ -13,10 +13,11 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fgbaseline import data, smoother
-from fgbaseline.data import Calibration, Estimate, NoiseSettings, Problem, Status
+from fgbaseline import data, diagnosis, smoother
+from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import Calibration, NoiseSettings
 
 from .gtsam_time import INCREMENTAL, OTHER, gtsam_timed
 from .measured import Row, row, table
@@ -39,7 +40,7 @@ def rows(recording: Path | None, runs: int, frames: int = DRIVE_FRAMES) -> list[
 
 def on_recording(recording: Path, runs: int) -> list[Row]:
     """Times real time, and the shares of GTSAM's calls in processor time."""
-    problem = data.calibrated(data.read(recording))
+    problem = diagnosis.calibrated(data.read(recording))
     duration = float(problem.sequence.t[-1] - problem.sequence.t[0])
     real_time, shares = [], []
     for _ in range(runs):
@@ -93,7 +94,7 @@ def long_drive(frames: int, seed: int) -> Problem:
         seed=seed,
     )
     noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
-    return data.calibrated(simulate(simulation), settings=Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(simulation), settings=Calibration(noise, shift=Shift.AFTER))
 
 
 def solved(problem: Problem) -> Estimate:

@@ -48,7 +48,7 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         taken[stage] = time.perf_counter() - start
 
     with watch("imports"):
-        from fgbaseline.data.forks import cores, shared
+        from fgbaseline.data.parallel import cores, shared
         from fgbaseline.reports import job
         from fgbaseline.reports.cli import progress  # noqa: F401
     settings = job.RunSettings(sequence=recording, estimators=estimators)

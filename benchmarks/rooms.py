@@ -1,3 +1,3 @@
 """The folders whose packages are measured."""
 
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports")

@@ -14,21 +14,21 @@ OF_THE_FILE = frozenset(
         "extrinsic_inverse",
     }
 )
-"""codes of faults in how the file was written, which a run prints whatever its preset"""
+"""codes of faults of the file itself, which a run prints with every preset"""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with a recording."""
+    """A fault of a recording."""
 
     code: str
-    """by which programs know it, such as `gyro_bias`"""
+    """identifier for programs, such as `gyro_bias`"""
     sentence: str
-    """for people, with figures"""
+    """description with figures"""
     before: float
     """a figure of the recording as it is, in `unit`"""
     after: float
-    """the same once it is repaired and masked; equal to `before` where nothing can be put right"""
+    """the figure once repaired and masked; equal to `before` where nothing can be repaired"""
     unit: str
     certainty: str
-    """how sure it is: a standard error, a lead in likelihood, or 'counted'"""
+    """a standard error, a lead in likelihood, or 'counted'"""

@@ -1,4 +1,4 @@
-"""TOML files of ours (limits, repairs, suites): read into a pydantic model, and told in one sentence what is wrong.
+"""TOML files (limits, repairs, suites) read into a pydantic model, with one sentence for the first fault.
 
 class Limits(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -6,16 +6,17 @@ class Limits(BaseModel):
 
 file = read_toml(path, Limits)
 file.content.limit[0].metric
-raise file.wrong(("limit", 0, "metric"), "there is no such metric")  # limits.toml: line 7: there is no ...
+raise file.wrong(("limit", 0, "metric"), "there is no such metric")  # limits.toml: limit[0].metric: there is no ...
 """
 
 import difflib
 import json
 import re
+import sys
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, get_args
+from typing import Any, Generic, TypeAlias, TypeGuard, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -23,64 +24,66 @@ from pydantic_core import ErrorDetails
 from fgbaseline.geometry import InputError
 
 from .formats.named_file import FilePath, reading, regular_file, shown
-from .toml_lines import Place, lines_of
 
 SHOWN = 60
 """characters of a value that a sentence repeats"""
 Content = TypeVar("Content", bound=BaseModel)
+Place: TypeAlias = tuple[str | int, ...]
+"""keys and indices that lead from the top of a file to a value, such as ("limit", 0, "metric")"""
 
 
 @dataclass(frozen=True, slots=True)
 class TomlFile(Generic[Content]):
-    """A file that was read, and where everything stands in it."""
+    """The content of a file, and its path for error messages."""
 
     content: Content
     path: FilePath
-    lines: Mapping[Place, int]
-
-    def line(self, place: Place) -> int:
-        """The line, from 1, of a place such as ("limit", 0, "metric"), or of the nearest thing around it."""
-        return _line(self.lines, place)
 
     def wrong(self, place: Place, sentence: str) -> InputError:
-        """The error, to be raised, that says file and line before the sentence."""
-        return _wrong(self.path, self.line(place), sentence)
+        """The error, to be raised, that names file and key path before the sentence."""
+        return _wrong(self.path, key_path(place), sentence)
+
+
+def key_path(place: Place) -> str:
+    """The key path of a place: `limit[3].metric` for ("limit", 3, "metric")."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
 
 
 def read_toml(path: FilePath, model: type[Content]) -> TomlFile[Content]:
     """The TOML file `path` as a `model`, which should forbid extra keys.
 
     TOML has types, so "5" is no number and 1 no truth value; arrays may become tuples, and strings enums and paths.
-    Raises InputError naming the file, the line, the key and what is allowed, for the first thing that is wrong.
+    Raises InputError naming the file, the key path and the allowed values, for the first fault in the file.
     """
     with reading(path):
-        text = regular_file(path).read_bytes()
-        values = _parsed(text)
-    lines = lines_of(text)
+        values = _parsed(regular_file(path).read_bytes())
     try:
         content = model.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         errors = error.errors(include_url=False)
         unknown = [each for each in errors if each["type"] == "extra_forbidden"]  # what explains a missing key
-        told = [_told(each, values, model) for each in unknown or errors]
-        inmost = [(p, said) for p, said in told if not any(other[: len(p)] == p != other for other, _ in told)]
-        line, sentence = min((_line(lines, place), sentence) for place, sentence in inmost)
-        raise _wrong(path, line, sentence) from None
-    return TomlFile(content, path, lines)
+        faults = [_fault(each, values, model) for each in unknown or errors]
+        inmost = [f for f in faults if not any(g[0][: len(f[0])] == f[0] != g[0] for g in faults)]
+        place, value, sentence = min(inmost, key=lambda fault: (_order(fault[0], values), fault))
+        raise _wrong(path, f"{key_path(place)}{value}", sentence) from None
+    return TomlFile(content, path)
 
 
-def _line(lines: Mapping[Place, int], place: Place) -> int:
-    while place and place not in lines:
-        place = place[:-1]
-    return lines.get(place, 1)
+def _order(place: Place, values: Any) -> tuple[int, ...]:
+    """The place by the positions of its keys in the file."""
+    order = []
+    for part in place:
+        order.append(part if isinstance(part, int) else list(values).index(part))
+        values = values[part]
+    return tuple(order)
 
 
-def _wrong(path: FilePath, line: int, sentence: str) -> InputError:
-    return InputError(f"{shown(path)}: line {line}: {sentence}")
+def _wrong(path: FilePath, key: str, sentence: str) -> InputError:
+    return InputError(": ".join(text for text in (shown(path), key, sentence) if text))
 
 
 def _parsed(text: bytes) -> dict[str, Any]:
-    """What the text says. Raises InputError that begins with the line."""
+    """The values in a text. Raises InputError, with the line where the syntax is wrong."""
     try:
         return tomllib.loads(text.decode())
     except UnicodeDecodeError as error:
@@ -95,27 +98,25 @@ def _parsed(text: bytes) -> dict[str, Any]:
         raise InputError("a value in it is too long or too deeply nested to be read; make it simpler") from None
 
 
-def _told(error: ErrorDetails, values: Any, model: type[BaseModel]) -> tuple[Place, str]:
-    """Where it is wrong, and the sentence."""
+def _fault(error: ErrorDetails, values: Any, model: type[BaseModel]) -> tuple[Place, str, str]:
+    """The place of an error, the value there where it is shown (` = 5`), and the sentence."""
     place = _place(error["loc"], values)
-    key = str(error["loc"][-1]) if error["loc"] else ""
-    around = _name(place[:-1]) if place else ""
     if error["type"] == "extra_forbidden":
-        allowed = sorted(_fields(model, place[:-1]))
+        key, around = str(error["loc"][-1]), place[:-1]
+        allowed = sorted(_fields(model, around))
         near = difflib.get_close_matches(key, allowed, n=1)
         meant = f" (did you mean '{near[0]}'?)" if near else ""
-        return place, f"there is no key '{key}'{around}{meant}; allowed are {', '.join(allowed)}"
+        return around, "", f"there is no key '{key}'{meant}; allowed are {', '.join(allowed)}"
     if error["type"] == "missing":
-        return place, f"the key '{key}' is missing{_name(place)}; add it"
-    said = str(error["ctx"]["error"]) if error["type"] == "value_error" else _rule(error)
-    last = next((part for part in reversed(place) if isinstance(part, str)), None)
-    if isinstance(error["input"], dict) or last is None:
-        return place, said if last is None else f"[{_dotted(place)}]: {said}"
-    return place, f"{last} = {_shortened(json.dumps(error['input'], ensure_ascii=False, default=str))}{around}: {said}"
+        return place, "", f"the key '{error['loc'][-1]}' is missing; add it"
+    sentence = str(error["ctx"]["error"]) if error["type"] == "value_error" else _rule(error)
+    if isinstance(error["input"], dict) or not place:
+        return place, "", sentence
+    return place, f" = {_shortened(json.dumps(error['input'], ensure_ascii=False, default=str))}", sentence
 
 
 def _rule(error: ErrorDetails) -> str:
-    """What pydantic allows, as the end of a sentence."""
+    """The rule that pydantic states, as the end of a sentence."""
     _, should, allowed = error["msg"].partition(", unable")[0].partition(" should ")
     return f"it should {allowed}; change it" if should else f"{error['msg']}; change it"
 
@@ -135,16 +136,8 @@ def _place(loc: tuple[int | str, ...], values: Any) -> Place:
     return tuple(place)
 
 
-def _name(place: Place) -> str:
-    return f" in [{_dotted(place)}]" if place else ""
-
-
-def _dotted(place: Place) -> str:
-    return ".".join(part for part in place if isinstance(part, str))
-
-
 def _fields(model: Any, place: Place) -> set[str]:
-    """The keys that the models at a place know."""
+    """The keys of the models at a place."""
     if not place:
         return {field.alias or name for one in _models(model) for name, field in one.model_fields.items()}
     if isinstance(place[0], int):
@@ -159,8 +152,13 @@ def _fields(model: Any, place: Place) -> set[str]:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """The models that an annotation such as `tuple[Limit, ...] | None` speaks of."""
+    """The models in an annotation such as `tuple[Limit, ...] | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
         yield from _models(argument)
+
+
+def is_finite_number(value: object) -> TypeGuard[int | float]:
+    """Whether a value read from a file is a number within a double's range: no infinity, NaN or truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max

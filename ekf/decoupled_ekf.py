@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
-from fgbaseline.data.problem import Problem, Reading
+from fgbaseline.data.problem import LandmarkMode, Problem
 from fgbaseline.geometry import FloatArray, se3
 
 from .landmark_mapping import map_landmarks
@@ -45,7 +45,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     o = problem.observations()
     rows = problem.feature_row(o.landmark)
     T = problem.n_frames
-    in_turn = problem.reading is Reading.IN_TURN
+    in_turn = problem.landmark_mode is LandmarkMode.UPDATED
     if in_turn:
         blocks = IndependentLandmarks(problem, problem.measurement)
     else:
@@ -105,7 +105,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
         world_T_imu=poses,
         covariance=covariances,
         landmarks=Landmarks(problem.features[known], blocks.mean[known], blocks.covariance()[known]),
-        used=problem.spread(taken),
+        used=problem.scatter_mask(taken),
         status=status,
         reason=reason,
         seconds=seconds,

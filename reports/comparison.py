@@ -8,8 +8,8 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.data import Estimate, HeldOut, Problem, Status
-from fgbaseline.data.forks import shared
 from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.parallel import shared
 from fgbaseline.geometry import FloatArray
 
 from .common_frames import CommonRmse, common_rmse

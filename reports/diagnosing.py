@@ -7,10 +7,20 @@ from typing import Any
 import click
 import numpy as np
 
-from fgbaseline.data import Diagnosis, TimeUnit, diagnose, read, repairs_text
-from fgbaseline.data.diagnose import Finding, Tracks, findings_of, not_identifiable, to_json, track_state
-from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data import TimeUnit, read
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.plural import plural
+from fgbaseline.diagnosis import (
+    Diagnosis,
+    TrackStatistics,
+    diagnose,
+    findings_of,
+    not_identifiable,
+    repairs_text,
+    to_json,
+    track_statistics,
+)
 from fgbaseline.geometry import InputError
 
 from .whole_folder import require_free, whole_folder
@@ -39,14 +49,14 @@ def tell(
     if repairs is not None:
         _require_writable(repairs, force=force)
     diagnosis = diagnose(read(path, time_unit=time_unit))
-    tracks = track_state(diagnosis)
+    tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
     report = to_json(diagnosis, tracks, findings)
     if out is not None:
         with whole_folder(out, force=force, mark=MARK) as folder:
             write(diagnosis, tracks, report, folder)
     if repairs is not None:
-        with written_beside(repairs) as file:
+        with atomic_write(repairs) as file:
             file.write(repairs_text(diagnosis).encode())
     if as_json:
         click.echo(text(report), nl=False)
@@ -70,7 +80,7 @@ def _require_writable(file: Path, *, force: bool) -> None:
         raise InputError(f"{file}: there is no folder {file.parent}; make it, or choose another place")
 
 
-def write(diagnosis: Diagnosis, tracks: Tracks, report: dict[str, Any], folder: Path) -> None:
+def write(diagnosis: Diagnosis, tracks: TrackStatistics, report: dict[str, Any], folder: Path) -> None:
     """diagnosis.json and the figures, into an existing, empty folder."""
     from . import figures
 
@@ -111,8 +121,8 @@ def noise(diagnosis: Diagnosis) -> str:
     assert fit is not None
     sigma = fit.sigmas
     told = (
-        f"Noise (one sigma): {sigma.linear:.3f} m/s and {sigma.angular:.4f} rad/s of a velocity held over an interval, "
-        f"{sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
+        f"Noise (one sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity held "
+        f"over an interval, {sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
     )
     if fit.inflation.pixel > 1.0:
         told += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"

@@ -6,25 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from fgbaseline.data import (
-    Calibration,
     HeldOut,
+    LandmarkMode,
     Problem,
-    Reading,
     Sequence,
     TimeUnit,
-    calibrated,
     documented,
     estimator_names,
     find_estimator,
-    hold_out,
     read,
-    read_repairs,
 )
-from fgbaseline.data.diagnose import known_units, unit_findings, unusable
-from fgbaseline.data.diagnose.units import evidence
-from fgbaseline.data.documented import DEFAULT_FEATURES
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.problem.documented import DEFAULT_FEATURES
+from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
+from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
 from .solving import Watch, solve_all, unwatched
@@ -48,7 +44,7 @@ class RunSettings:
     estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
     features: int | Literal["all"] | None = None
     """None for the preset's default"""
-    landmarks: Reading = Reading.IN_TURN
+    landmarks: LandmarkMode = LandmarkMode.UPDATED
     truth: Path | None = None
     truth_frame: BodyFrame | None = None
     seed: int = 0

@@ -12,7 +12,7 @@ from ..formats.fields import extrinsic, positive, time_stamps
 from ..formats.named_file import FilePath, reading, regular_file
 from ..formats.npz_archive import NpzArchive
 from ..observations import IntArray, Observations
-from ..problem import Excluded, LandmarkPrior, Problem, Reading
+from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from ..sequence import Sequence
 from . import layout
 
@@ -46,7 +46,7 @@ def _words(path: Path) -> dict[str, Any]:
         return {
             "preset": str(words["preset"]),
             "diagnosed": bool(words["diagnosed"]),
-            "reading": Reading(words["reading"]),
+            "reading": LandmarkMode(words["reading"]),
             "remarks": tuple(map(str, words["remarks"])),
             "sequence": {key: str(s[key]) for key in ("name", "form", "source")},
             "sequence_remarks": tuple(map(str, s["remarks"])),
@@ -115,7 +115,7 @@ def _problem(numbers: _Numbers, words: dict[str, Any]) -> Problem:
         landmark_prior=prior,
         kernel=None if threshold is None else HuberKernel(threshold),
         mapping_pixel_variance=numbers.optional("mapping_pixel_variance"),
-        reading=words["reading"],
+        landmark_mode=words["reading"],
         diagnosed=words["diagnosed"],
         remarks=words["remarks"],
     )

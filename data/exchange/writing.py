@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.beside import written_beside
+from ..formats.atomic_write import atomic_write
 from ..formats.npz_member import write_member
 from ..problem import Excluded, Problem
 from . import layout
@@ -20,12 +20,12 @@ def write_problem(problem: Problem, folder: Path) -> None:
     The ground truth stays behind: what is exported is what an estimator may look at. Raises InputError when a file
     cannot be written.
     """
-    with written_beside(folder / layout.ARRAYS) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(folder / layout.ARRAYS) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in arrays(problem).items():
             form = "<i8" if array.dtype.kind in "iu" else "<f8"
             write_member(archive, key, array.shape, [array], form)
     text = json.dumps(scalars(problem), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    with written_beside(folder / layout.SCALARS) as file:
+    with atomic_write(folder / layout.SCALARS) as file:
         file.write(text.encode("utf-8"))
     _tables(problem, folder)
 
@@ -78,7 +78,7 @@ def scalars(problem: Problem) -> dict[str, Any]:
         },
         "preset": problem.preset,
         "diagnosed": problem.diagnosed,
-        "reading": problem.reading.value,
+        "reading": problem.landmark_mode.value,
         "remarks": [*problem.remarks, *problem.repairs],
         "camera": {"fu": camera.fu, "fv": camera.fv, "cu": camera.cu, "cv": camera.cv, "baseline": camera.baseline},
         "imu_T_cam": sequence.imu_T_cam.tolist(),
@@ -117,7 +117,7 @@ def _table(path: Path, titles: tuple[str, ...], columns: list[NDArray[Any]]) -> 
     """A CSV of columns (n,): numbers in full, an empty cell where there is none."""
     cells = [map(_cell, column.tolist()) for column in columns]
     lines = [",".join(titles), *(",".join(row) for row in zip(*cells, strict=True)), ""]
-    with written_beside(path) as file:
+    with atomic_write(path) as file:
         file.write("\n".join(lines).encode("ascii"))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from .beside import written_beside
+from .atomic_write import atomic_write
 from .named_file import FilePath
 from .stamped_poses import writable
 
@@ -29,7 +29,7 @@ def write_euroc(path: FilePath, t: FloatArray, world_T_body: FloatArray) -> None
     wxyz = np.roll(so3.quaternion_xyzw(poses[:, :3, :3]), 1, axis=1)
     rows = np.concatenate([poses[:, :3, 3], wxyz], axis=1).tolist()
     lines = [",".join([str(ns), *map(repr, row)]) for ns, row in zip(nanoseconds, rows, strict=True)]
-    with written_beside(path) as file:
+    with atomic_write(path) as file:
         file.write("\n".join([HEADER, *lines, ""]).encode("ascii"))
 
 

@@ -6,7 +6,7 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import IntArray
 from ..time_unit import TimeUnit
-from .beside import written_beside
+from .atomic_write import atomic_write
 from .named_file import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
 from .stamped_poses import require_rising, writable
@@ -70,7 +70,7 @@ def write_kitti(path: FilePath, world_T_body: FloatArray) -> None:
         k = int(np.argmax(np.isnan(poses).all(axis=(1, 2))))
         raise InputError(f"pose {k} is missing, but line k of a KITTI file is frame k; write a TUM file")
     lines = [" ".join(map(repr, row)) for row in poses[:, :3].reshape(-1, NUMBERS).tolist()]
-    with written_beside(path) as file:
+    with atomic_write(path) as file:
         file.write("\n".join([*lines, ""]).encode("ascii"))
 
 

@@ -9,7 +9,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import IntArray
 from ..sequence import Sequence
-from .beside import written_beside
+from .atomic_write import atomic_write
 from .feature_block import CHUNK, UNOBSERVED
 from .named_file import FilePath
 from .npz_member import write_member
@@ -23,7 +23,7 @@ def write_npz(sequence: Sequence, path: FilePath) -> None:
     """
     if (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
-    with written_beside(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in _arrays(sequence).items():
             write_member(archive, key, array.shape, [array])
         if sequence.n_landmarks:

@@ -12,7 +12,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import BoolArray
-from .beside import written_beside
+from .atomic_write import atomic_write
 from .fields import time_stamps
 from .kitti import EXACT, ROTATION_TOLERANCE, nearest_rotations
 from .named_file import FilePath
@@ -61,7 +61,7 @@ def write_trajectory_npz(
         if covariance.shape != (len(t), 6, 6):
             raise InputError(f"{COVARIANCE}: expected shape ({len(t)}, 6, 6), got {covariance.shape}")
         arrays[COVARIANCE] = covariance[~np.isnan(np.asarray(world_T_body)).all(axis=(1, 2))]
-    with written_beside(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in arrays.items():
             write_member(archive, key, array.shape, [array])
 

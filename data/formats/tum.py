@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, so3
 
-from .beside import written_beside
+from .atomic_write import atomic_write
 from .named_file import FilePath
 from .stamped_poses import writable
 
@@ -18,5 +18,5 @@ def write_tum(path: FilePath, t: FloatArray, world_T_imu: FloatArray) -> None:
     stamps, poses = writable(t, world_T_imu)
     rows = np.concatenate([stamps[:, None], poses[:, :3, 3], so3.quaternion_xyzw(poses[:, :3, :3])], axis=1)
     lines = [" ".join(map(repr, row)) for row in rows.tolist()]
-    with written_beside(path) as file:
+    with atomic_write(path) as file:
         file.write("\n".join(["# timestamp [s] tx ty tz qx qy qz qw", *lines, ""]).encode("ascii"))

@@ -14,7 +14,7 @@ A simulated town lies among the real recordings; `pytest -s tests/data/test_simu
     simulated, 10 seeds      69.9   47.9   93.1   14.2     6    10    18    39    11    21    38    71   134
 """
 
-from ..axes import AXIS_CONVENTIONS, axes_matrix, axes_name
+from ..axis_conventions import AXIS_CONVENTIONS, axes_matrix, axes_name
 from .recording import Labels, simulate, simulate_with_labels
 from .rig import HANDHELD, KITTI, Rig
 from .settings import Simulation, Velocities, default_drive

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, StereoCamera, so3
 
-from ..axes import AXIS_CONVENTIONS, axes_matrix
+from ..axis_conventions import AXIS_CONVENTIONS, axes_matrix
 from ..sequence import Sequence
 
 _IMU_R_CAM = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])

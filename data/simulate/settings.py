@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..axes import IDENTITY, axes_matrix
+from ..axis_conventions import IDENTITY, axes_matrix
 from ..sequence import Sequence
 from .rig import HANDHELD, KITTI, Rig, rig_of
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3
 
-from ..axes import axes_matrix
+from ..axis_conventions import axes_matrix
 from .chance import Concern, generator
 from .path import Path
 from .settings import Simulation

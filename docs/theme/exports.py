@@ -1,8 +1,7 @@
 """For griffe, which reads the docstrings: a package's public name may be that of the module it comes from.
 
 `from .batch import batch` leaves the function under the name `batch`, and the module out of reach, as Python has it;
-griffe keeps the module. Here the function takes its place. A whole package of the name of its function stays
-(`data.diagnose`).
+griffe keeps the module. Here the function takes its place.
 """
 
 from typing import Any

@@ -85,7 +85,7 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         world_T_imu=poses,
         covariance=covariances,
         landmarks=joint.map.landmarks(problem.features),
-        used=problem.spread(joint.used),
+        used=problem.scatter_mask(joint.used),
         status=status,
         reason=reason,
         seconds=seconds,

@@ -8,8 +8,7 @@ from typing import Any
 
 from fgbaseline.data import estimator_names
 from fgbaseline.data.simulate import Simulation
-from fgbaseline.data.toml_file import TomlFile
-from fgbaseline.data.toml_lines import Place
+from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.geometry import InputError
 
 from ..job import check_estimators
@@ -36,7 +35,7 @@ class Input:
 def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
     """Every job of a suite in order, `data` being the folder of relative paths (None: that of the suite).
 
-    Raises InputError naming the file and the line of what cannot be.
+    Raises InputError naming the file and the key path of what cannot be.
     """
     _check_estimators(suite)
     sweep = _settings(suite)
@@ -48,10 +47,8 @@ def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
     for index, entry in enumerate(content.sequence):
         for each in _inputs(suite, index, entry, data):
             if each.name in names:
-                line = suite.line(("sequence", names[each.name]))
-                raise suite.wrong(
-                    ("sequence", index), f"'{each.name}' is the name of a sequence of line {line}; add a name"
-                )
+                other = key_path(("sequence", names[each.name]))
+                raise suite.wrong(("sequence", index), f"'{each.name}' is the name of {other} too; add a name")
             names[each.name] = index
             for settings, seed in product(sweep, each.seeds):
                 job = Job(

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from glob import glob, has_magic
 from pathlib import Path
 
-from fgbaseline.data import read, read_repairs
+from fgbaseline.data import read
 from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 
 from .identity import content_of
@@ -16,7 +17,7 @@ from .suite import Entry, Suite, several
 def recordings(
     suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None
 ) -> Iterator[tuple[str, Recorded, float]]:
-    """Name, source and number of observations of each. Raises InputError naming the line."""
+    """Name, source and number of observations of each. Raises InputError naming the key path."""
     folder = (data or Path(suite.path).parent).absolute()
     found = _files(suite, index, entry, folder)
     truth = None if entry.truth is None else folder / entry.truth

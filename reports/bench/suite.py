@@ -6,8 +6,8 @@ from typing import Annotated, Literal, TypeAlias, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from fgbaseline.data.formats import BodyFrame
-from fgbaseline.data.repairs import SigmaByHand
 from fgbaseline.data.toml_file import TomlFile, read_toml
+from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 
 from ..job import RunSettings
 from .drives import Drives
@@ -15,7 +15,7 @@ from .drives import Drives
 Page: TypeAlias = Literal["none", "tables", "figures"]
 Preset: TypeAlias = Literal["calibrated", "documented"]
 Features: TypeAlias = Annotated[int, Field(ge=1)] | Literal["all"]
-Noise: TypeAlias = Literal["estimated", "assumed"] | SigmaByHand
+Noise: TypeAlias = Literal["estimated", "assumed"] | SigmaOverrides
 Share: TypeAlias = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Seed: TypeAlias = Annotated[int, Field(ge=0)]
 MOST_SEEDS = 10_000

@@ -10,20 +10,11 @@ from threading import Lock
 
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data import (
-    Calibration,
-    Problem,
-    Reading,
-    Sequence,
-    calibrated,
-    documented,
-    hold_out,
-    read,
-    read_repairs,
-)
-from fgbaseline.data.documented import DEFAULT_FEATURES
-from fgbaseline.data.repairs import Repairs
+from fgbaseline.data import LandmarkMode, Problem, Sequence, documented, read
+from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import Calibration, calibrated, hold_out, read_repairs
+from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
 
 from ..comparison import Run, compare_all
@@ -110,7 +101,7 @@ def _problem(sequence: Sequence, job: Job) -> Problem:
     features = None if job.features == "all" else job.features
     if job.preset == "documented":
         count = DEFAULT_FEATURES if job.features is None else features
-        return documented(sequence, count, Reading(job.landmarks))
+        return documented(sequence, count, LandmarkMode(job.landmarks))
     if job.noise == "assumed":
         return calibrated(sequence, features, settings=Calibration())
     repairs = None

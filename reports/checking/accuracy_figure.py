@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline.compare import Matched
-from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
 from ..figures.lettering import plain
@@ -43,7 +43,7 @@ def draw(aligned: Matched, errors: Mapping[str, tuple[pd.DataFrame, float | None
         stream = BytesIO()
         figure.savefig(stream, format="png", dpi=120)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as file:
+    with atomic_write(path) as file:
         file.write(stream.getvalue())
 
 

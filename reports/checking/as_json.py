@@ -45,7 +45,7 @@ def _line(line: Line) -> dict[str, Any]:
         "missing": line.missing,
         "sample": None if line.shortage is None else line.shortage.n,
         "coverage": None if line.shortage is None else line.shortage.coverage,
-        "limit_line": line.limit_line,
+        "limit": line.limit,
     }
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fgbaseline.compare.limits import Outcome, rounded
-from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
@@ -100,7 +100,7 @@ def write_baseline(checked: Checked, path: Path) -> str:
     text = updated(checked)
     same = path.is_file() and path.read_bytes() == text.encode()
     if not same:
-        with written_beside(path) as file:
+        with atomic_write(path) as file:
             file.write(text.encode())
     return f"The baseline {shown(path)} is {'as it was' if same else 'written'}."
 

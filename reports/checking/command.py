@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.data.formats.beside import written_beside
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import writing
 from fgbaseline.geometry import InputError
 
@@ -75,7 +75,7 @@ def _write(checked: Checked, outputs: Outputs) -> None:
     with ExitStack() as stack:
         for path, text in texts:
             if path is not None:
-                stack.enter_context(written_beside(path)).write(text)
+                stack.enter_context(atomic_write(path)).write(text)
     if summary := os.environ.get(JOB_SUMMARY):
         with writing(summary), Path(summary).open("a", encoding="utf-8") as file:
             file.write(markdown(checked) + "\n")

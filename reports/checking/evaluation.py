@@ -7,7 +7,7 @@ from typing import Any
 from fgbaseline.compare import FEWEST_STRETCHES, too_small
 from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
-from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.data.toml_file import TomlFile, key_path
 
 from ..results.tree import INFINITE
 from .baseline import before, is_timing
@@ -104,7 +104,7 @@ def _lines(
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
         short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
         outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating, short)
-        at, left_out = limits.line(("limit", index)), missing_in(values, limit.metric)
+        at, left_out = key_path(("limit", index)), missing_in(values, limit.metric)
         return Line(
             name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason, left_out, shortage
         )

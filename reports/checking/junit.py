@@ -40,7 +40,7 @@ def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
     said = line.reason or f"{texts['value']} is not {texts['bound']}"
     problem = ElementTree.SubElement(case, tag, type=line.outcome.value, message=_text(f"{line.metric}: {said}"))
     told = [f"{title}: {text}" for title, text in texts.items()]
-    problem.text = _text("\n".join([*told, f"{checked.limits}, line {line.limit_line}"]))
+    problem.text = _text("\n".join([*told, f"{checked.limits}, {line.limit}"]))
 
 
 def _reference_suite(suites: ElementTree.Element, checked: Checked) -> None:

@@ -104,5 +104,5 @@ class Limits(_Part):
 
 
 def read_limits(path: Path) -> TomlFile[Limits]:
-    """The limits in a file. Raises InputError naming file, line, key and what is allowed."""
+    """The limits in a file. Raises InputError naming file, key path and what is allowed."""
     return read_toml(path, Limits)

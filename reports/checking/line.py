@@ -41,8 +41,8 @@ class Line:
     """the name of the sequence; empty where trajectories alone were compared"""
     estimator: str
     metric: str
-    limit_line: int
-    """of the limits file"""
+    limit: str
+    """key path in the limits file, such as `limit[0]`"""
     outcome: Outcome
     value: float | None
     bounds: Bounds | None

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from fgbaseline.data.finite import is_finite_number
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
+from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
 from ..results.tree import INFINITE

@@ -59,7 +59,7 @@ def remarks(checked: Checked) -> list[str]:
         reasons = [reason for reason in (line.reason, left_out) if reason not in ("", NEW)]
         if reasons:
             name = f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}"
-            said.append(f"{name}: {'; '.join(reasons)} ({checked.limits}, line {line.limit_line}).")
+            said.append(f"{name}: {'; '.join(reasons)} ({checked.limits}, {line.limit}).")
     return said
 
 

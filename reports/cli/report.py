@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fgbaseline.data.forks import cores, shared
+from fgbaseline.data.parallel import cores, shared
 from fgbaseline.data.plural import plural
 
 from .. import job

@@ -116,7 +116,7 @@ def command(
     Exits 0 when every estimator gave an answer, 1 when one failed (the report is written all the same), 2 on bad
     input.
     """
-    from fgbaseline.data import Reading, TimeUnit
+    from fgbaseline.data import LandmarkMode, TimeUnit
 
     from ..job import RunSettings
     from .report import report
@@ -126,7 +126,7 @@ def command(
         preset=preset,
         estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
         features=features,
-        landmarks=Reading(landmarks),
+        landmarks=LandmarkMode(landmarks),
         truth=truth,
         truth_frame=truth_frame,
         seed=seed,

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fgbaseline.data import HeldOut, Problem, Reading, read, read_problem
+from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
 from fgbaseline.geometry import InputError
 
 from .. import job
@@ -45,7 +45,7 @@ def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
             sequence=sequence,
             preset=known["preset"],
             features="all" if known["features"] == "all" else int(known["features"]),
-            landmarks=Reading(known["landmarks"]),
+            landmarks=LandmarkMode(known["landmarks"]),
             as_recorded=bool(known["as_recorded"]),
             held_out=float(known["held_out"]),
             seed=int(known["seed"]),

@@ -6,13 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.data import Diagnosis
-from fgbaseline.data.axes import IDENTITY
-from fgbaseline.data.diagnose import Tracks
-from fgbaseline.data.diagnose.diagnosis import turned
-from fgbaseline.data.diagnose.repair import sure_bias
+from fgbaseline.data.axis_conventions import IDENTITY, twist_in_imu_axes
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.data.plural import plural
+from fgbaseline.diagnosis import Diagnosis, TrackStatistics
+from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.moving_sum import moving_sum
 
@@ -26,7 +24,7 @@ SMOOTH = 1.0
 BINS = np.linspace(-5.0, 5.0, 61)
 
 
-def draw_diagnosis(diagnosis: Diagnosis, tracks: Tracks) -> dict[str, Figure]:
+def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, Figure]:
     """The figures of a diagnosis by name; those for which it has nothing to show are missing."""
     figures: dict[str, Figure] = {}
     with in_style():
@@ -46,11 +44,11 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     """What the cameras see, what was recorded and what the repair makes of it, about each axis of imu_T_cam."""
     assert diagnosis.odometry is not None
     sequence, odometry = diagnosis.sequence, diagnosis.odometry
-    bias = sure_bias(diagnosis)
+    bias = significant_bias(diagnosis)
     recorded = held_twist(sequence, Shift.AFTER)[:, 3:]
     repaired = held_twist(sequence, diagnosis.shift)
     repaired[:, 3:] -= bias
-    repaired = turned(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
+    repaired = twist_in_imu_axes(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
     seen = odometry.twist(sequence.dt)[:, 3:]
     t = sequence.t[:-1] - sequence.t[0]
     width = SMOOTH / float(np.median(sequence.dt))
@@ -161,12 +159,13 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     for panel in panels[::3]:
         panel.set_ylabel("density")
     sigma = fit.sigmas
-    title = f"Residuals of the velocities over the noise found: {sigma.linear:.3f} m/s, {sigma.angular:.4f} rad/s"
+    noise = f"{sigma.linear_velocity:.3f} m/s, {sigma.angular_velocity:.4f} rad/s"
+    title = f"Residuals of the velocities over the noise found: {noise}"
     head(figure, title, [swatch("#b8c4d0", plural(len(fit.motion), "interval")), *handles])
     return figure
 
 
-def matches_over_time(diagnosis: Diagnosis, tracks: Tracks) -> Figure:
+def matches_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     """The features of each frame, and the share of its matches that contradict the motion."""
     sequence = diagnosis.sequence
     t = sequence.t - sequence.t[0]

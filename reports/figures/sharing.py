@@ -4,7 +4,7 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from fgbaseline.data.forks import shared
+from fgbaseline.data.parallel import shared
 from fgbaseline.reports.comparison import Run
 
 from .drawing import drawings

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fgbaseline.data import Diagnosis, Excluded, Observations, Sequence
-from fgbaseline.data.axes import IDENTITY, axes_matrix
-from fgbaseline.data.diagnose import repair
-from fgbaseline.data.diagnose.repair import sure_bias
+from fgbaseline.data import Excluded, Observations, Sequence
+from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix
 from fgbaseline.data.motion import Shift, held_twist
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.track_mask import MaskSettings
+from fgbaseline.diagnosis import Diagnosis, repair
+from fgbaseline.diagnosis.repairs.significance import significant_bias
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 
 from .stand_in import StandIn
 
@@ -33,7 +33,7 @@ def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
     stages = [Stage(AS_RECORDED, "", recorded)]
     if diagnosis.fit is None:
         return stages
-    angular, linear, bias = diagnosis.angular, diagnosis.linear, sure_bias(diagnosis)
+    angular, linear, bias = diagnosis.angular, diagnosis.linear, significant_bias(diagnosis)
     now = recorded
     if angular.changed or linear.changed:
         now = _turned(now, angular.name, linear.name)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fgbaseline.data import Observations, Sequence
-from fgbaseline.data.axes import axes_matrix
+from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.plural import plural
 from fgbaseline.data.simulate import Simulation, Velocities, simulate_with_labels

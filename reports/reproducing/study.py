@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fgbaseline import ekf
-from fgbaseline.data import Diagnosis, Estimate, Progress, Reading, Sequence, diagnose
-from fgbaseline.data.documented import SLAM_PIXEL_VARIANCE
+from fgbaseline.data import Estimate, LandmarkMode, Progress, Sequence
 from fgbaseline.data.motion import dead_reckoned_path, increments
+from fgbaseline.data.problem.documented import SLAM_PIXEL_VARIANCE
+from fgbaseline.diagnosis import Diagnosis, diagnose
 from fgbaseline.geometry import FloatArray
 
 from .stages import Stage, diagnosed_stages, simulated_stages
@@ -105,7 +106,9 @@ def study(
     diagnosis, stages = found
     sequence, last = subject.studied, stages[-1].sequence
     grid = [Settings(n, v) for v in sweep.pixel_variances for n in sweep.features]
-    held = [Settings(n, v, reading=Reading.HELD) for v in sweep.pixel_variances for n in (max(sweep.features), None)]
+    held = [
+        Settings(n, v, reading=LandmarkMode.FIXED) for v in sweep.pixel_variances for n in (max(sweep.features), None)
+    ]
     low = {
         "pixels": Settings(pixel_variance=LOW_PIXEL_VARIANCE),
         "motion": Settings(motion=LOW_MOTION),

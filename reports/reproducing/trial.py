@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fgbaseline import compare, ekf
-from fgbaseline.data import Estimate, Problem, Reading, Sequence, Status, documented
-from fgbaseline.data.documented import DEFAULT_FEATURES, SLAM_PIXEL_VARIANCE
+from fgbaseline.data import Estimate, LandmarkMode, Problem, Sequence, Status, documented
 from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.problem.documented import DEFAULT_FEATURES, SLAM_PIXEL_VARIANCE
 from fgbaseline.geometry import FloatArray, se3
 
 
@@ -21,7 +21,7 @@ class Settings:
     """V, px^2"""
     motion: float = 1.0
     """times the report's W"""
-    reading: Reading = Reading.IN_TURN
+    reading: LandmarkMode = LandmarkMode.UPDATED
 
 
 @dataclass(frozen=True, slots=True)

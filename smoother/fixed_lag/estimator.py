@@ -72,7 +72,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         world_T_imu=window.path,
         covariance=window.covariance,
         landmarks=window.landmarks(),
-        used=problem.spread(window.used),
+        used=problem.scatter_mask(window.used),
         status=Status.RECOVERED if trouble else Status.OK,
         reason=f"the system was indeterminate on the way: {', '.join(trouble)}" if trouble else "",
         seconds=seconds,

@@ -65,4 +65,4 @@ def determined_observations(problem: Problem, world_T_imu: FloatArray, criterion
     weakest = np.sqrt(np.linalg.eigvalsh(found.covariance)[:, -1])
     good = (count >= criterion.min_observations) & (weakest < criterion.max_relative_deviation * distance[found.index])
     lost = o.select(taken).landmark[~satisfies_cheirality(problem, o.select(taken), world_T_imu, found)]
-    return problem.spread(np.isin(o.landmark, np.setdiff1d(found.index[good], lost)))
+    return problem.scatter_mask(np.isin(o.landmark, np.setdiff1d(found.index[good], lost)))

@@ -59,7 +59,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     poses, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _status(events)
-    used = problem.spread(smoother.used())
+    used = problem.scatter_mask(smoother.used())
     online = Estimate(
         name="isam2-online",
         world_T_imu=smoother.builder.online_poses,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
-from fgbaseline.data.problem import Problem, Reading
+from fgbaseline.data.problem import LandmarkMode, Problem
 from fgbaseline.geometry import FloatArray, StereoCamera
 
 P = np.hstack([np.eye(3), np.zeros((3, 1))])
@@ -154,7 +154,7 @@ class DenseFilter:
 
     def slam(self) -> Answer:
         """Part c, in the problem's reading."""
-        in_turn = self.problem.reading is Reading.IN_TURN
+        in_turn = self.problem.landmark_mode is LandmarkMode.UPDATED
         if in_turn:
             m, sigma_m = self._landmark_prior()
         else:

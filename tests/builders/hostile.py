@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline import data
+from fgbaseline import data, diagnosis
 from fgbaseline.data import Observations, Sequence, Truth
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
@@ -233,7 +233,7 @@ RECORDINGS = (
 
 def solved(recording: Hostile) -> Run:
     """Every estimator on the problem that `fgbaseline run` makes of it, compared."""
-    problem = data.calibrated(recording.make())
+    problem = diagnosis.calibrated(recording.make())
     return compare_all(problem, solve_all(problem, ESTIMATORS), {})
 
 

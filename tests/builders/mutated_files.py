@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline import data, ekf
+from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 
 from .commands import fgbaseline
@@ -70,7 +70,7 @@ def good_trajectory(base: int) -> tuple[str, list[list[str]]]:
         np.savez(path, **good_recording(base))
         sequence = data.read(path)
         assert sequence.truth is not None
-        estimate = ekf.dead_reckoning(data.calibrated(sequence)).world_T_imu
+        estimate = ekf.dead_reckoning(diagnosis.calibrated(sequence)).world_T_imu
         start = np.eye(4)
         start[:3, 3] = 3.0, -2.0, 1.0
         texts = []

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline import data
+from fgbaseline import data, diagnosis
 from fgbaseline.data.exchange import read_problem, write_problem
 from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read_trajectory
 from fgbaseline.data.formats.trajectory_file import read_pose_covariances
@@ -292,7 +292,7 @@ def readers() -> dict[str, Reader]:
         "trajectory npz": Reader(_member_read(trajectory, "a.npz", *paths), lambda: _member_seeds(trajectory)),
         "landmarks": Reader(_file("a.csv", read_landmarks), lambda: [b"id,x,y,z,n_used\n0,1.5,2,3,7\n12,4,5,-6e3,1\n"]),
         "TOML limits": Reader(_file("a.toml", read_limits), lambda: [LIMITS]),
-        "TOML repairs": Reader(_file("a.toml", data.read_repairs), lambda: [REPAIRS]),
+        "TOML repairs": Reader(_file("a.toml", diagnosis.read_repairs), lambda: [REPAIRS]),
         "JSON summary": Reader(_file("summary.json", read_measured, lambda path: read_folder(path.parent)), _summaries),
         "run folder": Reader(_run_folder, _summaries),
         "problem JSON": Reader(

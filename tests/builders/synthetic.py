@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from fgbaseline import data
+from fgbaseline import diagnosis
 from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Truth
 from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
@@ -114,8 +114,8 @@ def plain_problem(sequence: Sequence, kernel: HuberKernel | None = None, pixel_s
 def matched(sequence: Sequence) -> Problem:
     """The calibrated preset with the noise that `drive` simulates: 0.5 px, 0.1 m/s, 0.01 rad/s, held over the interval
     after the sample."""
-    noise = data.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.01)
-    return data.calibrated(sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
+    noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.01)
+    return diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
 
 
 def position_errors(estimate: Estimate, sequence: Sequence) -> FloatArray:

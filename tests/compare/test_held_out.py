@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fgbaseline import compare, data
+from fgbaseline import compare, data, diagnosis
 from fgbaseline.compare.held_out import HeldOutErrors, half_errors
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
@@ -17,7 +17,7 @@ from ..builders.synthetic import drive, with_pixels
 
 @cache
 def held() -> tuple[Sequence, HeldOut]:
-    return data.hold_out(drive(seconds=12.0, features_per_frame=30.0), 0.4, seed=1)
+    return diagnosis.hold_out(drive(seconds=12.0, features_per_frame=30.0), 0.4, seed=1)
 
 
 def true_path() -> FloatArray:
@@ -123,7 +123,7 @@ def test_a_point_behind_the_camera_counts_as_infinitely_wrong_and_stays_a_number
 
 def test_other_pixels_of_the_held_out_tracks_cannot_change_which_are_held_out() -> None:
     sequence = drive(seconds=12.0, features_per_frame=30.0)
-    other = data.hold_out(with_pixels(sequence, sequence.observations.pixel + 1.0), 0.4, seed=1)[1]
+    other = diagnosis.hold_out(with_pixels(sequence, sequence.observations.pixel + 1.0), 0.4, seed=1)[1]
     np.testing.assert_array_equal(other.observations.landmark, held()[1].observations.landmark)
 
 

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fgbaseline import compare, data, ekf, smoother
+from fgbaseline import compare, data, diagnosis, ekf, smoother
 from fgbaseline.compare import Verdict
 from fgbaseline.compare.cost import cost
 from fgbaseline.compare.noise_scale import expected_square, motion_scale, pixel_scale
@@ -34,8 +34,8 @@ def reference() -> Estimate:
 
 def told(pixel: float = 0.5, linear: float = 0.1, angular: float = 0.01) -> Problem:
     """The same drive with another noise model, without a mask that would hide its consequences."""
-    noise = data.NoiseSettings(pixel=pixel, linear_velocity=linear, angular_velocity=angular)
-    problem = data.calibrated(clean().sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
+    noise = diagnosis.NoiseSettings(pixel=pixel, linear_velocity=linear, angular_velocity=angular)
+    problem = diagnosis.calibrated(clean().sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
     return replace(problem, kernel=None)
 
 
@@ -53,8 +53,8 @@ def test_the_pixel_scale_is_that_of_the_noise_within_a_tenth(
     scale: float, features_per_frame: float, kernel: data.HuberKernel | None
 ) -> None:
     sequence = drive(seconds=6.0, features_per_frame=features_per_frame)
-    noise = data.NoiseSettings(pixel=0.5 / scale, linear_velocity=0.1, angular_velocity=0.01)
-    problem = data.calibrated(sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
+    noise = diagnosis.NoiseSettings(pixel=0.5 / scale, linear_velocity=0.1, angular_velocity=0.01)
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
     problem = replace(problem, kernel=kernel, excluded=np.zeros_like(problem.excluded))
     assert problem.mask.all()
     estimate = smoother.isam2(problem)
@@ -147,12 +147,12 @@ def test_offered_are_the_wanted_observations_but_for_far_points_that_the_problem
     problem = clean()
     d = disparity(problem.sequence.observations.pixel)
     np.testing.assert_array_equal(offered(problem), problem.mask | (d > 1.0) | (d <= 0.0))
-    few = data.calibrated(problem.sequence, 10, settings=data.Calibration())
+    few = diagnosis.calibrated(problem.sequence, 10, settings=diagnosis.Calibration())
     wanted = few.excluded != data.Excluded.FEATURE_NOT_CHOSEN
     np.testing.assert_array_equal(offered(few), few.mask | (((d > 1.0) | (d <= 0.0)) & wanted))
 
 
-@pytest.mark.parametrize("preset", [data.documented, data.calibrated])
+@pytest.mark.parametrize("preset", [data.documented, diagnosis.calibrated])
 def test_no_estimator_uses_more_than_was_offered(preset: Callable[[data.Sequence], Problem]) -> None:
     far = drive("loop", seconds=6.0, features_per_frame=25.0)
     pixel = far.observations.pixel.copy()

@@ -147,7 +147,7 @@ def test_words_that_are_not_ours_are_told(problems: dict[str, Problem], tmp_path
         ("{", "it is no JSON"),
         ("[]", "schema: expected 'fgbaseline/problem/1', got None"),
         (json.dumps({**words, "schema": "fgbaseline/problem/9"}), "got 'fgbaseline/problem/9'"),
-        (json.dumps({**words, "reading": "aloud"}), "'aloud' is not a valid Reading"),
+        (json.dumps({**words, "reading": "aloud"}), "'aloud' is not a valid LandmarkMode"),
         (json.dumps({k: v for k, v in words.items() if k != "preset"}), "'preset' is missing"),
     ):
         path.write_text(text)

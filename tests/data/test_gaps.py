@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fgbaseline import data
-from fgbaseline.data.gaps import admit_gaps, gaps, wandering
+from fgbaseline import data, diagnosis
 from fgbaseline.data.motion import Shift
+from fgbaseline.data.problem.velocity_gaps import admit_gaps, gaps, random_walk_density
 from fgbaseline.geometry import se3
 
 from ..builders.hostile import gap
@@ -27,14 +27,14 @@ def wandering_problem(q: float, frames: int = 4000, hole: float = 0.0) -> data.P
 @pytest.mark.parametrize("q", [0.01, 1.0])
 def test_the_density_of_a_random_walk_is_found(q: float) -> None:
     problem = wandering_problem(q, hole=1.0)
-    found = wandering(problem, gaps(problem.sequence.dt))
+    found = random_walk_density(problem, gaps(problem.sequence.dt))
     assert (found > 0.5 * q).all()
     assert (found < 2.0 * q).all()
 
 
 def test_noise_alone_is_no_wandering() -> None:
     problem = wandering_problem(0.0, hole=1.0)
-    assert (wandering(problem, gaps(problem.sequence.dt)) < 3e-3).all()
+    assert (random_walk_density(problem, gaps(problem.sequence.dt)) < 3e-3).all()
 
 
 def test_a_recording_without_gaps_is_left_alone() -> None:
@@ -57,10 +57,10 @@ def test_only_the_gap_is_made_uncertain_and_a_longer_one_more_so() -> None:
     assert len(before.increment) == len(short.increment)
 
 
-@pytest.mark.parametrize("settings", [None, data.Calibration(shift=Shift.AFTER)])
-def test_the_calibrated_problem_allows_for_gaps_diagnosed_or_not(settings: data.Calibration | None) -> None:
+@pytest.mark.parametrize("settings", [None, diagnosis.Calibration(shift=Shift.AFTER)])
+def test_the_calibrated_problem_allows_for_gaps_diagnosed_or_not(settings: diagnosis.Calibration | None) -> None:
     sequence = gap()
-    problem = data.calibrated(sequence, settings=settings)
+    problem = diagnosis.calibrated(sequence, settings=settings)
     sigma = np.sqrt(problem.increment_covariance[29, 0, 0])
     assert sequence.dt[29] == pytest.approx(10.1)
     assert sigma > 5.0

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fgbaseline import data
+from fgbaseline import data, diagnosis
 from fgbaseline.data.exchange import read_problem
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.measured import read_measured, value_of
@@ -157,5 +157,5 @@ def test_an_integer_too_large_for_a_double_is_no_number(tmp_path: Path) -> None:
     path = tmp_path / "repairs.toml"
     path.write_text(f"velocity_scale = {'9' * 400}\n")
     with pytest.raises(InputError, match="it should be a number from"):
-        data.read_repairs(path)
+        diagnosis.read_repairs(path)
     assert value_of({"status": "ok", "ate": {"rmse": 10**400}}, "ate.rmse") == (None, "it is not a finite number")

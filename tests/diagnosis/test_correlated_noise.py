@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fgbaseline.data import Observations, Sequence, calibrated, diagnose
-from fgbaseline.data.diagnose import blind_intervals, bridged, findings_of
-from fgbaseline.data.diagnose.whole_shift import whole_shift
+from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import calibrated, diagnose, findings_of
+from fgbaseline.diagnosis.conventions.integer_delay import integer_delay
+from fgbaseline.diagnosis.repairs.dropout import averaged_over_dropouts, dropout_intervals
 from fgbaseline.geometry import FloatArray
 
 RATE = 10.0
@@ -86,7 +87,7 @@ def test_a_blind_interval_is_bridged_better_than_its_own_sample_says_and_knows_b
         for start in range(30, 270, 40):
             blind[start : start + length] = True
         seen = np.where(blind[:, None], np.nan, true)
-        result = bridged(recorded, seen, blind, np.repeat([0.5, 0.05], 3))
+        result = averaged_over_dropouts(recorded, seen, blind, np.repeat([0.5, 0.05], 3))
         np.testing.assert_array_equal(result.blind, np.flatnonzero(blind))
         np.testing.assert_array_equal(result.twist[~blind], recorded[~blind])
         sums = (result.twist - true)[blind].reshape(-1, length, 6).sum(axis=1)
@@ -101,7 +102,7 @@ def test_a_velocity_without_noise_is_left_alone() -> None:
     true, _ = velocities(100, 0)
     blind = np.zeros(100, dtype=np.bool_)
     blind[50] = True
-    result = bridged(true, np.where(blind[:, None], np.nan, true), blind, np.full(6, 1e-6))
+    result = averaged_over_dropouts(true, np.where(blind[:, None], np.nan, true), blind, np.full(6, 1e-6))
     assert len(result.blind) == 0
     np.testing.assert_array_equal(result.twist, true)
 
@@ -111,14 +112,14 @@ def test_blind_intervals_have_too_few_landmarks_in_common() -> None:
     landmark[frame >= 3] += 10
     landmark[(frame == 4) & (landmark > 14)] += 100
     observations = Observations(frame, landmark, np.zeros((50, 4)))
-    assert blind_intervals(observations, 5).tolist() == [False, False, True, True]
+    assert dropout_intervals(observations, 5).tolist() == [False, False, True, True]
 
 
 def test_a_whole_shift_is_told_by_the_fit_or_not_at_all() -> None:
     dt = 0.1
 
     def parabola(depth: float, at: float) -> float | None:
-        found = whole_shift(lambda shift: depth * (shift - at) ** 2, dt)
+        found = integer_delay(lambda shift: depth * (shift - at) ** 2, dt)
         return None if found is None else found.shift
 
     assert parabola(100.0, -0.9) == pytest.approx(-0.09)

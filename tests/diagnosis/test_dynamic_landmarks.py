@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from fgbaseline.data import Excluded, calibrated, diagnose
-from fgbaseline.data.diagnose.points import PIECE, _pieces, judged
+from fgbaseline.data import Excluded
 from fgbaseline.data.simulate import Simulation, simulate_with_labels
+from fgbaseline.diagnosis import calibrated, diagnose
+from fgbaseline.diagnosis.repairs.landmark_mask import PIECE, _pieces, exclude_landmarks
 from fgbaseline.geometry import se3
 
 from ..builders.synthetic import Scene, drive
@@ -37,19 +38,19 @@ def test_points_behind_or_without_a_distance_are_undetermined() -> None:
     assert sequence.truth is not None
     excluded = np.zeros(len(sequence.observations), dtype=np.uint8)
     path = sequence.truth.world_T_imu
-    np.testing.assert_array_equal(judged(sequence, path, excluded, 0.5), excluded)
-    vague = judged(sequence, path, excluded, 500.0)
+    np.testing.assert_array_equal(exclude_landmarks(sequence, path, excluded, 0.5), excluded)
+    vague = exclude_landmarks(sequence, path, excluded, 500.0)
     assert (vague == Excluded.GEOMETRY).all()
     turned = path.copy()
     turned[5:] = turned[5:] @ se3.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.pi]))
-    assert (judged(sequence, turned, excluded, 0.5) != Excluded.NO).all()
+    assert (exclude_landmarks(sequence, turned, excluded, 0.5) != Excluded.NO).all()
 
 
 def test_what_is_out_already_stays_out_for_its_own_reason() -> None:
     sequence = Scene().sequence()
     assert sequence.truth is not None
     excluded = np.full(len(sequence.observations), Excluded.COPIED, dtype=np.uint8)
-    np.testing.assert_array_equal(judged(sequence, sequence.truth.world_T_imu, excluded, 500.0), excluded)
+    np.testing.assert_array_equal(exclude_landmarks(sequence, sequence.truth.world_T_imu, excluded, 500.0), excluded)
 
 
 def test_pieces_are_runs_of_eight_to_fifteen() -> None:

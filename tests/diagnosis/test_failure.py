@@ -5,22 +5,23 @@ import pytest
 
 from fgbaseline import data
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import calibrated, diagnose
 
 
 @pytest.mark.parametrize("error", [np.linalg.LinAlgError("Singular matrix"), ValueError("only finite values")])
 def test_a_diagnosis_that_breaks_says_so_and_the_recording_is_taken_as_it_is(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    module = importlib.import_module("fgbaseline.data.diagnose.stages")
+    module = importlib.import_module("fgbaseline.diagnosis.estimation.pipeline")
 
     def breaks(_: data.Sequence) -> None:
         raise error
 
     monkeypatch.setattr(module, "odometry", breaks)
     sequence = simulate(Simulation(duration=5.0))
-    diagnosis = data.diagnose(sequence)
+    diagnosis = diagnose(sequence)
     assert str(error) in diagnosis.cannot_tell
-    problem = data.calibrated(sequence)
+    problem = calibrated(sequence)
     assert not problem.diagnosed
     assert problem.remarks[0] == f"not diagnosed: {diagnosis.cannot_tell}"
     assert len(problem.observations()) > 0

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fgbaseline.data import Diagnosis, Excluded, Observations, Sequence, Truth, diagnose
-from fgbaseline.data.diagnose import findings_of, not_identifiable, repair, to_json
+from fgbaseline.data import Excluded, Observations, Sequence, Truth
 from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import AXIS_CONVENTIONS, Simulation, simulate
-from fgbaseline.data.track_mask import MaskSettings
+from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of, not_identifiable, repair, to_json
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray
 
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from fgbaseline import data
+from fgbaseline import data, diagnosis
 from fgbaseline.data import Excluded, Observations, Sequence
 from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate_with_labels
-from fgbaseline.data.track_mask import MaskSettings, exclusions
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions
 from fgbaseline.geometry import FloatArray
 
 from ..builders.synthetic import Scene, drive, with_pixels
@@ -168,7 +168,7 @@ def test_nothing_to_mask() -> None:
 
 def test_on_a_drive_with_wrong_matches_the_mask_leaves_few_of_them_and_most_of_the_right_ones() -> None:
     sequence, labels = simulate_with_labels(Simulation(duration=20.0, wrong_share=0.05, seed=3))
-    left = data.calibrated(sequence, settings=data.Calibration()).excluded == Excluded.NO
+    left = diagnosis.calibrated(sequence, settings=diagnosis.Calibration()).excluded == Excluded.NO
     determined = sequence.observations.pixel[:, 0] - sequence.observations.pixel[:, 2] > 3.0
     assert labels.wrong.mean() > 0.04
     assert labels.wrong[left].mean() < 0.025
@@ -178,10 +178,10 @@ def test_on_a_drive_with_wrong_matches_the_mask_leaves_few_of_them_and_most_of_t
 def test_the_mask_is_that_of_the_recording_whatever_is_estimated_from_it() -> None:
     sequence = drive(wrong=0.05)
     one, other = (
-        data.calibrated(
+        diagnosis.calibrated(
             sequence,
-            settings=data.Calibration(
-                noise=data.NoiseSettings(pixel, 10.0 * pixel, pixel), kernel=data.HuberKernel(pixel)
+            settings=diagnosis.Calibration(
+                noise=diagnosis.NoiseSettings(pixel, 10.0 * pixel, pixel), kernel=data.HuberKernel(pixel)
             ),
         )
         for pixel in (0.1, 5.0)

@@ -10,29 +10,23 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from fgbaseline.data import Excluded, Observations
-from fgbaseline.data.axes import axes_matrix
-from fgbaseline.data.diagnose import window as adjustment
-from fgbaseline.data.diagnose.axes import linear_axes
-from fgbaseline.data.diagnose.regression import regress
-from fgbaseline.data.diagnose.spline import spline_through
-from fgbaseline.data.diagnose.timing import timing
-from fgbaseline.data.diagnose.window import SHARED_PRIOR, WindowFit, fit_windows_alike
-from fgbaseline.data.diagnose.window_terms import (
-    SHARED,
-    Sigmas,
-    WindowData,
-    joined,
-    motion_terms,
-    pixel_terms,
-)
+from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.motion import Shift, held_twist
-from fgbaseline.data.track_mask import MaskSettings, exclusions, split_tracks
+from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.diagnosis.conventions.axes import linear_axes
+from fgbaseline.diagnosis.conventions.robust_regression import regress
+from fgbaseline.diagnosis.conventions.spline import spline_through
+from fgbaseline.diagnosis.conventions.time_delay import timing
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions, split_tracks
+from fgbaseline.diagnosis.windows import bundle_adjustment as adjustment
+from fgbaseline.diagnosis.windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_windows_alike
+from fgbaseline.diagnosis.windows.residuals import SHARED, WindowData, joined, motion_terms, pixel_terms
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import measured_rows
 
 from ..builders.synthetic import Scene
 
-SIGMAS = Sigmas(0.5, 0.1, 0.01)
+SIGMAS = NoiseSettings(0.5, 0.1, 0.01)
 KERNEL = HuberKernel()
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline.data import Diagnosis, diagnose, read
-from fgbaseline.data.diagnose import findings_of
+from fgbaseline.data import read
+from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of
 
 UTIAS = (
     "2011_09_26_drive_0001_sync_KLT",
@@ -47,8 +47,8 @@ def test_the_utias_drives_have_consistent_axes_and_no_bias(recordings: Callable[
 def test_the_noise_that_was_added_to_0027_is_found(recordings: Callable[[str], Path]) -> None:
     d = diagnosed(recordings("ece276a_2020/0027.npz"))
     assert d.sigmas is not None
-    assert d.sigmas.linear == pytest.approx(0.5, rel=0.25)
-    assert d.sigmas.angular == pytest.approx(0.05, rel=0.25)
+    assert d.sigmas.linear_velocity == pytest.approx(0.5, rel=0.25)
+    assert d.sigmas.angular_velocity == pytest.approx(0.05, rel=0.25)
     assert int(d.repeated.sum()) == 91
     assert not {finding.code for finding in findings_of(d)} & {"angular_axes", "linear_axes"}
     assert d.linear.seen == (True, False, False)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data import Diagnosis, Excluded, Repairs, calibrated, diagnose, read_repairs, repairs_text
-from fgbaseline.data.axes import axes_matrix
-from fgbaseline.data.by_hand import overridden
+from fgbaseline.data import Excluded
+from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.motion import increments
-from fgbaseline.data.repairs import MaskByHand, SigmaByHand
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import Calibration, Diagnosis, Repairs, calibrated, diagnose, read_repairs, repairs_text
+from fgbaseline.diagnosis.repair_overrides.application import with_overrides
+from fgbaseline.diagnosis.repair_overrides.settings import MaskOverrides, SigmaOverrides
 from fgbaseline.geometry import InputError, so3
 
 from ..builders.commands import everything_in, fgbaseline
@@ -41,26 +42,26 @@ def file_with(tmp_path: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "said"),
+    ("text", "place", "said"),
     [
-        ("gyro_bias = [1, 2]", 1, "gyro_bias = [1, 2]: it should be three numbers of at most 10 rad/s"),
-        ("\ngyro_bias = [nan, 0, 0]", 2, "three numbers"),
-        ('linear_axes = "x,y,-z"', 1, "none of the 24 right-handed axis conventions"),
-        ("angular_axes = 3", 1, "none of the 24"),
-        ("time_offset_s = 0.1\nshift_intervals = 1", 2, "time_offset_s says the same in seconds"),
-        ("velocity_scale = 0", 1, "a number from 0.01 to 100, or 'as-recorded'"),
-        ("velocity_scale = true", 1, "a number from 0.01"),
-        ("[sigma]\npixel = -1", 2, "pixel = -1 in [sigma]"),
-        ("[mask]\nmin_track = 2.5", 2, "whole number"),
-        ("[mask]\nmin_track = 1", 2, "whole number"),
-        ("bias = [0, 0, 0]", 1, "did you mean 'gyro_bias'?"),
-        ('sigma.pixel = "as-recorded"', 1, "a number from"),
+        ("gyro_bias = [1, 2]", "gyro_bias", "gyro_bias = [1, 2]: it should be three numbers of at most 10 rad/s"),
+        ("\ngyro_bias = [nan, 0, 0]", "gyro_bias", "three numbers"),
+        ('linear_axes = "x,y,-z"', "linear_axes", "none of the 24 right-handed axis conventions"),
+        ("angular_axes = 3", "angular_axes", "none of the 24"),
+        ("time_offset_s = 0.1\nshift_intervals = 1", "shift_intervals", "time_offset_s says the same in seconds"),
+        ("velocity_scale = 0", "velocity_scale", "a number from 0.01 to 100, or 'as-recorded'"),
+        ("velocity_scale = true", "velocity_scale", "a number from 0.01"),
+        ("[sigma]\npixel = -1", "sigma.pixel", "sigma.pixel = -1"),
+        ("[mask]\nmin_track = 2.5", "mask.min_track", "whole number"),
+        ("[mask]\nmin_track = 1", "mask.min_track", "whole number"),
+        ("bias = [0, 0, 0]", "there is no key", "did you mean 'gyro_bias'?"),
+        ('sigma.pixel = "as-recorded"', "sigma.pixel", "a number from"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_line(tmp_path: Path, text: str, line: int, said: str) -> None:
+def test_what_cannot_be_is_told_with_its_key_path(tmp_path: Path, text: str, place: str, said: str) -> None:
     with pytest.raises(InputError) as told:
         read_repairs(file_with(tmp_path, text))
-    assert f"repairs.toml: line {line}: " in str(told.value)
+    assert f"repairs.toml: {place}" in str(told.value)
     assert said in str(told.value)
 
 
@@ -73,7 +74,7 @@ def test_what_is_set_by_hand_is_what_the_problem_has() -> None:
         velocity_scale=1.25,
         shift_intervals=-0.25,
         misalignment_deg=(0.0, 0.1, -2.0),
-        sigma=SigmaByHand(linear_velocity=0.7, pixel=2.5),
+        sigma=SigmaOverrides(linear_velocity=0.7, pixel=2.5),
     )
     problem, recorded = calibrated(found.sequence, diagnosis=found, repairs=repairs), found.sequence
     rate = (recorded.angular_velocity - [0.001, 0.0, -0.0005]) @ axes_matrix("-y,x,z").T
@@ -117,20 +118,20 @@ def test_as_recorded_turns_one_repair_off_and_leaves_the_others(tmp_path: Path) 
 
 def test_the_bias_is_found_for_the_axes_that_are_given() -> None:
     found = faulty()
-    wrong = overridden(found, Repairs(angular_axes="x,y,z", linear_axes="x,y,z"))
-    right = overridden(replace(wrong, by_hand=frozenset()), Repairs(angular_axes="x,-y,-z"))
+    wrong = with_overrides(found, Repairs(angular_axes="x,y,z", linear_axes="x,y,z"))
+    right = with_overrides(replace(wrong, overrides=frozenset()), Repairs(angular_axes="x,-y,-z"))
     assert np.abs(right.gyro_bias - BIAS).max() < 0.004
     np.testing.assert_allclose(right.gyro_bias, found.gyro_bias, atol=1e-6)
     assert right.shift == found.shift
 
 
 def test_nothing_by_hand_changes_nothing() -> None:
-    assert overridden(faulty(), Repairs()) is faulty()
+    assert with_overrides(faulty(), Repairs()) is faulty()
 
 
 def test_a_shift_beyond_the_recording_is_refused() -> None:
     with pytest.raises(InputError, match="time_offset_s: velocities shifted by 150 intervals leave the recording"):
-        overridden(faulty(), Repairs(time_offset_s=15.0))
+        with_overrides(faulty(), Repairs(time_offset_s=15.0))
 
 
 def test_what_the_diagnosis_writes_poses_the_problem_that_it_would_pose_itself(tmp_path: Path) -> None:
@@ -146,13 +147,13 @@ def test_what_the_diagnosis_writes_poses_the_problem_that_it_would_pose_itself(t
 
 def test_the_mask_by_hand_is_the_mask() -> None:
     found = faulty()
-    loose = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskByHand(prediction_gate=1000.0)))
-    whole = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskByHand(split_tracks=False)))
+    loose = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskOverrides(prediction_gate=1000.0)))
+    whole = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskOverrides(split_tracks=False)))
     usual = calibrated(found.sequence, diagnosis=found)
     assert int((loose.excluded == Excluded.PREDICTION).sum()) == 0
     assert usual.sequence.n_landmarks > found.sequence.n_landmarks == whole.sequence.n_landmarks
     assert whole.mask.sum() < usual.mask.sum()
-    deep = Repairs(mask=MaskByHand(min_disparity=8.0, min_track=6))
+    deep = Repairs(mask=MaskOverrides(min_disparity=8.0, min_track=6))
     strict = calibrated(found.sequence, diagnosis=found, repairs=deep)
     pixel = strict.observations().pixel
     assert (pixel[:, 0] - pixel[:, 2]).min() > 8.0
@@ -174,7 +175,7 @@ def test_a_recording_that_tells_nothing_takes_what_is_given() -> None:
 
 def test_repairs_beside_what_takes_the_recording_as_it_is_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not both"):
-        calibrated(faulty().sequence, settings=data.Calibration(), repairs=Repairs())
+        calibrated(faulty().sequence, settings=Calibration(), repairs=Repairs())
     data.write_npz(simulate(Simulation(duration=3.0)), tmp_path / "drive.npz")
     file_with(tmp_path, "velocity_scale = 1.1")
     for refused in ("--as-recorded", "--preset=documented"):

@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from fgbaseline import data, ekf
-from fgbaseline.data import Estimate, Problem, Reading
+from fgbaseline.data import Estimate, LandmarkMode, Problem
 from fgbaseline.geometry import FloatArray
 
 from ..builders.dense_filter import Answer, DenseFilter
@@ -25,7 +25,7 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def posed(path: str, features: int | None, reading: Reading = Reading.IN_TURN) -> Problem:
+def posed(path: str, features: int | None, reading: LandmarkMode = LandmarkMode.UPDATED) -> Problem:
     """50 frames with 40 to 75 landmarks, of which `features` are chosen."""
     return data.documented(drive(path), features, reading)
 
@@ -86,9 +86,9 @@ def test_the_noise_of_the_map_is_its_own() -> None:
     same_landmarks(alone, problem, DenseFilter(replace(problem, mapping_pixel_variance=3.0)).mapping())
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("reading", LandmarkMode)
 @pytest.mark.parametrize(("path", "features"), CASES)
-def test_slam_is_equations_9_to_13(path: str, features: int | None, reading: Reading) -> None:
+def test_slam_is_equations_9_to_13(path: str, features: int | None, reading: LandmarkMode) -> None:
     problem = posed(path, features, reading)
     expected = DenseFilter(problem).slam()
     estimate = ekf.ekf(problem)
@@ -100,7 +100,7 @@ def test_slam_is_equations_9_to_13(path: str, features: int | None, reading: Rea
 
 
 def test_the_readings_differ() -> None:
-    in_turn, held = (ekf.ekf(posed("town", None, reading)) for reading in Reading)
+    in_turn, held = (ekf.ekf(posed("town", None, reading)) for reading in LandmarkMode)
     assert np.abs(in_turn.world_T_imu - held.world_T_imu).max() > 1e-3
     mapped = ekf.landmark_mapping(posed("town", None))
     np.testing.assert_array_equal(held.landmarks.position, mapped.landmarks.position)

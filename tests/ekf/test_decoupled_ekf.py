@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline import data, ekf
-from fgbaseline.data import Estimate, Problem, Reading, Status
+from fgbaseline import data, diagnosis, ekf
+from fgbaseline.data import Estimate, LandmarkMode, Problem, Status
 from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
 from fgbaseline.ekf.decoupled_ekf import _printed_form_failure
@@ -83,7 +83,7 @@ def test_a_landmark_exactly_in_the_camera_plane_fails_with_its_frame_and_keeps_w
         angular_velocity=np.zeros((10, 3)),
         imu_T_cam=np.eye(4),
     )
-    problem = data.documented(sequence, reading=Reading.IN_TURN)
+    problem = data.documented(sequence, landmark_mode=LandmarkMode.UPDATED)
     # Without motion and with a camera at the IMU, the plane z = 0 of the first frame is hit to the last bit.
     o = sequence.observations
     only_late = replace(sequence, observations=o.select(o.frame >= frame))
@@ -99,7 +99,7 @@ def test_a_landmark_exactly_in_the_camera_plane_fails_with_its_frame_and_keeps_w
 
 def test_without_observations_there_is_no_filter_but_dead_reckoning_remains() -> None:
     sequence = replace(drive(), observations=data.Observations.none())
-    problem = data.calibrated(sequence, settings=data.Calibration())
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
     estimate = ekf.ekf(problem)
     assert estimate.status is Status.FAILED
     assert estimate.reason == "no observations"
@@ -125,7 +125,7 @@ def test_on_clean_data_the_filter_is_nearer_to_the_truth_than_dead_reckoning() -
     for path in ("town", "loop", "handheld"):
         for seed in (1, 2, 3):
             sequence = drive(path, seconds=20.0, features_per_frame=70.0, seed=seed)
-            problem = data.calibrated(sequence, settings=data.Calibration())
+            problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
             filtered, reckoned = ekf.ekf(problem), ekf.dead_reckoning(problem)
             assert filtered.status is Status.OK
             assert_covariances(filtered)

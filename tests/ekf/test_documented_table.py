@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data, ekf
-from fgbaseline.data import Estimate, Problem, Reading, Sequence
+from fgbaseline.data import Estimate, LandmarkMode, Problem, Sequence
 from fgbaseline.data.formats import read
 from fgbaseline.geometry import se3
 
@@ -96,13 +96,13 @@ def test_row_3_does_not_hang_on_the_last_digit_of_where_the_landmarks_start(sequ
 
 
 def test_row_4(sequence: Sequence) -> None:
-    problem = data.documented(sequence, reading=Reading.HELD)
+    problem = data.documented(sequence, landmark_mode=LandmarkMode.FIXED)
     row = "70.11 119.3 424.7 356.7 0.2"
     assert printed(statistics(problem, ekf.ekf(problem)), row) == row
 
 
 def test_rows_3_and_4_with_the_signs_of_the_rates_reversed(turned: Sequence) -> None:
-    in_turn, held = data.documented(turned), data.documented(turned, reading=Reading.HELD)
+    in_turn, held = data.documented(turned), data.documented(turned, landmark_mode=LandmarkMode.FIXED)
     row, apart = "9.053 14.327 27.053 42.374 15.9", "9.588 38.568 7.229"
     estimate = ekf.ekf(in_turn)
     assert printed(statistics(in_turn, estimate), row) == row
@@ -111,10 +111,10 @@ def test_rows_3_and_4_with_the_signs_of_the_rates_reversed(turned: Sequence) -> 
     assert printed(statistics(held, ekf.ekf(held)), row) == row
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("reading", LandmarkMode)
 @pytest.mark.parametrize("features", [200, 700, None])
 def test_other_numbers_of_features_finish_and_say_how(
-    sequence: Sequence, features: int | None, reading: Reading
+    sequence: Sequence, features: int | None, reading: LandmarkMode
 ) -> None:
     problem = data.documented(sequence, features, reading)
     estimate = ekf.ekf(problem)
@@ -128,15 +128,15 @@ def test_other_numbers_of_features_finish_and_say_how(
     assert np.linalg.eigvalsh(estimate.covariance[1:] * unit[:, :, None] * unit[:, None, :]).min() > -1e-14
     assert (estimate.status == "recovered") == bool(estimate.events)
     assert {event.kind for event in estimate.events} <= {"innovation covariance singular"}
-    if features is None and reading is Reading.HELD:
+    if features is None and reading is LandmarkMode.FIXED:
         # The very failure that the report describes.
         assert estimate.status == "recovered"
         assert f"first at frame {estimate.events[0].frame}" in estimate.reason
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("reading", LandmarkMode)
 def test_only_where_the_frames_disagree_the_printed_equations_lose_positive_definiteness(
-    sequence: Sequence, turned: Sequence, reading: Reading
+    sequence: Sequence, turned: Sequence, reading: LandmarkMode
 ) -> None:
-    assert ekf.ekf(data.documented(sequence, reading=reading)).status == "recovered"
-    assert ekf.ekf(data.documented(turned, reading=reading)).status == "ok"
+    assert ekf.ekf(data.documented(sequence, landmark_mode=reading)).status == "recovered"
+    assert ekf.ekf(data.documented(turned, landmark_mode=reading)).status == "ok"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from fgbaseline import compare, data, ekf
+from fgbaseline import compare, data, diagnosis, ekf
 from fgbaseline.data import Estimate, Sequence
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
@@ -90,7 +90,7 @@ def test_a_constant_bias_is_found_to_within_what_the_filter_says(path: PathName,
 
 def test_a_bias_that_is_not_asked_for_bends_the_path_and_one_that_is_does_not() -> None:
     # A good gyroscope and few features: what it reads counts.
-    noise = data.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.005)
+    noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.005)
     squares = []
     for seed in range(3):
         sequence = simulate(
@@ -98,7 +98,7 @@ def test_a_bias_that_is_not_asked_for_bends_the_path_and_one_that_is_does_not() 
                 duration=20.0, features_per_frame=6.0, seed=seed, wrong_share=0.0, gyro_bias=BIAS, sigma_angular=0.005
             )
         )
-        problem = data.calibrated(sequence, settings=data.Calibration(noise=noise, shift=Shift.AFTER))
+        problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
         plain, asked = ekf.joint_ekf(problem), ekf.joint_ekf_bias(problem)
         assert plain.gyro_bias is None
         squares.append([np.mean(position_errors(e, sequence) ** 2) for e in (plain, asked)])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline import compare, data, ekf
+from fgbaseline import compare, data, diagnosis, ekf
 from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.ekf import JointSettings
 from fgbaseline.geometry import FloatArray
@@ -51,7 +51,7 @@ def assert_covariances(covariances: FloatArray) -> None:
 def test_on_the_reports_recording_every_frame_is_estimated(recordings: Recordings) -> None:
     sequence = data.read(recordings("03.npz"))
     sequence = replace(sequence, angular_velocity=sequence.angular_velocity * [1.0, -1.0, -1.0])
-    problem = data.calibrated(sequence)
+    problem = diagnosis.calibrated(sequence)
     estimate = ekf.joint_ekf(problem)
     assert estimate.status is not Status.FAILED
     assert np.isfinite(estimate.world_T_imu).all()
@@ -67,7 +67,7 @@ def test_on_the_reports_recording_every_frame_is_estimated(recordings: Recording
 def test_on_noisy_velocities_it_halves_the_error_of_dead_reckoning(recordings: Recordings) -> None:
     truth = recordings("ground_truth/kitti_odometry_07.txt")
     sequence = data.read(recordings("ece276a_2020/0027.npz"), truth, "camera")
-    problem = data.calibrated(sequence)
+    problem = diagnosis.calibrated(sequence)
     reckoned = ate(ekf.dead_reckoning(problem), sequence)
     ours, textbook = (ate(ekf.joint_ekf(problem, settings=how), sequence) for how in (None, JointSettings.textbook()))
     assert ours < 0.5 * reckoned
@@ -76,11 +76,11 @@ def test_on_noisy_velocities_it_halves_the_error_of_dead_reckoning(recordings: R
 
 @pytest.mark.slow
 def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_textbook(recordings: Recordings) -> None:
-    told = data.Calibration(noise=data.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
+    told = diagnosis.Calibration(noise=diagnosis.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
     squares = []
     for name in UTIAS:
         sequence = noisy(data.read(recordings(f"utias/{name}.mat")))
-        problem = data.calibrated(sequence, settings=told)  # the filter is on trial here, not the diagnosis
+        problem = diagnosis.calibrated(sequence, settings=told)  # the filter is on trial here, not the diagnosis
         answers = ekf.joint_ekf(problem), ekf.joint_ekf(problem, settings=JointSettings.textbook())
         assert answers[0].status is not Status.FAILED
         squares.append([ate(e, sequence) ** 2 for e in (*answers, ekf.dead_reckoning(problem))])
@@ -90,7 +90,7 @@ def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_text
 
 
 def test_landmarks_that_come_back_are_the_same_landmarks(recordings: Recordings) -> None:
-    problem = data.calibrated(data.read(recordings("utias/dataset3.mat")))
+    problem = diagnosis.calibrated(data.read(recordings("utias/dataset3.mat")))
     problem = replace(problem, pixel_variance=40.0)  # about what the recording comes with
     o = problem.observations()
     span = np.array([np.ptp(o.frame[o.landmark == j]) + 1 for j in problem.features])

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from fgbaseline import data, ekf, smoother
+from fgbaseline import data, diagnosis, ekf, smoother
 from fgbaseline.data import Estimate, Excluded, Observations, Problem
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.ekf import JointSettings
@@ -142,7 +142,9 @@ def test_the_tree_is_exchanged_without_knowing_which_landmarks_come_back() -> No
     [("utias/dataset3.mat", 300), ("utias/2011_09_26_drive_0001_sync_KLT.mat", 70), ("03.npz", 90)],
 )
 def test_nor_on_real_recordings(recordings: Callable[[str], Path], recording: str, frames: int, name: str) -> None:
-    problem = truncated(data.calibrated(data.read(recordings(recording)), settings=data.Calibration()), frames)
+    problem = truncated(
+        diagnosis.calibrated(data.read(recordings(recording)), settings=diagnosis.Calibration()), frames
+    )
     k = frames // 2
     assert_same_until(k, RECORDED[name], problem, other_future(problem, k, 0, 0.5, 1.0))
 

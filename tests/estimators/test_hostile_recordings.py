@@ -10,7 +10,15 @@ import pytest
 
 from fgbaseline import compare, data, smoother
 from fgbaseline.compare import Verdict
-from fgbaseline.data.diagnose import findings_of, to_json, track_state
+from fgbaseline.diagnosis import (
+    calibrated,
+    diagnose,
+    findings_of,
+    read_repairs,
+    repairs_text,
+    to_json,
+    track_statistics,
+)
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.summary import summarise
 
@@ -44,12 +52,12 @@ def test_every_estimator_admits_its_errors_or_fails_with_a_reason_and_the_tables
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_it_is_diagnosed_without_a_word_of_python(name: str) -> None:
-    diagnosis = data.diagnose(BY_NAME[name].make())
-    tracks = track_state(diagnosis)
+    diagnosis = diagnose(BY_NAME[name].make())
+    tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
     assert [f["code"] for f in to_json(diagnosis, tracks, findings)["findings"]] == [f.code for f in findings]
     assert "Error" not in diagnosis.cannot_tell
-    assert data.repairs_text(diagnosis)
+    assert repairs_text(diagnosis)
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -72,18 +80,18 @@ def test_the_report_is_written_by_the_command_and_diagnose_ends_well(tmp_path: P
     told = fgbaseline("diagnose", "drive.npz", "--write-repairs", "repairs.toml", cwd=tmp_path)
     assert told.returncode == (2 if failed else 1), told.stderr
     assert "Traceback" not in told.stderr
-    assert data.read_repairs(tmp_path / "repairs.toml")
+    assert read_repairs(tmp_path / "repairs.toml")
 
 
 def test_a_cut_cannot_be_seen_but_that_it_may_be_there_is_said() -> None:
     sequence = cut()
-    diagnosis = data.diagnose(sequence)
-    (finding,) = [f for f in findings_of(diagnosis, track_state(diagnosis)) if f.code == "cuts"]
+    diagnosis = diagnose(sequence)
+    (finding,) = [f for f in findings_of(diagnosis, track_statistics(diagnosis)) if f.code == "cuts"]
     assert "30" in finding.sentence
-    problem = data.calibrated(sequence)
+    problem = calibrated(sequence)
     reasons = compare.trust(problem, smoother.isam2(problem)).reasons
     assert any("over 1 of 47 intervals no landmark ties" in reason for reason in reasons)
-    assert not any(f.code == "cuts" for f in data.calibrated(base()).findings)
+    assert not any(f.code == "cuts" for f in calibrated(base()).findings)
 
 
 def test_the_recordings_are_what_they_are_said_to_be() -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fgbaseline import compare, data
+from fgbaseline import compare, data, diagnosis
 from fgbaseline.data import Estimate, LandmarkPrior, Problem, Sequence, Truth
 from fgbaseline.geometry import FloatArray, se3, so3
 
@@ -46,7 +46,7 @@ def recorded(source: str) -> Sequence:
 
 @cache
 def posed(source: str) -> Problem:
-    return data.calibrated(recorded(source))
+    return diagnosis.calibrated(recorded(source))
 
 
 @cache
@@ -168,7 +168,7 @@ def test_in_another_unit_of_length_everything_is_the_same_but_for_the_unit(
     source = source if source == "drive" else str(recordings(source))
     problem = posed(source)
     # The recording as read: what is repaired and masked, and how large the noise is, follows from it.
-    other = data.calibrated(scaled(recorded(source), factor))
+    other = diagnosis.calibrated(scaled(recorded(source), factor))
     unit = np.repeat([factor, 1.0], 3)
     np.testing.assert_array_equal(other.excluded, problem.excluded)
     np.testing.assert_allclose(other.increment / unit, problem.increment, rtol=1e-6, atol=1e-9)

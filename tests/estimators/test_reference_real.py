@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, smoother
-from fgbaseline.data import Estimate, Problem, calibrated, find_estimator, read
+from fgbaseline.data import Estimate, Problem, find_estimator, read
+from fgbaseline.diagnosis import calibrated
 from fgbaseline.geometry import disparity
 
 Recordings = Callable[[str], Path]

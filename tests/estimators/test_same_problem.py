@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fgbaseline.compare.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
-from fgbaseline.data.diagnose.window_terms import WindowData, joined, pixel_terms
+from fgbaseline.diagnosis.windows.residuals import WindowData, joined, pixel_terms
 from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import Innovation, StackedJacobian

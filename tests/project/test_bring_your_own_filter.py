@@ -46,7 +46,7 @@ def solve(problem: Problem, progress=None) -> Estimate:
     return Estimate(
         name="their-filter",
         world_T_imu=world_T_imu,
-        used=problem.spread(np.ones(len(seen), dtype=bool)),
+        used=problem.scatter_mask(np.ones(len(seen), dtype=bool)),
         landmarks=Landmarks(index, se3.transform(world_T_cam, points)),
     )
 '''

@@ -17,7 +17,7 @@ import click
 import numpy as np
 import pytest
 
-from fgbaseline import data, ekf
+from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli.main import COMMANDS, group
@@ -99,7 +99,7 @@ class Place:
         poses, extrinsic = sequence.truth.world_T_imu, sequence.imu_T_cam
         data.write_kitti(folder / "poses.txt", se3.inverse(extrinsic) @ poses @ extrinsic)
         data.write_tum(folder / "truth.tum", sequence.t, poses)
-        problem = data.calibrated(sequence)
+        problem = diagnosis.calibrated(sequence)
         mine = ekf.ekf(problem)
         data.write_tum(folder / "mine.tum", sequence.t, mine.world_T_imu)
         data.write_euroc(folder / "poses.csv", sequence.t, ekf.dead_reckoning(problem).world_T_imu)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline import data, ekf
+from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.formats import attach_truth
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import se3
@@ -80,7 +80,7 @@ class FullPlace:
             camera = se3.inverse(sequence.imu_T_cam) @ sequence.truth.world_T_imu @ sequence.imu_T_cam
             data.write_kitti(self.folder / "poses.txt", camera)
         sequence = data.read(self.folder / "drive.npz")
-        problem = data.calibrated(sequence)
+        problem = diagnosis.calibrated(sequence)
         mine = ekf.ekf(problem)
         truth = attach_truth(sequence, self.folder / "poses.txt", "camera").truth
         assert truth is not None

@@ -14,7 +14,7 @@ import pytest
 from ..builders.commands import environment
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare", "reports")
+ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports")
 DESCRIBED = ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in")
 
 
@@ -114,17 +114,17 @@ class Environment:
 USERS_OWN = 'OWNER = "the user"\n'
 BOTH = """
 import compare as c, data as d, ekf as e
-from fgbaseline import compare, data, ekf, geometry, reports, smoother
+from fgbaseline import compare, data, diagnosis, ekf, geometry, reports, smoother
 from importlib.metadata import entry_points
 
 assert {c.OWNER, d.OWNER, e.OWNER} == {"the user"}
-for ours in (compare, data, ekf, geometry, reports, smoother):
+for ours in (compare, data, diagnosis, ekf, geometry, reports, smoother):
     assert not hasattr(ours, "OWNER")
     print(ours.__file__)
 for estimator in entry_points(group="fgbaseline.estimators"):
     assert callable(estimator.load())
 sequence = data.read("drive.npz")
-problem = data.calibrated(sequence)
+problem = diagnosis.calibrated(sequence)
 assert len(compare.divergence(ekf.dead_reckoning(problem), smoother.isam2(problem), sequence.up)) == sequence.n_frames
 """
 

@@ -24,6 +24,9 @@ def planned(folder: Path, text: str, data: Path | None = None) -> list[Planned]:
     return plan(read_suite(written(folder, text)), data)
 
 
+SEQUENCE = 'name = "x"\n[[sequence]]\n'
+
+
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
     """`drive.npz` in the folder of the suite."""
@@ -33,41 +36,45 @@ def drive(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "said"),
+    ("text", "place", "said"),
     [
-        ('name = "x"\nestimator = ["ekf"]\n' + DRIVE, 2, "there is no key 'estimator' (did you mean 'estimators'?)"),
-        ('name = "x"\nestimators = [\n "ekf",\n "kalman",\n]\n' + DRIVE, 4, "there is no 'kalman'; installed are"),
-        ('name = "x"\nestimators = ["ekf", "ekf"]\n' + DRIVE, 2, "'ekf' is named twice"),
-        ('name = "x"\n[[sequence]]\n', 2, "give either files or simulate"),
-        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', 2, "give either files or simulate"),
-        ('name = "x"\n[[sequence]]\nfiles = [\n "drive.npz",\n "drive_2.npz",\n]\n', 5, "'drive_2.npz' is no file in"),
-        ('name = "x"\n[[sequence]]\nfiles = "kitti/*.mat"\n', 3, "'kitti/*.mat' matches no file in"),
-        ('name = "x"\n[[sequence]]\nfiles = "suite.toml"\n', 3, "this is a text file and no recording"),
-        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', 2, "give truth and truth_frame"),
-        ('name = "x"\n' + FILE + 'truth = "poses.txt"\ntruth_frame = "imu"\n', 3, "poses.txt"),
-        ('name = "x"\n' + FILE + "seeds = [1, 2]\n", 2, "seeds are for simulated drives"),
-        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", 2, "seeds names one twice"),
-        ('name = "x"\n' + DRIVE + 'truth = "t.txt"\n', 2, "truth is for recordings"),
-        ('name = "x"\n[[sequence]]\nsimulate = { path = "moon" }\n', 3, 'path = "moon"'),
-        ('name = "x"\n[[sequence]]\n[sequence.simulate]\nduration = [1, 0]\n', 4, "expected a number above 0"),
-        ('name = "x"\n[[sequence]]\n[sequence.simulate]\nduration = { from = 5, to = 1, steps = 3 }\n', 4, "smaller"),
+        ('name = "x"\nestimator = ["ekf"]\n' + DRIVE, "there is no key 'estimator'", "did you mean 'estimators'?"),
+        ('name = "x"\nestimators = [\n "ekf",\n "kalman",\n]\n' + DRIVE, "estimators[1]", "no 'kalman'; installed are"),
+        ('name = "x"\nestimators = ["ekf", "ekf"]\n' + DRIVE, "estimators", "'ekf' is named twice"),
+        (SEQUENCE, "sequence[0]", "give either files or simulate"),
+        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give either files or simulate"),
+        (SEQUENCE + 'files = ["drive.npz", "drive_2.npz"]\n', "sequence[0].files[1]", "'drive_2.npz' is no file in"),
+        (SEQUENCE + 'files = "kitti/*.mat"\n', "sequence[0].files", "'kitti/*.mat' matches no file in"),
+        (SEQUENCE + 'files = "suite.toml"\n', "sequence[0].files", "a text file and no recording"),
+        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "give truth and truth_frame"),
+        ('name = "x"\n' + FILE + 'truth = "poses.txt"\ntruth_frame = "imu"\n', "sequence[0].files[0]", "poses.txt"),
+        ('name = "x"\n' + FILE + "seeds = [1, 2]\n", "sequence[0]", "seeds are for simulated drives"),
+        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", "sequence[0]", "seeds names one twice"),
+        ('name = "x"\n' + DRIVE + 'truth = "t.txt"\n', "sequence[0]", "truth is for recordings"),
+        (SEQUENCE + 'simulate = { path = "moon" }\n', "sequence[0].simulate.path", 'path = "moon"'),
+        (SEQUENCE + "simulate.duration = [1, 0]\n", "sequence[0].simulate.duration", "expected a number above 0"),
+        (
+            SEQUENCE + "simulate.duration = { from = 5, to = 1, steps = 3 }\n",
+            "sequence[0].simulate.duration",
+            "smaller",
+        ),
         (
             'name = "x"\n' + DRIVE + '[sweep]\npreset = "documented"\nnoise = "assumed"\n',
-            7,
+            "sweep.noise",
             "the calibrated preset alone",
         ),
-        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', 6, "the documented preset alone"),
-        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", 6, "200 is named twice"),
-        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = 0\n", 6, "features"),
-        ('name = "x"\n' + DRIVE + "[sweep]\nheld_out = 1.0\n", 6, "held_out"),
-        ('name = "x"\n' + DRIVE + DRIVE, 5, "'town' is the name of a sequence of line 2"),
-        ('name = "a/b"\n' + DRIVE, 1, "without slashes"),
+        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', "sweep.landmarks", "the documented preset alone"),
+        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", "sweep.features[1]", "200 is named twice"),
+        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = 0\n", "sweep.features = 0", "change it"),
+        ('name = "x"\n' + DRIVE + "[sweep]\nheld_out = 1.0\n", "sweep.held_out = 1.0", "change it"),
+        ('name = "x"\n' + DRIVE + DRIVE, "sequence[1]", "'town' is the name of sequence[0] too"),
+        ('name = "a/b"\n' + DRIVE, "name", "without slashes"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_line(drive: Path, text: str, line: int, said: str) -> None:
+def test_what_cannot_be_is_told_with_its_key_path(drive: Path, text: str, place: str, said: str) -> None:
     with pytest.raises(InputError) as error:
         planned(drive.parent, text)
-    assert f"suite.toml: line {line}: " in str(error.value)
+    assert f"suite.toml: {place}" in str(error.value)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -81,7 +88,7 @@ def test_repairs_that_a_preset_would_not_use_are_refused(drive: Path) -> None:
         ('noise = "assumed"', 'noise = "assumed" takes'),
         ("noise = { pixel = 1.0 }", "noise is set by [sweep] as well"),
     ):
-        with pytest.raises(InputError, match="line 4") as error:
+        with pytest.raises(InputError, match=r"suite\.toml: sequence\[0\]\.repairs: ") as error:
             planned(drive.parent, f"{text}[sweep]\n{sweep}\n")
         assert said in str(error.value)
 

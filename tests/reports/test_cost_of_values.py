@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline import data
+from fgbaseline import diagnosis
 from fgbaseline.data import Problem, read_problem
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
@@ -141,7 +141,7 @@ def test_frames_at_a_rate_over_a_span_are_bounded() -> None:
 
 @pytest.mark.parametrize(("key", "value"), [("n_landmarks", 1e9), ("n_landmarks", 1e300), ("landmark", 1e12)])
 def test_ids_of_an_exported_problem_size_no_array(key: str, value: float, tmp_path: Path) -> None:
-    write_problem(data.calibrated(drive()), tmp_path)
+    write_problem(diagnosis.calibrated(drive()), tmp_path)
     with np.load(tmp_path / "problem.npz") as read:
         arrays = {name: read[name] for name in read.files}
     changed = np.array(arrays[key], dtype=np.float64)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fgbaseline.data.diagnose import Finding
+from fgbaseline.data.finding import Finding
 from fgbaseline.reports import html
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import quantity

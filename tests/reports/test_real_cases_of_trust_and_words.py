@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from fgbaseline import compare, data, smoother
+from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.reports.comparing import compare as compared
 from fgbaseline.reports.comparison import compare_all
 from fgbaseline.reports.html import verdict
@@ -14,7 +14,7 @@ Recordings = Callable[[str], Path]
 def test_zero_for_unseen_is_not_trusted(recordings: Recordings) -> None:
     sequence = data.read(recordings("cases/46-zero-for-unseen/v16_zero_unobserved.npz"))
     zeros = bool((sequence.observations.pixel == 0.0).all(axis=1).mean() > 0.5)  # unless the reader drops them
-    problem = data.calibrated(sequence)
+    problem = diagnosis.calibrated(sequence)
     trust = compare.trust(problem, smoother.isam2(problem))
     assert (trust.verdict is compare.Verdict.UNTRUSTED) == zeros
     assert any("have no positive disparity" in reason for reason in trust.reasons) == zeros
@@ -29,7 +29,7 @@ def test_the_length_of_a_path_that_bends_is_its_length(recordings: Recordings) -
 
 
 def test_a_standing_rig_ranks_nobody_by_a_hundredth_of_a_millimetre(recordings: Recordings) -> None:
-    problem = data.calibrated(data.read(recordings("cases/40-stationary/v08_stationary.npz")))
+    problem = diagnosis.calibrated(data.read(recordings("cases/40-stationary/v08_stationary.npz")))
     isam2 = smoother.isam2(problem)
     answers = {"isam2": isam2, "fixed-lag": smoother.fixed_lag(problem)}
     answers["batch"] = smoother.batch(problem, given={"isam2": isam2})

@@ -191,7 +191,7 @@ def test_each_repair_of_what_was_simulated_brings_dead_reckoning_nearer_to_the_t
 
 
 def test_what_the_diagnosis_repairs_is_repaired_one_cause_at_a_time(faulty: Sequence) -> None:
-    from fgbaseline.data import diagnose
+    from fgbaseline.diagnosis import diagnose
 
     stages = diagnosed_stages(diagnose(faulty))
     assert [stage.name for stage in stages][:2] == ["as recorded", "axes agree"]

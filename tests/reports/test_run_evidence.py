@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fgbaseline import data
+from fgbaseline import data, diagnosis
 from fgbaseline.data import Innovations
 from fgbaseline.geometry import InputError
 from fgbaseline.reports import figures, html, job
@@ -130,7 +130,7 @@ def test_covariances_that_are_none_are_told_with_their_frames() -> None:
 
 
 def test_a_run_in_which_nobody_answers_says_that_nothing_can_be_judged() -> None:
-    kept, held = data.hold_out(drive(), 0.5)
+    kept, held = diagnosis.hold_out(drive(), 0.5)
     problem = matched(kept)
     run = compare_all(problem, {"ekf": failed(problem, "ekf", "no")}, {}, held)
     assert any("none is left to judge" in sentence for sentence in html.verdict(run))

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline import data, smoother
-from fgbaseline.data import NoiseSettings, Problem
+from fgbaseline import diagnosis, smoother
+from fgbaseline.data import Problem
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.diagnosis import NoiseSettings
 from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key
 from fgbaseline.smoother.isam2 import estimator
 from fgbaseline.smoother.isam2.elimination_ordering import GROUP_FRAMES, MANY_LANDMARKS, N_GROUPS, EliminationOrdering
@@ -75,7 +76,7 @@ def test_the_tail_is_no_landmark() -> None:
 def short_drive() -> Problem:
     simulation = Simulation(duration=4.0, features_per_frame=15.0, seed=4, wrong_share=0.0)
     noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
-    return data.calibrated(simulate(simulation), settings=data.Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(simulation), settings=diagnosis.Calibration(noise, shift=Shift.AFTER))
 
 
 def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:

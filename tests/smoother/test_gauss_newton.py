@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline import compare, data, smoother
+from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.compare.cost import cost
 from fgbaseline.data import HuberKernel
 from fgbaseline.data.motion import dead_reckoned_path
@@ -90,7 +90,7 @@ def test_steps_from_far_off_end_at_the_minimum_or_say_that_they_do_not() -> None
 @pytest.mark.slow
 def test_a_recording_in_wrong_axes_ends_at_the_minimum_too(recordings: Callable[[str], Path]) -> None:
     sequence = data.read(recordings("utias/2011_09_26_drive_0009_sync_KLT.mat"))
-    problem = data.calibrated(sequence, settings=data.Calibration())
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
     answer = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": answer})
     assert cost(problem, answer, batch.used) < (1.0 + 1e-5) * cost(problem, batch, batch.used)

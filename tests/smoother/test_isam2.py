@@ -6,11 +6,11 @@ import gtsam
 import numpy as np
 import pytest
 
-from fgbaseline import data, ekf, smoother
+from fgbaseline import data, diagnosis, ekf, smoother
 from fgbaseline.data import Estimate, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.track_mask import MaskSettings
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.keys import landmark_key
@@ -279,9 +279,9 @@ def test_the_first_landmarks_that_all_come_at_once_do_not_throw_the_path(seed: i
             duration=3.0, features_per_frame=35.0, seed=seed, sigma_linear=0.5, sigma_angular=0.05, wrong_share=0.0
         )
     )
-    noise = data.NoiseSettings(pixel=0.5, linear_velocity=0.5, angular_velocity=0.05)
-    told = data.Calibration(noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None)
-    estimate = smoother.isam2(data.calibrated(sequence, settings=told))
+    noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.5, angular_velocity=0.05)
+    told = diagnosis.Calibration(noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None)
+    estimate = smoother.isam2(diagnosis.calibrated(sequence, settings=told))
     assert position_errors(estimate.by_products["isam2-online"], sequence)[2:].max() < 0.12
 
 

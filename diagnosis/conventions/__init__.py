@@ -1,0 +1,1 @@
+"""Units, axes and delay of the recorded velocities."""

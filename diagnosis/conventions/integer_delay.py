@@ -1,0 +1,41 @@
+"""Integer delay of the velocities by the cost of fitted windows, where turns are too few for a cross-correlation.
+
+Linear velocities count too. Only integer shifts compete: between them two samples are averaged, and the lower noise
+would be taken for a better fit.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray
+
+from .time_delay import TimeDelay
+
+SHIFTS = (-2.0, -1.0, 0.0, 1.0)
+"""intervals"""
+ENOUGH = 25.0
+"""log-likelihood lead over all other shifts; high, since time-correlated pixel errors exaggerate it"""
+INFLATION = 3.0
+"""of the standard error, for the same reason"""
+
+
+def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None:
+    """The delay by a parabola through half the cost (negative log-likelihood) at the best shift and its neighbors.
+
+    None where no shift leads, or where the best one is at the edge of the range.
+    """
+    tried = np.array(SHIFTS)
+    costs = np.array([cost(shift) for shift in SHIFTS])
+    best = int(np.argmin(costs))
+    if best in (0, len(SHIFTS) - 1) or np.delete(costs, best).min() - costs[best] < ENOUGH:
+        return None
+    before, at, after = costs[best - 1 : best + 2]
+    curvature = before - 2.0 * at + after
+    shift = tried[best] + 0.5 * (before - after) / curvature
+    return TimeDelay(float(shift) * dt, INFLATION / float(np.sqrt(curvature)) * dt, True, tried, _relative(costs))
+
+
+def _relative(costs: FloatArray) -> FloatArray:
+    """(m,) 1 at the best shift, less where the fit is worse: how likely it is beside it, for errors as lasting."""
+    return np.asarray(np.exp(-(costs - costs.min()) / ENOUGH), dtype=np.float64)

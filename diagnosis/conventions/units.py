@@ -1,0 +1,242 @@
+"""Units of stamps, velocities and baseline, from the motion of the odometry, which has none.
+
+Odometry measures rotations absolutely and translations in baselines. Over an interval dt of the file, with velocities
+v, w and a baseline b of the file, it measures
+
+    rotation / (w dt)    = time * angular
+    translation / (v dt) = time * linear / baseline
+
+where each factor converts a unit of the file to SI. The hypothesis with the fewest wrong units, and with plausible
+intervals and baselines, is chosen; where it does not lead, nothing is changed.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.motion import held_twist
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.time_unit import TimeUnit, rescaled_time, usual
+
+from ..odometry.stereo_odometry import Odometry
+from .scale_ratio import ScaleRatio, scale_ratio
+
+THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
+DEGREE = float(np.pi / 180.0)
+TOLERANCE = 0.45
+"""of the decadic logarithm of a ratio; the nearest two factors, degrees and thousandths, are 1.24 apart"""
+BASELINES = (0.01, 5.0)
+"""m, of stereo rigs"""
+FARTHEST_CAMERA = 20.0
+"""m from the IMU"""
+UNUSUAL = 1.5
+"""wrong units that an interval or baseline which does not exist is worth"""
+LEAD = 1.0
+"""wrong units by which an explanation must lead"""
+MIN_KNOWN = 20
+"""intervals whose motion the cameras show"""
+OVERSHOOT, LARGE_RATE = 20.0, 0.3
+"""times what the cameras see, and rad/s: rates beyond both are no noise of a gyroscope"""
+NAMES = ("time", "angular", "linear", "baseline")
+LABELS = {"time": "stamps", "angular": "angular velocities", "linear": "linear velocities", "baseline": "the baseline"}
+SI = {"time": "s", "angular": "rad/s", "linear": "m/s", "baseline": "m"}
+NOUNS = {
+    "time": {unit.seconds: unit.noun for unit in TimeUnit},
+    "angular": {DEGREE: "°/s", 1e-3: "mrad/s"},
+    "linear": {1e-3: "mm/s", 1e3: "km/s"},
+    "baseline": {1e-3: "mm", 1e3: "km"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """Factors that convert each recorded quantity to SI; `doubt` states an ambiguity that remains."""
+
+    time: float = 1.0
+    """s"""
+    angular: float = 1.0
+    """rad/s"""
+    linear: float = 1.0
+    """m/s"""
+    baseline: float = 1.0
+    """m"""
+    doubt: str = ""
+    scale_ratios: tuple[ScaleRatio, ScaleRatio] | None = None
+    """of angular and linear velocity"""
+
+    @property
+    def wrong(self) -> int:
+        """The number of factors other than 1."""
+        return sum(factor != 1.0 for factor in (self.time, self.angular, self.linear, self.baseline))
+
+
+def usual_baseline(sequence: Sequence) -> Sequence:
+    """The recording with an implausible baseline scaled to a plausible one, for odometry, which works at any scale.
+
+    The camera is then placed at the IMU, since the unit of its position is unknown.
+    """
+    b = sequence.camera.baseline
+    if BASELINES[0] <= b <= BASELINES[1]:
+        return sequence
+    factor = 1000.0 ** -round(np.log(b / 0.2) / np.log(1000.0))
+    imu_T_cam = sequence.imu_T_cam.copy()
+    imu_T_cam[:3, 3] = 0.0
+    return replace(sequence, camera=replace(sequence.camera, baseline=b * factor), imu_T_cam=imu_T_cam)
+
+
+def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mapping[str, float] | None = None) -> Units:
+    """The units of a recording, those that are `given` (by the names of `Units`) as they are.
+
+    `seen_by_cameras` is the odometry of `usual_baseline(sequence)`, or None where nothing is seen.
+    """
+    given = ({"time": 1.0} if sequence.time_unit_given else {}) | dict(given or {})
+    scale_ratios = _gains(sequence, seen_by_cameras)
+    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    ratios = _explicable(*scale_ratios)
+    if not given and any(ratio is not None for ratio in ratios) and _fits(Units(), ratios):
+        return Units(scale_ratios=scale_ratios, doubt=_unfollowed(sequence, Units(), scale_ratios[0], given))
+
+    def unlikely(units: Units) -> float:
+        changed = units.linear != 1.0 or units.baseline != 1.0 or not scale_ratios[1].known
+        rig = changed and "baseline" not in given and not BASELINES[0] <= b * units.baseline <= BASELINES[1]
+        clock = "time" not in given and not usual(interval * units.time)
+        wrong = [name for name in NAMES if name not in given and getattr(units, name) != 1.0]
+        return len(wrong) + UNUSUAL * (rig + clock)
+
+    fitting = sorted(((unlikely(u), i, u) for i, u in enumerate(_hypotheses(given)) if _fits(u, ratios)))
+    if not fitting:
+        return replace(next(_hypotheses(given)), scale_ratios=scale_ratios)
+    least, _, best = fitting[0]
+    others = [u for cost, _, u in fitting[1:] if cost < least + LEAD]
+    doubt = (
+        _doubt(sequence, scale_ratios, [best, *others])
+        if others
+        else _unfollowed(sequence, best, scale_ratios[0], given)
+    )
+    return replace(next(_hypotheses(given)) if doubt else best, doubt=doubt, scale_ratios=scale_ratios)
+
+
+def _unfollowed(sequence: Sequence, units: Units, seen: ScaleRatio, given: Mapping[str, float]) -> str:
+    """Doubt about rates that are far larger than those seen and no noise of a gyroscope."""
+    rate = sequence.angular_velocity * units.angular
+    scatter = float(np.sqrt(np.mean((rate - np.median(rate, axis=0)) ** 2)))
+    excess = units.time * units.angular / seen.ratio if seen.ratio > 0.0 else 0.0
+    if seen.known or "angular" in given or scatter < LARGE_RATE or excess < OVERSHOOT:
+        return ""
+    return (
+        f"the recorded angular velocities scatter by {scatter:.2g} rad/s, {excess:.3g} times more than the cameras "
+        "see, and do not follow it: they are in another unit (57.3 times for °/s) or not of this recording; settle "
+        "it with angular_velocity in a table [units] in --repairs"
+    )
+
+
+def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleRatio, ScaleRatio]:
+    unknown = ScaleRatio(np.nan, known=False)
+    if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
+        return unknown, unknown
+    seen, recorded = seen_by_cameras.twist(sequence.dt), held_twist(sequence)
+    scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
+    angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
+    linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
+    return angular, linear._replace(ratio=linear.ratio * scale)
+
+
+def _explicable(angular: ScaleRatio, linear: ScaleRatio) -> tuple[float | None, float | None]:
+    """The ratios that are known and that wrong units explain; what else they are is no matter of units."""
+    degrees = tuple(factor * DEGREE for factor in THOUSANDS)
+    return _near(angular, (*THOUSANDS, *degrees)), _near(linear, THOUSANDS)
+
+
+def _near(g: ScaleRatio, factors: tuple[float, ...]) -> float | None:
+    return g.ratio if g.known and any(abs(np.log10(g.ratio / f)) < TOLERANCE for f in factors) else None
+
+
+def _hypotheses(given: Mapping[str, float]) -> Iterator[Units]:
+    """All, the usual units first."""
+    choices: dict[str, tuple[float, ...]] = dict.fromkeys(NAMES, THOUSANDS) | {"angular": (1.0, DEGREE, *THOUSANDS[1:])}
+    choices |= {name: (factor,) for name, factor in given.items()}
+    for time, angular, linear, baseline in product(*(choices[name] for name in NAMES)):
+        yield Units(time, angular, linear, baseline)
+
+
+def _fits(units: Units, ratios: tuple[float | None, float | None]) -> bool:
+    """Whether the ratios of turns and distances that are known are those of these units."""
+    expected = (units.time * units.angular, units.time * units.linear / units.baseline)
+    return all(
+        ratio is None or abs(np.log10(ratio / value)) < TOLERANCE for ratio, value in zip(ratios, expected, strict=True)
+    )
+
+
+def rescaled(sequence: Sequence, units: Units) -> Sequence:
+    """The recording in SI units; the camera's position is scaled along where it would be far from the IMU."""
+    if units.wrong == 0:
+        return sequence
+    imu_T_cam = sequence.imu_T_cam.copy()
+    if _takes_camera_along(sequence, units):
+        imu_T_cam[:3, 3] *= units.baseline
+    return replace(
+        rescaled_time(sequence, units.time),
+        linear_velocity=sequence.linear_velocity * units.linear,
+        angular_velocity=sequence.angular_velocity * units.angular,
+        camera=replace(sequence.camera, baseline=sequence.camera.baseline * units.baseline),
+        imu_T_cam=imu_T_cam,
+    )
+
+
+def _takes_camera_along(sequence: Sequence, units: Units) -> bool:
+    far = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
+    return units.baseline != 1.0 and far > FARTHEST_CAMERA >= far * units.baseline
+
+
+def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
+    """A finding for each wrong unit of `sequence`, as recorded."""
+    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    texts = {
+        "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
+        f"{interval * units.time:.3g} s",
+        "angular": f"The angular velocity is in {_named('angular', units.angular)} and not in rad/s",
+        "linear": f"The linear velocity is in {_named('linear', units.linear)} and not in m/s",
+        "baseline": f"The stereo baseline, {b:.6g}, is in {_named('baseline', units.baseline)} and not in m"
+        + ("; so is the camera's place in imu_T_cam" if _takes_camera_along(sequence, units) else ""),
+    }
+    codes = {"time": "time_unit", "angular": "angular_velocity_unit", "linear": "linear_velocity_unit"}
+    found = []
+    for name in NAMES:
+        factor = getattr(units, name)
+        if factor != 1.0:
+            text = f"{texts[name]}: {1.0 / factor:.6g} times too large; multiplied by {factor:.6g}."
+            if factor > 1.0:
+                text = f"{texts[name]}: {factor:.6g} times too small; multiplied by {factor:.6g}."
+            code = codes.get(name, "baseline_unit")
+            found.append(Finding(code, text, 1.0 / factor, 1.0, "recorded over true", evidence(units)))
+    return tuple(found)
+
+
+def evidence(units: Units) -> str:
+    """The evidence of the odometry for the units, in words."""
+    assert units.scale_ratios is not None
+    words = [
+        f"{what} {g.ratio:.3g} times as large as recorded"
+        for what, g in zip(("turns", "distances"), units.scale_ratios, strict=True)
+        if g.known
+    ]
+    return f"the cameras see {' and '.join(words)}" if words else "the cameras show no motion to compare with"
+
+
+def _doubt(sequence: Sequence, scale_ratios: tuple[ScaleRatio, ScaleRatio], candidates: list[Units]) -> str:
+    said = []
+    for units in candidates[:3]:
+        wrong = [f"{LABELS[name]} in {_named(name, f)}" for name in NAMES if (f := getattr(units, name)) != 1.0]
+        said.append(" with ".join(wrong) or "all units as they should be")
+    return (
+        f"the units are in doubt: {evidence(Units(scale_ratios=scale_ratios))}, the median interval between frames is "
+        f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.camera.baseline:.6g}, which fits "
+        f"{' as well as '.join(said)}; settle it with --time-unit s, ms, us or ns, or with a table [units] in --repairs"
+    )
+
+
+def _named(name: str, factor: float) -> str:
+    return NOUNS[name].get(factor, f"units of {factor:g} {SI[name]}")

@@ -1,0 +1,1 @@
+"""Estimation of faults and noise: the pipeline of a diagnosis and its result."""

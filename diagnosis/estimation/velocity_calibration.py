@@ -1,0 +1,86 @@
+"""Calibration of the recorded velocities against stereo odometry: axes, delay, bias, scale, misalignment and noise."""
+
+import numpy as np
+
+from fgbaseline.data.axis_conventions import twist_in_imu_axes
+from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray
+
+from ..conventions.axes import Axes, angular_axes, linear_axes
+from ..conventions.integer_delay import integer_delay
+from ..conventions.time_delay import timing
+from ..noise.calibration_fit import fit_windows, half_cost
+from ..odometry.stereo_odometry import Odometry
+from ..tracks.track_segments import repeated
+from .result import Diagnosis
+
+MIN_INTERVALS = 20
+"""with a motion from odometry"""
+SNAP = 0.15
+"""intervals: a shift this near to a usual one (`Shift`) is taken for it"""
+
+
+def calibrate_velocities(sequence: Sequence, seen_by_cameras: Odometry, processes: int) -> Diagnosis:
+    """The calibration of the velocities of a recording in SI units against its stereo odometry."""
+    copies = repeated(sequence)
+    known = seen_by_cameras.known
+    if known.sum() < MIN_INTERVALS:
+        reason = f"the cameras tell the motion of only {int(known.sum())} of {len(known)} intervals"
+        return Diagnosis(sequence, reason, seen_by_cameras, repeated=copies)
+    angular, linear = _axes_of(sequence, seen_by_cameras)
+    return calibrate_with_axes(sequence, seen_by_cameras, angular, linear, copies, processes=processes)
+
+
+def _axes_of(sequence: Sequence, seen_by_cameras: Odometry) -> tuple[Axes, Axes]:
+    """The axis conventions of angular and linear velocity."""
+    seen, recorded, known = (
+        seen_by_cameras.twist(sequence.dt),
+        held_twist(sequence, Shift.MIDDLE),
+        seen_by_cameras.known,
+    )
+    angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
+    return angular, linear_axes(
+        seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.camera.baseline
+    )
+
+
+def calibrate_with_axes(
+    sequence: Sequence,
+    seen_by_cameras: Odometry,
+    angular: Axes,
+    linear: Axes,
+    copies: BoolArray,
+    given_shift: float | None = None,
+    processes: int = 1,
+) -> Diagnosis:
+    """Delay (unless `given_shift`), bias, scale, misalignment and noise of velocities in given axes."""
+    seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
+    dt = float(np.median(sequence.dt))
+    when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)
+
+    def twist(shift: float) -> FloatArray:
+        return twist_in_imu_axes(held_twist(sequence, shift), linear.name, angular.name)
+
+    fit = None
+    if not when.identifiable and given_shift is None:
+        fit = fit_windows(sequence, seen_by_cameras, twist(Shift.AFTER), processes)
+        white = None if fit is None else fit.white
+        if white is not None:
+
+            def cost(shift: float) -> float:
+                return half_cost(sequence, seen_by_cameras, twist(shift), white, processes)
+
+            when = integer_delay(cost, dt) or when
+    found = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
+    shift = found if given_shift is None else given_shift
+    if fit is None or shift != Shift.AFTER:
+        fit = fit_windows(sequence, seen_by_cameras, twist(shift), processes)
+    reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
+    return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
+
+
+def _usual(shift: float) -> float:
+    nearest = min(Shift, key=lambda usual: abs(shift - usual))
+    return float(nearest) if abs(shift - nearest) < SNAP else shift

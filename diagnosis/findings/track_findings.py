@@ -1,0 +1,149 @@
+"""Findings on tracks and time stamps, in sentences."""
+
+import numpy as np
+
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.plural import plural
+from fgbaseline.data.problem.velocity_gaps import GAP
+from fgbaseline.data.sequence import Sequence
+
+from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY
+from .phrases import spans
+from .track_statistics import BURST, MIN_USABLE, MOVING_LINKS, TrackStatistics
+
+MIN_WRONG = 0.10
+"""share of the links: every tracker has some that are wrong"""
+MIN_DEPTHLESS, MIN_TINY, MIN_ROWS, MIN_MOVING = 0.0075, 0.02, 0.01, 0.01
+"""shares of the observations, or of the tracks for `MIN_MOVING`, that are worth a word"""
+
+
+def track_findings(sequence: Sequence, repeated: BoolArray, tracks: TrackStatistics) -> tuple[Finding, ...]:
+    """Copied frames, wrong matches, dynamic landmarks, unusable observations, cuts and gaps."""
+    counts = (
+        _copies(repeated, tracks),
+        _wrong_matches(tracks),
+        _bursts(tracks),
+        _moving(sequence, tracks),
+        _disparities(sequence, tracks),
+        _rows(sequence, tracks),
+        _few_features(tracks),
+        _cuts(sequence, tracks),
+        _gaps(sequence, tracks),
+    )
+    return tuple(finding for found in counts for finding in found)
+
+
+def _counted(code: str, sentence: str, before: float, after: float, unit: str) -> Finding:
+    return Finding(code, sentence, before, after, unit, "counted")
+
+
+def _copies(repeated: BoolArray, tracks: TrackStatistics) -> list[Finding]:
+    n = int(repeated.sum())
+    if n == 0:
+        return []
+    text = (
+        f"In {n:,} of {len(repeated):,} intervals nearly all tracks are copies, to the last bit, of the frame before: "
+        f"{plural(tracks.copied, 'observation')} that nothing was tracked for, and whose tracks often go on as other "
+        "points."
+    )
+    return [_counted("copied_frames", text, tracks.copied, 0, "observations")]
+
+
+def _wrong_matches(tracks: TrackStatistics) -> list[Finding]:
+    links, wrong = int(tracks.links.sum()), int(tracks.wrong.sum())
+    if wrong <= MIN_WRONG * links or links == 0:
+        return []
+    text = (
+        f"{wrong / links:.0%} of the matches from a frame to the next contradict the motion that the others of their "
+        f"frame agree on ({wrong:,} of {links:,})."
+    )
+    return [_counted("wrong_matches", text, wrong / links, tracks.wrong_after, "share of the matches")]
+
+
+def _bursts(tracks: TrackStatistics) -> list[Finding]:
+    frames = np.flatnonzero(tracks.burst)
+    if len(frames) == 0:
+        return []
+    worst = int(frames[np.argmax(tracks.wrong_share[frames])])
+    text = (
+        f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than {BURST:.0%} of the matches "
+        f"contradict the motion (from frames {spans(frames)}; worst from frame {worst}, "
+        f"{tracks.wrong_share[worst]:.0%} of {tracks.links[worst]})."
+    )
+    return [_counted("bursts", text, float(tracks.wrong_share[worst]), tracks.wrong_after, "share of the matches")]
+
+
+def _moving(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
+    n_tracks = len(np.unique(sequence.observations.landmark))
+    if tracks.moving <= MIN_MOVING * n_tracks:
+        return []
+    text = (
+        f"{plural(tracks.moving, 'track')} of {n_tracks:,} contradict the motion over {MOVING_LINKS} frames and more "
+        "in succession: things that move, or tracks that slide."
+    )
+    return [_counted("moving", text, tracks.moving, tracks.moving_after, "tracks")]
+
+
+def _disparities(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
+    n, found = max(1, len(sequence.observations)), []
+    if tracks.not_positive > MIN_DEPTHLESS * n:
+        text = (
+            f"{plural(tracks.not_positive, 'observation')} ({tracks.not_positive / n:.1%}) have a disparity of zero or "
+            "less: no point in front of the camera gives that."
+        )
+        found.append(_counted("disparity_not_positive", text, tracks.not_positive, 0, "observations"))
+    if tracks.tiny > MIN_TINY * n:
+        text = (
+            f"{plural(tracks.tiny, 'observation')} ({tracks.tiny / n:.1%}) have a disparity of at most "
+            f"{MIN_DISPARITY:g} px, too little to tell a depth."
+        )
+        found.append(_counted("disparity_tiny", text, tracks.tiny, 0, "observations"))
+    return found
+
+
+def _rows(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
+    n = max(1, len(sequence.observations))
+    if tracks.rows <= MIN_ROWS * n:
+        return []
+    text = (
+        f"In {plural(tracks.rows, 'observation')} ({tracks.rows / n:.1%}) the rows of the left and right image differ "
+        f"by more than {MAX_ROW_MISMATCH:g} px: not matched, or not rectified."
+    )
+    return [_counted("row_mismatch", text, tracks.rows, 0, "observations")]
+
+
+def _few_features(tracks: TrackStatistics) -> list[Finding]:
+    frames = np.flatnonzero(tracks.few)
+    if len(frames) == 0:
+        return []
+    text = (
+        f"{plural(len(frames), 'frame')} of {len(tracks.usable):,} have fewer than {MIN_USABLE} usable features "
+        f"({spans(frames)}): only the velocities tell the motion there."
+    )
+    return [_counted("few_features", text, len(frames), len(frames), "frames")]
+
+
+def _cuts(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
+    """Intervals that no track spans, though both frames have some."""
+    usable = tracks.usable >= MIN_USABLE
+    untied = sequence.observations.ties(sequence.n_frames) == 0
+    cuts = np.flatnonzero(untied & usable[:-1] & usable[1:])
+    if len(cuts) == 0:
+        return []
+    text = (
+        f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
+        "tracker started anew, or the recording is cut there. Only the velocities tell the motion."
+    )
+    return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
+
+
+def _gaps(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
+    if len(tracks.gaps) == 0:
+        return []
+    longest = int(tracks.gaps[np.argmax(sequence.dt[tracks.gaps])])
+    text = (
+        f"{plural(len(tracks.gaps), 'gap')} in time: {plural(len(tracks.gaps), 'interval')} longer than {GAP:g} times "
+        f"the median ({np.median(sequence.dt):.3f} s), the longest {sequence.dt[longest]:.3f} s after frame {longest}."
+    )
+    return [_counted("gaps", text, len(tracks.gaps), len(tracks.gaps), "intervals")]

@@ -1,0 +1,136 @@
+"""Statistics of tracks: unusable observations, and track segments that contradict the odometry of their interval."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, disparity
+
+from ..estimation.result import Diagnosis
+from ..odometry.ransac import TRUNCATION
+from ..repairs.repaired_sequence import Repaired, repair
+from ..tracks.observation_mask import MaskSettings
+from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, sound
+
+BURST = 1.0 / 3.0
+"""share of the links of an interval that contradict its motion, from which on it is a burst"""
+BURST_LINKS = 5
+"""that must contradict it, so that few features are not taken for many errors"""
+WRONG_PIXEL = 0.5
+"""px: usual noise of the rows; segments within four sigmas of it are not wrong"""
+MOVING_LINKS = 5
+"""of a track in succession that contradict the motion: a wrong match contradicts it once or twice"""
+MIN_USABLE = 6
+"""features of a frame, below which odometry has no motion"""
+GAP = 2.5
+"""times the median interval"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TrackStatistics:
+    """Counts over the observations, frames and intervals of a recording."""
+
+    not_positive: int
+    """observations whose disparity is zero or less"""
+    tiny: int
+    """observations whose disparity is positive and at most `links.MIN_DISPARITY`"""
+    rows: int
+    """observations with |vL - vR| above `links.MAX_ROW_MISMATCH`"""
+    copied: int
+    """observations that are the same to the bit as the frame before, in intervals whose tracks are copies"""
+    usable: IntArray
+    """(T,) observations of each frame that can be triangulated"""
+    links: IntArray
+    """(T-1,) pairs of sound observations of one landmark over each interval whose motion the cameras tell"""
+    wrong: IntArray
+    """(T-1,) those that contradict this motion"""
+    wrong_after: float
+    """share of the links that contradict it, of those that the repaired and masked recording has left"""
+    moving: int
+    """tracks that contradict the motion over `MOVING_LINKS` intervals in succession"""
+    moving_after: int
+    """the same among the links that the repaired and masked recording has left"""
+    gaps: IntArray
+    """intervals longer than `GAP` times the median"""
+
+    @property
+    def wrong_share(self) -> FloatArray:
+        """(T-1,) share of the links that contradict the motion; NaN where it is unknown."""
+        return np.where(self.links > 0, self.wrong / np.maximum(self.links, 1), np.nan)
+
+    @property
+    def burst(self) -> BoolArray:
+        """(T-1,) intervals in which a third or more of the links contradict the motion."""
+        return np.asarray((self.wrong >= BURST_LINKS) & (self.wrong > BURST * self.links), dtype=np.bool_)
+
+    @property
+    def few(self) -> BoolArray:
+        """(T,) frames with fewer than `MIN_USABLE` usable features."""
+        return np.asarray(self.usable < MIN_USABLE, dtype=np.bool_)
+
+
+def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> TrackStatistics:
+    """Statistics of the tracks of a diagnosed recording; `repaired` is `repair(diagnosis, MaskSettings())`."""
+    sequence = diagnosis.sequence
+    o, n = sequence.observations, sequence.n_frames - 1
+    apart = disparity(o.pixel)
+    links, wrong, moving, moving_after, after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0, 0.0
+    odometry = diagnosis.odometry
+    if odometry is not None:
+        told = odometry.known[odometry.links.frame]
+        floor = max(1.0, WRONG_PIXEL / odometry.pixel_sigma)
+        outlier = told & (odometry.whitened > TRUNCATION * floor**2)
+        links = np.bincount(odometry.links.frame[told], minlength=n)
+        wrong = np.bincount(odometry.links.frame[outlier], minlength=n)
+        moving = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier)
+        repaired = repaired or repair(diagnosis, MaskSettings())
+        left = told & _left(sequence, repaired, odometry.links.before, odometry.links.after)
+        after = float(outlier[left].mean()) if left.any() else 0.0
+        moving_after = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier & left)
+    return TrackStatistics(
+        not_positive=int(np.sum(apart <= 0)),
+        tiny=int(np.sum((apart > 0) & (apart <= MIN_DISPARITY))),
+        rows=int(np.sum(np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > MAX_ROW_MISMATCH)),
+        copied=_copied(sequence, diagnosis.repeated),
+        usable=np.bincount(o.frame[sound(sequence)], minlength=n + 1),
+        links=links,
+        wrong=wrong,
+        wrong_after=after,
+        moving=moving,
+        moving_after=moving_after,
+        gaps=np.flatnonzero(sequence.dt > GAP * np.median(sequence.dt)),
+    )
+
+
+def _copied(sequence: Sequence, repeated: BoolArray) -> int:
+    if not repeated.any():
+        return 0
+    o = sequence.observations
+    before, after = consecutive(sequence)
+    same = (o.pixel[before] == o.pixel[after]).all(axis=1)
+    return int(np.sum(same & repeated[o.frame[before]]))
+
+
+def _moving(landmark: IntArray, frame: IntArray, outlier: BoolArray) -> int:
+    """How many landmarks have so many outlier links in succession."""
+    order = np.lexsort((frame, landmark))
+    landmark, frame, outlier = landmark[order], frame[order], outlier[order]
+    same = (landmark[1:] == landmark[:-1]) & (frame[1:] == frame[:-1] + 1) & (outlier[1:] == outlier[:-1])
+    run = np.cumsum(~np.r_[False, same]) - 1
+    if len(run) == 0:
+        return 0
+    long_enough = np.bincount(run) >= MOVING_LINKS
+    return len(np.unique(landmark[outlier & long_enough[run]]))
+
+
+def _left(sequence: Sequence, repaired: Repaired, before: IntArray, after: IntArray) -> BoolArray:
+    """(n,) links of the recording whose two observations are still one track's once it is repaired and masked."""
+    o, now = sequence.observations, repaired.sequence.observations
+    # The repair gives observations other landmarks, and with them another order within their frame.
+    was, is_now = (np.lexsort((*x.pixel.T, x.frame)) for x in (o, now))
+    excluded, landmark = np.empty(len(o), np.uint8), np.empty(len(o), np.int64)
+    excluded[was], landmark[was] = repaired.excluded[is_now], now.landmark[is_now]
+    kept = (excluded[before] == 0) & (excluded[after] == 0)
+    return np.asarray(kept & (landmark[before] == landmark[after]), dtype=np.bool_)

@@ -1,0 +1,224 @@
+"""Findings on units, velocities and calibration, and parameters that are not identifiable, in sentences."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.geometry import FloatArray
+
+from ..conventions.axes import Axes
+from ..conventions.units import LABELS, NAMES, unit_findings
+from ..estimation.result import Diagnosis
+from ..repairs.significance import SIGNIFICANT, significant_bias, significant_misalignment, significant_offset
+from .phrases import listed, vector
+from .track_findings import track_findings
+from .track_statistics import TrackStatistics, track_statistics
+
+MIN_SCALE = 0.02
+"""share by which velocities and stereo must disagree"""
+SURE_SHIFT = 2.0
+"""standard errors from both usual shifts; `time_delay.INFLATION` is in the standard error already"""
+USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
+"""intervals: shifts that are a convention, and nobody's mistake"""
+KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
+"""rad/s, share and rad: standard errors beyond which a figure is not identifiable"""
+
+
+def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> tuple[Finding, ...]:
+    """Significant faults, velocities first; none for a clean recording. `tracks` is `track_statistics(diagnosis)`."""
+    told: list[Finding] = [*diagnosis.sequence.findings]
+    if diagnosis.recorded is not None:
+        told += unit_findings(diagnosis.units, diagnosis.recorded)
+    if diagnosis.inversion is not None:
+        told.append(_extrinsic_inverse(*diagnosis.inversion))
+    if diagnosis.fit is not None:
+        parts: tuple[Callable[[Diagnosis], Finding | None], ...] = (
+            _angular_axes,
+            _linear_axes,
+            _gyro_bias,
+            _time_offset,
+            _velocity_scale,
+            _extrinsic,
+            _disparity_offset,
+        )
+        told += [finding for part in parts if (finding := part(diagnosis)) is not None]
+    return (*told, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_statistics(diagnosis)))
+
+
+def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Conversions of units and an inverted extrinsic, which precede all else; one sentence each."""
+    done = [f"{LABELS[name]} multiplied by {f:.6g}" for name in NAMES if (f := getattr(diagnosis.units, name)) != 1.0]
+    return (*done, *(["extrinsic imu_T_cam inverted"] if diagnosis.inverted else []))
+
+
+def _extrinsic_inverse(before: float, after: float) -> Finding:
+    return Finding(
+        "extrinsic_inverse",
+        "imu_T_cam is recorded as its inverse, cam_T_imu: inverted, it fits the turns and distances that the cameras "
+        "see in the axes of both velocities, and as recorded in neither. It is inverted.",
+        before,
+        after,
+        "rad/s",
+        "compared by the odometry of the cameras",
+    )
+
+
+def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Parameters that the recording does not determine, one sentence each."""
+    if diagnosis.cannot_tell:
+        return (f"Nothing about the velocities: {diagnosis.cannot_tell}.",)
+    told = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
+    if not diagnosis.timing.identifiable:
+        told.append("A delay between velocities and images: that needs turns that both show.")
+    deviation = diagnosis.gyro_bias_deviation
+    if (deviation > KNOWN_BIAS).any():
+        told.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
+    if diagnosis.velocity_scale[1] > KNOWN_SCALE:
+        told.append(f"The scale of the velocities better than to {diagnosis.velocity_scale[1]:.1%}.")
+    angle = diagnosis.misalignment[1]
+    loose = ["xyz"[i] for i in range(3) if angle[i] > KNOWN_ANGLE]
+    if loose:
+        worst = np.rad2deg(angle.max())
+        told.append(f"Whether imu_T_cam is turned about {listed(loose)}: the error is known to {worst:.1f}° at best.")
+    return tuple(sentence for sentence in told if sentence)
+
+
+def rate_error(diagnosis: Diagnosis, shift: float, bias: FloatArray, convention: str) -> float:
+    """Median error in rad/s of the angular velocity against odometry, with this shift, bias and convention."""
+    assert diagnosis.odometry is not None
+    known = diagnosis.odometry.known
+    recorded = held_twist(diagnosis.sequence, shift)
+    recorded[:, 3:] -= bias
+    difference = twist_in_imu_axes(recorded, IDENTITY, convention) - diagnosis.odometry.twist(diagnosis.sequence.dt)
+    return float(np.median(np.linalg.norm(difference[known, 3:], axis=1)))
+
+
+def _angular_axes(diagnosis: Diagnosis) -> Finding | None:
+    return _axes("angular", diagnosis.angular, "rad/s") if diagnosis.angular.changed else None
+
+
+def _linear_axes(diagnosis: Diagnosis) -> Finding | None:
+    return _axes("linear", diagnosis.linear, "m/s") if diagnosis.linear.changed else None
+
+
+def _axes(which: str, axes: Axes, unit: str) -> Finding:
+    """Sign changes alone are said as such."""
+    matrix = axes_matrix(axes.name)
+    reversed_ = ["xyz"[i] for i in range(3) if matrix[i, i] < 0]
+    letter = "w" if which == "angular" else "v"
+    if np.abs(np.diag(matrix)).all():
+        what = f"Components {listed(f'{letter}_{axis}' for axis in reversed_)} are recorded with the opposite sign"
+    else:
+        what = f"The {which} velocity is recorded in other axes: the axes of imu_T_cam are its ({axes.name})"
+    unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
+    part = f"; that of {listed(unseen)} is a guess, the cameras cannot tell" if unseen else ""
+    return Finding(
+        f"{which}_axes",
+        f"{what}{part}.",
+        axes.before,
+        axes.after,
+        unit,
+        f"leads the conventions that differ by {axes.margin:.0f} in log-likelihood",
+    )
+
+
+def _gyro_bias(diagnosis: Diagnosis) -> Finding | None:
+    bias = significant_bias(diagnosis)
+    if not bias.any():
+        return None
+    name, shift, none = diagnosis.angular.name, diagnosis.shift, np.zeros(3)
+    return Finding(
+        "gyro_bias",
+        f"The gyroscope reads {vector(bias, 4)} rad/s at rest, in the axes it was recorded in.",
+        rate_error(diagnosis, shift, none, name),
+        rate_error(diagnosis, shift, bias, name),
+        "rad/s",
+        f"standard errors {vector(diagnosis.gyro_bias_deviation, 4)} rad/s",
+    )
+
+
+def _time_offset(diagnosis: Diagnosis) -> Finding | None:
+    timing, dt = diagnosis.timing, float(np.median(diagnosis.sequence.dt))
+    shift = timing.shift / dt
+    far = all(abs(shift - usual) > SURE_SHIFT * timing.deviation / dt for usual in USUAL)
+    if not timing.identifiable or diagnosis.shift in USUAL or not far:
+        return None
+    when = f"{abs(timing.shift):.3f} s {'before' if timing.shift < 0 else 'after'} their stamps"
+    text = f"Velocities describe the interval that begins {when} ({shift:+.2f} intervals)"
+    if diagnosis.shift == Shift.BEFORE:
+        text = f"Velocities belong to the interval before their stamp ({shift:+.2f} intervals), not to the one after it"
+    bias = significant_bias(diagnosis)
+    return Finding(
+        "time_offset",
+        text + ".",
+        rate_error(diagnosis, Shift.AFTER, bias, diagnosis.angular.name),
+        rate_error(diagnosis, diagnosis.shift, bias, diagnosis.angular.name),
+        "rad/s",
+        f"standard error {timing.deviation:.4f} s ({timing.deviation / dt:.2f} intervals)",
+    )
+
+
+def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
+    scale, deviation = diagnosis.velocity_scale
+    if diagnosis.units.scale_ratios is not None and not diagnosis.units.scale_ratios[1].known:
+        return None  # a standing rig: the ratio of two noises
+    if abs(scale - 1.0) <= max(MIN_SCALE, SIGNIFICANT * deviation):
+        return None
+    more = "larger" if scale > 1.0 else "smaller"
+    return Finding(
+        "velocity_scale",
+        f"Recorded speeds are {abs(scale - 1.0):.1%} {more} than the stereo camera sees; which of the two is wrong "
+        "the recording cannot tell, so neither is changed unless that is set by hand.",
+        scale,
+        scale,
+        "recorded over seen",
+        f"standard error {deviation:.1%}",
+    )
+
+
+def _extrinsic(diagnosis: Diagnosis) -> Finding | None:
+    angle = significant_misalignment(diagnosis)
+    if not angle.any():
+        return None
+    return Finding(
+        "extrinsic",
+        f"imu_T_cam is turned against the velocities by {np.rad2deg(np.linalg.norm(angle)):.2f}°: about x, y and z by "
+        f"{vector(np.rad2deg(angle), 2)}°.",
+        float(np.rad2deg(np.linalg.norm(angle))),
+        0.0,
+        "°",
+        f"standard errors {vector(np.rad2deg(diagnosis.misalignment[1]), 2)}°",
+    )
+
+
+def _disparity_offset(diagnosis: Diagnosis) -> Finding | None:
+    offset, deviation = significant_offset(diagnosis), diagnosis.disparity_offset[1]
+    if not offset:
+        return None
+    small = "small" if offset > 0 else "large"
+    return Finding(
+        "disparity_offset",
+        f"Disparities are {abs(offset):.2f} px too {small}: with uR moved by {-offset:+.2f} px, near and far points "
+        "agree on one motion, as they do not as recorded.",
+        abs(offset),
+        0.0,
+        "px",
+        f"standard error {deviation:.2f} px",
+    )
+
+
+def _unseen(what: str, axes: Axes) -> str:
+    unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
+    if not unseen:
+        return ""
+    if len(unseen) == 3:
+        return f"In which axes the {what} was recorded: the motion excites none of them enough."
+    rows = axes.name.split(",")
+    told = listed(f"{rows['xyz'.index(name)]} is along {name} of imu_T_cam" for name in "xyz" if name not in unseen)
+    return (
+        f"All axes of the {what}: the motion shows only that its {told}, not which of its components are along "
+        f"{listed(unseen)}, or their signs."
+    )

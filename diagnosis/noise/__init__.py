@@ -1,0 +1,1 @@
+"""Noise and calibration errors estimated from windows."""

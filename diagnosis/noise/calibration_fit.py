@@ -1,0 +1,123 @@
+"""Variance components and calibration errors from bundle adjustments of many short windows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray
+
+from ..odometry.stereo_odometry import Odometry
+from ..windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_windows_alike
+from ..windows.residuals import SHARED
+from ..windows.selection import spread_spans, unbroken_spans, windows_of
+from .correlated_noise import Inflation, inflation_of
+
+ROUNDS = 6
+START = NoiseSettings(pixel=1.0, linear_velocity=0.4, angular_velocity=0.02)
+"""px, baselines/s and rad/s"""
+FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
+"""px, baselines/s and rad/s: no noise is less"""
+CHI_SQUARE_MEDIAN = 0.4549
+"""of one degree of freedom"""
+MIN_REDUNDANCY = 0.05
+"""of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
+its residual is no evidence of noise"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CalibrationFit:
+    """Noise and calibration parameters in common to all windows."""
+
+    sigmas: NoiseSettings
+    """noise for a filter, correlated errors included"""
+    shared: FloatArray
+    """(8,) see `residuals.SHARED`"""
+    deviation: FloatArray
+    """(8,) standard errors, from the spread between windows where that is larger than the formal ones"""
+    windows: int
+    inflation: Inflation
+    white: NoiseSettings
+    """white noise within a window: `sigmas` without time-correlated errors"""
+    motion: FloatArray
+    """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
+    unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
+
+
+def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> CalibrationFit | None:
+    """The fit of windows spread over the recording; None where no window has enough observations.
+
+    `twist` (T-1, 6) is the recorded velocity of each interval in the axes of imu_T_cam. The sigmas are the variance
+    components at which squared residuals match their degrees of freedom, as medians over axes and windows.
+    """
+    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames))
+    if not windows:
+        return None
+    baseline = sequence.camera.baseline
+    sigmas = replace(START, linear_velocity=START.linear_velocity * baseline)
+    shared = [np.zeros(SHARED)] * len(windows)
+    fits: list[WindowFit] = []
+    for _ in range(ROUNDS):
+        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
+        windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
+        shared = [fit.shared for fit in fits]
+        sigmas = _components(fits, sigmas, baseline)
+    shared_mean, deviation = _agreed(fits)
+    unbroken = windows_of(sequence, odometry, twist, unbroken_spans(odometry))
+    inflation = inflation_of(sequence, unbroken, shared_mean, sigmas, processes)
+    believed = NoiseSettings(
+        sigmas.pixel * inflation.pixel,
+        sigmas.linear_velocity * inflation.velocity,
+        sigmas.angular_velocity * inflation.velocity,
+    )
+    residual = np.concatenate([fit.motion_residual for fit in fits]) / np.repeat(
+        [sigmas.linear_velocity, sigmas.angular_velocity], 3
+    )
+    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
+    motion = np.where(redundancy > MIN_REDUNDANCY, residual / np.sqrt(np.maximum(redundancy, MIN_REDUNDANCY)), np.nan)
+    return CalibrationFit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
+
+
+def half_cost(
+    sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas: NoiseSettings, processes: int = 1
+) -> float:
+    """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
+    whiten = np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
+    total = 0.0
+    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames))
+    start = [np.zeros(SHARED)] * len(windows)
+    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
+        total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
+    return total
+
+
+def _components(fits: list[WindowFit], sigmas: NoiseSettings, baseline: float) -> NoiseSettings:
+    residual = np.concatenate([fit.motion_residual for fit in fits])
+    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
+    told = redundancy > MIN_REDUNDANCY
+    share = np.where(told, residual**2 / np.maximum(redundancy, MIN_REDUNDANCY), np.nan)
+    variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if told.any(axis=0).all() else np.zeros(6)
+    pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
+    return NoiseSettings(
+        pixel=max(FLOOR.pixel, sigmas.pixel * float(np.sqrt(pixel))),
+        linear_velocity=max(FLOOR.linear_velocity * baseline, float(np.sqrt(variance[:3].mean()))),
+        angular_velocity=max(FLOOR.angular_velocity, float(np.sqrt(variance[3:].mean()))),
+    )
+
+
+def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
+    """The information-weighted mean (8,) of the shared parameters, windows far off left out, and its deviation."""
+    information = np.array([fit.shared_information for fit in fits])
+    values = np.array([fit.shared for fit in fits])
+    center = np.median(values, axis=0)
+    spread = 1.4826 * np.median(np.abs(values - center), axis=0) + 1e-9
+    keep = (np.abs(values - center) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
+    total = information[keep].sum(axis=0) + SHARED_PRIOR
+    mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))
+    claimed = np.sqrt(np.diag(np.linalg.inv(total)))
+    # The same mean's variance from how the windows differ: (sum I)^-1 sum I d d^T I (sum I)^-1
+    difference = np.einsum("wij,wj->wi", information[keep], values[keep] - mean)
+    inverse = np.linalg.inv(total)
+    seen = np.sqrt(np.diag(inverse @ (difference.T @ difference) @ inverse))
+    return mean, np.asarray(np.maximum(claimed, seen), dtype=np.float64)

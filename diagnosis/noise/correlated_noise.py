@@ -1,0 +1,121 @@
+"""Time-correlated noise: inflation factors of white noise, for pixels or for velocities.
+
+Pixel errors are correlated along a track, and some are common to all tracks, so that averaging over frames helps less
+than for white noise. A filter that assumes white noise is then overconfident in its cameras. Or the velocities drift.
+Windows of the recording give the excess of the difference between both over white noise; a disagreement between two
+halves of the tracks attributes it to the cameras.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, se3, so3
+
+from ..windows.bundle_adjustment import fit_windows_alike
+from ..windows.residuals import SCALE, TURN, Window, WindowData
+
+LOOSE = 30.0
+"""times the velocity noise, for fits that the cameras dominate"""
+MIN_LANDMARKS = 8
+"""of a fit that the cameras dominate"""
+MIN_WINDOWS = 3
+LASTING = 1.5
+"""factor between halves of the tracks from which on pixel errors count as time-correlated"""
+MAX_FACTOR = 20.0
+CHI_SQUARE_6_MEDIAN = 5.3481
+ITERATIONS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Inflation:
+    """Factors on white noise, at least 1."""
+
+    halves: float = 1.0
+    """of the pixels, for errors independent between tracks: from the motions by two halves of the tracks"""
+    pixel: float = 1.0
+    """of the pixels, in total; above `halves` where tracks share errors: the excess against velocities is attributed to
+    cameras whose errors are time-correlated"""
+    velocity: float = 1.0
+    """of the velocities, to which the excess is attributed otherwise"""
+
+
+def inflation_of(
+    sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: NoiseSettings, processes: int = 1
+) -> Inflation:
+    """Inflation from windows without gaps, with their common `shared` parameters (8,) and white noise `sigmas`."""
+    loose = NoiseSettings(sigmas.pixel, LOOSE * sigmas.linear_velocity, LOOSE * sigmas.angular_velocity)
+    pairs = [window for window in windows if len(window[2]) >= 2 * MIN_LANDMARKS]
+    both = [_half(window, parity) for window in pairs for parity in (0, 1)]
+    ends = _ends(sequence, both, loose, shared, processes)
+    halves = _factor([_between(one, other) for one, other in zip(ends[::2], ends[1::2], strict=True)])
+    by_cameras, by_velocities = [], []
+    enough = [window for window in windows if len(window[2]) >= MIN_LANDMARKS]
+    whole = _ends(sequence, enough, loose, shared, processes)
+    for (data, _, _), (seen, C) in zip(enough, whole, strict=True):
+        driven, C_driven = _driven(data, shared, sigmas)
+        gap = se3.log(se3.inverse(seen) @ driven)
+        by_cameras.append((gap, C, C_driven))
+        by_velocities.append((gap, C_driven, halves**2 * C))
+    if halves > LASTING:
+        return Inflation(halves, max(halves, _factor(by_cameras)))
+    return Inflation(halves, halves, _factor(by_velocities))
+
+
+End = tuple[FloatArray, FloatArray]
+"""pose (4, 4) and covariance (6, 6) of the last frame of a window"""
+
+
+def _between(one: End, other: End) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """How far apart two halves of the tracks have the last pose (6,), and the covariance of that for white noise."""
+    return se3.log(se3.inverse(one[0]) @ other[0]), one[1] + other[1], np.zeros((6, 6))
+
+
+def _half(window: Window, parity: int) -> Window:
+    """That of the even or the odd landmarks."""
+    data, poses, points = window
+    chosen = data.row % 2 == parity
+    half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
+    return half, poses, points[parity::2]
+
+
+def _ends(
+    sequence: Sequence, windows: list[Window], loose: NoiseSettings, shared: FloatArray, processes: int
+) -> list[End]:
+    """Where each window ends, from the tracks."""
+    common = [shared] * len(windows)
+    fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
+    return [(fit.poses[-1], fit.last_covariance) for fit in fits]
+
+
+def _driven(data: WindowData, shared: FloatArray, sigmas: NoiseSettings) -> tuple[FloatArray, FloatArray]:
+    """The same from the velocities, without their bias, to scale and turned."""
+    back = so3.exp_so3(shared[TURN])
+    velocity, rate = data.twist[:, :3] / (1.0 + shared[SCALE]), data.twist[:, 3:] - shared[:3]
+    path = se3.compose(se3.exp(np.concatenate([velocity @ back, rate @ back], axis=1) * data.dt[:, None]))
+    J = se3.adjoint(se3.inverse(path[-1]) @ path[1:]) * (
+        np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
+    )
+    J = J * data.dt[:, None, None]
+    return path[-1], np.einsum("kij,klj->il", J, J)
+
+
+def _factor(differences: list[tuple[FloatArray, FloatArray, FloatArray]]) -> float:
+    """The f at which the median of d^T (f^2 C + A)^-1 d over (d, C, A) is that of chi-square; 1 where it is less."""
+    if len(differences) < MIN_WINDOWS:
+        return 1.0
+    d, C, A = (np.array(part) for part in zip(*differences, strict=True))
+
+    def median(factor: float) -> float:
+        solved = np.linalg.solve(factor**2 * C + A, d[:, :, None])[:, :, 0]
+        return float(np.median(np.einsum("ni,ni->n", d, solved)))
+
+    low, high = 1.0, MAX_FACTOR
+    if median(low) <= CHI_SQUARE_6_MEDIAN:
+        return low
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if median(middle) > CHI_SQUARE_6_MEDIAN else (low, middle)
+    return high

@@ -1,0 +1,1 @@
+"""Stereo visual odometry from frame to frame."""

@@ -1,0 +1,1 @@
+"""User-specified repairs, which take precedence over what the diagnosis estimates."""

@@ -1,0 +1,1 @@
+"""Repair of a recording by what the diagnosis estimates."""

@@ -1,0 +1,157 @@
+"""Repair of a recording by the significant estimates of its diagnosis."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.data.axis_conventions import twist_in_imu_axes
+from fgbaseline.data.motion import dead_reckoned_path, held_twist
+from fgbaseline.data.observations import Observations
+from fgbaseline.data.problem import Excluded
+from fgbaseline.data.sequence import Sequence, Truth
+from fgbaseline.geometry import FloatArray, so3
+
+from ..estimation.result import Diagnosis
+from ..odometry.stereo_odometry import Odometry, odometry
+from ..tracks.observation_mask import (
+    GATE_RANGE,
+    MaskSettings,
+    SplitTracks,
+    TrackConsistency,
+    prediction_gate,
+    split_tracks,
+)
+from ..tracks.track_segments import consecutive, sound
+from .landmark_mask import exclude_landmarks
+from .significance import significant_bias, significant_misalignment, significant_offset, significant_scale
+
+
+@dataclass(frozen=True, slots=True)
+class TrackRepairs:
+    """Settings for the repair of tracks."""
+
+    gate: float | None = None
+    """px, of a prediction along a track; None for `prediction_gate`"""
+    split: bool = True
+    """whether every run of a track that jumps becomes a landmark of its own, or only the longest takes part"""
+    mask_copies: bool = True
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Repaired:
+    """A repaired recording, the mask of its observations, and the repairs in sentences."""
+
+    sequence: Sequence
+    excluded: NDArray[np.uint8]
+    """(n,) an `Excluded` for each of its observations"""
+    gate: float
+    """px: how far from its prediction an observation may lie"""
+    repairs: tuple[str, ...]
+
+
+def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None = None) -> Repaired:
+    """The recording with velocities in the axes of imu_T_cam and without bias, the extrinsic aligned, disparities
+    without offset, and broken tracks split."""
+    sequence, done = diagnosis.sequence, []
+    linear, angular = diagnosis.linear, diagnosis.angular
+    bias, angle = significant_bias(diagnosis), significant_misalignment(diagnosis)
+    scale, tracks = significant_scale(diagnosis), tracks or TrackRepairs()
+    velocity = sequence.linear_velocity @ linear.matrix.T / scale
+    rate = (sequence.angular_velocity - bias) @ angular.matrix.T
+    if angular.changed:
+        done.append(f"angular velocity turned from the axes it was recorded in ({angular.name}) to those of imu_T_cam")
+    if linear.changed:
+        done.append(f"linear velocity turned from the axes it was recorded in ({linear.name}) to those of imu_T_cam")
+    if bias.any():
+        done.append(f"gyroscope bias of ({', '.join(f'{b:.4f}' for b in bias)}) rad/s taken off")
+    if scale != 1.0:
+        done.append(f"linear velocity divided by {scale:.4g}")
+    imu_T_cam = sequence.imu_T_cam.copy()
+    if angle.any():
+        imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
+        done.append(
+            f"extrinsic imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities"
+        )
+    offset = significant_offset(diagnosis)
+    if offset:
+        sequence = _without_offset(sequence, offset)
+        done.append(f"{offset:+.2f} px taken off every uR, so that disparities agree with the motion")
+    if diagnosis.shift != 0.0:
+        done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
+    path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)
+    split, gate = _split(sequence, path, mask, tracks)
+    observations, excluded = _renumbered(sequence, split)
+    pieces = split.n_landmarks - sequence.n_landmarks
+    n_landmarks = sequence.n_landmarks + pieces
+    if pieces:
+        done.append(f"{pieces} tracks that jump to another point split off as landmarks of their own")
+    tracked = replace(sequence, observations=observations, n_landmarks=n_landmarks, truth=None)
+    sigma = GATE_RANGE[0] if diagnosis.sigmas is None else diagnosis.sigmas.pixel
+    excluded = exclude_landmarks(tracked, path, excluded, sigma)
+    repaired = replace(
+        sequence,
+        linear_velocity=velocity,
+        angular_velocity=rate,
+        imu_T_cam=imu_T_cam,
+        observations=observations,
+        n_landmarks=n_landmarks,
+        truth=_with_landmarks(sequence.truth, n_landmarks),
+    )
+    return Repaired(repaired, excluded, gate, tuple(done))
+
+
+def _without_offset(sequence: Sequence, offset: float) -> Sequence:
+    o = sequence.observations
+    return replace(sequence, observations=replace(o, pixel=o.pixel - [0.0, 0.0, offset, 0.0]))
+
+
+def _path(diagnosis: Diagnosis, seen_by_cameras: Odometry | None) -> FloatArray:
+    """(T, 4, 4) a path that is right locally, which is all it is for: what the cameras see, and between two intervals
+    that they see what lies in their middle; elsewhere the velocities."""
+    sequence = diagnosis.sequence
+    twist = twist_in_imu_axes(held_twist(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
+    twist[:, :3] /= significant_scale(diagnosis)
+    twist[:, 3:] -= diagnosis.angular.matrix @ significant_bias(diagnosis)
+    if seen_by_cameras is not None:
+        seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
+        twist[known] = seen[known]
+        between = np.flatnonzero(~known[1:-1] & known[:-2] & known[2:]) + 1
+        twist[between] = 0.5 * (seen[between - 1] + seen[between + 1])
+    return dead_reckoned_path(twist * sequence.dt[:, None])
+
+
+def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs) -> tuple[SplitTracks, float]:
+    """Tracks cut where they jump, what excludes their observations, and the gate by which they were judged."""
+    o = sequence.observations
+    copied = np.zeros(len(o), dtype=np.bool_)
+    before, after = consecutive(sequence)
+    same = (o.pixel[before] == o.pixel[after]).all(axis=1)
+    if tracks.mask_copies:
+        copied[after[same]] = True
+    gate = tracks.gate
+    if gate is None:
+        links, usable = TrackConsistency(sequence, path, mask.prediction_gate), sound(sequence)
+        checked = usable[before] & usable[after] & ~same
+        gate = prediction_gate(links.error(before[checked], after[checked]))
+    split = split_tracks(sequence, path, replace(mask, prediction_gate=gate), copied)
+    if not tracks.split:
+        split.excluded[split.landmark != o.landmark] = Excluded.PREDICTION
+        split = SplitTracks(o.landmark, sequence.n_landmarks, split.excluded)
+    return split, gate
+
+
+def _renumbered(sequence: Sequence, split: SplitTracks) -> tuple[Observations, NDArray[np.uint8]]:
+    """Observations under their new landmarks, in their order, and what excludes them."""
+    o = sequence.observations
+    order = np.lexsort((split.landmark, o.frame))
+    moved = Observations(o.frame[order], split.landmark[order], o.pixel[order])
+    return moved, split.excluded[order]
+
+
+def _with_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
+    """The truth, with landmarks of unknown position for the tracks that were split off."""
+    if truth is None or truth.landmarks is None:
+        return truth
+    missing = np.full((n_landmarks - len(truth.landmarks), 3), np.nan)
+    return replace(truth, landmarks=np.concatenate([truth.landmarks, missing]))

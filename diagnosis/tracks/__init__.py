@@ -1,0 +1,1 @@
+"""Track segments, and which observations of a track are consistent."""

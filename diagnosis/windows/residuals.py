@@ -1,0 +1,185 @@
+"""Data of windows, and whitened residuals of pixels and velocities with their Jacobians."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.geometry import FloatArray, StereoMeasurement, se3, so3
+
+SHARED = 8
+"""gyroscope bias (3, rad/s), velocity scale minus one, the rotation vector (3, rad) by which the axes of the recorded
+velocities are turned against those of imu_T_cam: recorded = [(1 + s) exp(phi) v, exp(phi) w + b]; and the disparity
+offset d (px) by which uR is recorded too far to the right, all disparities too small: recorded uR = uR + d"""
+SCALE = 3
+"""of the shared parameters"""
+TURN = slice(4, 7)
+"""of the shared parameters"""
+OFFSET = 7
+"""of the shared parameters"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WindowData:
+    """Measurements of a window of W frames with n observations of m landmarks."""
+
+    frame: IntArray
+    """(n,) 0..W-1, sorted"""
+    row: IntArray
+    """(n,) landmark, 0..m-1; no landmark twice in a frame"""
+    pixel: FloatArray
+    """(n, 3) uL, uR and (vL + vR) / 2"""
+    twist: FloatArray
+    """(W-1, 6) recorded [v, w] of each interval, in the axes of imu_T_cam"""
+    dt: FloatArray
+    """(W-1,) s"""
+
+
+Window = tuple[WindowData, FloatArray, FloatArray]
+"""data, poses (W, 4, 4) of which the first is held, and points (m, 3)"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Joined:
+    """Several windows concatenated, so that their terms are computed together."""
+
+    frame: IntArray
+    """(n,) of all F frames"""
+    row: IntArray
+    """(n,) of all points"""
+    pixel: FloatArray
+    """(n, 3)"""
+    twist: FloatArray
+    """(k, 6)"""
+    dt: FloatArray
+    """(k,)"""
+    interval: IntArray
+    """(k,) the frame at which each interval begins"""
+    observations: tuple[slice, ...]
+    """of each window"""
+    frames: tuple[slice, ...]
+    points: tuple[slice, ...]
+
+    @property
+    def n_frames(self) -> int:
+        """F."""
+        return int(self.frames[-1].stop)
+
+    @property
+    def n_points(self) -> int:
+        """The number of landmarks of all windows."""
+        return int(self.points[-1].stop)
+
+    def intervals(self, window: int) -> slice:
+        """The slice of intervals of one window."""
+        return slice(self.frames[window].start - window, self.frames[window].stop - window - 1)
+
+
+def joined(windows: Sequence[Window]) -> Joined:
+    """The windows concatenated."""
+    data = [window[0] for window in windows]
+    observations = _slices([len(d.frame) for d in data])
+    frames, points = _slices([len(d.dt) + 1 for d in data]), _slices([len(window[2]) for window in windows])
+    return Joined(
+        frame=np.concatenate([d.frame + at.start for d, at in zip(data, frames, strict=True)]),
+        row=np.concatenate([d.row + at.start for d, at in zip(data, points, strict=True)]),
+        pixel=np.concatenate([d.pixel for d in data]),
+        twist=np.concatenate([d.twist for d in data]),
+        dt=np.concatenate([d.dt for d in data]),
+        interval=np.concatenate([np.arange(at.start, at.stop - 1) for at in frames]),
+        observations=observations,
+        frames=frames,
+        points=points,
+    )
+
+
+def _slices(lengths: list[int]) -> tuple[slice, ...]:
+    ends = np.cumsum(lengths).tolist()
+    return tuple(slice(end - length, end) for end, length in zip(ends, lengths, strict=True))
+
+
+class PixelTerms(NamedTuple):
+    """Whitened residuals of the three rows of n observations, with their Jacobians.
+
+    Each coordinate is in an array of its own, since stacks of small matrices take far longer.
+    """
+
+    residual: FloatArray
+    """(3, n)"""
+    by_point: FloatArray
+    """(3, 3, n) derivatives of the rows by the point in the world"""
+    arm: FloatArray
+    """(3, n) m, from the IMU to the point, in world axes: a pose that moves by v and turns by w, in world axes, changes
+    the rows as a point would that moves by -v - w x arm"""
+    weight: FloatArray
+    """(n,) of the kernel; zero where the point is not in front of the camera"""
+    turn: FloatArray
+    """(F, 3, 3) the rotations of the poses"""
+
+
+class MotionTerms(NamedTuple):
+    """Whitened velocity residuals of k intervals, with their Jacobians."""
+
+    residual: FloatArray
+    """(k, 6) recorded minus that of the poses"""
+    by_before: FloatArray
+    """(k, 6, 6) derivatives of the latter by the pose before"""
+    by_after: FloatArray
+    """(k, 6, 6) by the pose after"""
+    by_shared: FloatArray
+    """(k, 6, 8) by the shared parameters"""
+
+
+def pixel_terms(
+    model: StereoMeasurement,
+    imu_T_cam: FloatArray,
+    data: Joined,
+    poses: FloatArray,
+    points: FloatArray,
+    shared: FloatArray,
+) -> PixelTerms:
+    """Pixel terms at poses (F, 4, 4) and points (m, 3), for each window's `shared` parameters (w, 8)."""
+    point = np.take(np.ascontiguousarray(points.T), data.row, axis=1)
+    world_T_cam = np.ascontiguousarray(np.moveaxis((poses @ imu_T_cam)[:, :3], 0, 2))
+    of_frame = np.take(world_T_cam, data.frame, axis=2)
+    axes, seen_from = of_frame[:, :3], of_frame[:, 3]
+    q = (axes * (point - seen_from)[:, None]).sum(axis=0)
+    front = q[2] > model.camera.min_depth
+    q[:, ~front] = [[0.0], [0.0], [1.0]]
+    seen, white = model.camera.rows(q), model.white_scale[:, None]
+    by_point = model.camera.rows_along(seen, axes.transpose(1, 0, 2)) * white[:, None]
+    residual = data.pixel.T - seen.pixel
+    residual[1] -= np.repeat(shared[:, OFFSET], [o.stop - o.start for o in data.observations])
+    residual *= white
+    weight = np.where(front, model.weight((residual**2).sum(axis=0)), 0.0)
+    arm = point - np.take(np.ascontiguousarray(poses[:, :3, 3].T), data.frame, axis=1)
+    return PixelTerms(residual, by_point, arm, weight, poses[:, :3, :3])
+
+
+def motion_terms(data: Joined, poses: FloatArray, sigmas: NoiseSettings, shared: FloatArray) -> MotionTerms:
+    """Velocity terms at poses (F, 4, 4) and each window's `shared` parameters (w, 8)."""
+    whiten = 1.0 / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
+    shared = np.repeat(shared, [f.stop - f.start - 1 for f in data.frames], axis=0)
+    back = se3.inverse(poses[data.interval])
+    relative = back @ poses[data.interval + 1]
+    twist = se3.log(relative)
+    turn = np.zeros((len(twist), 6, 6))
+    turn[:, 3:, 3:] = so3.exp_so3(shared[:, TURN])
+    turn[:, :3, :3] = turn[:, 3:, 3:] * (1.0 + shared[:, SCALE, None, None])
+    predicted = (turn @ (twist / data.dt[:, None])[:, :, None])[:, :, 0]
+    along, turning = so3.hat3(predicted[:, :3]), so3.hat3(predicted[:, 3:])
+    predicted[:, 3:] += shared[:, :3]
+    # log(exp(xi) exp(d)) = xi + J_r^-1(xi) d, to second order in the small rotation of one interval
+    curly = se3.curly_hat(twist)
+    J_after = turn @ (np.eye(6) + 0.5 * curly + curly @ curly / 12.0) / data.dt[:, None, None]
+    J_before = -J_after @ se3.adjoint(se3.inverse(relative))
+    J_shared = np.zeros((len(twist), 6, SHARED))
+    J_shared[:, 3:, :3] = np.eye(3)
+    J_shared[:, :3, SCALE] = predicted[:, :3] / (1.0 + shared[:, SCALE, None])
+    J_shared[:, :3, TURN] = -along
+    J_shared[:, 3:, TURN] = -turning
+    residual = (data.twist - predicted) * whiten
+    return MotionTerms(residual, *(J * whiten[:, None] for J in (J_before, J_after, J_shared)))

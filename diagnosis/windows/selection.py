@@ -1,0 +1,92 @@
+"""Windows of a recording for bundle adjustment: which frames, and their tracks, initial poses and points."""
+
+import numpy as np
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.triangulation import triangulate_tracks
+
+from ..odometry.stereo_odometry import Odometry
+from .residuals import Window, WindowData
+
+FRAMES = 25
+"""of a window: longer than most tracks"""
+MAX_WINDOWS = 48
+MAX_UNBROKEN = 24
+"""windows without gaps, the longest ones"""
+MIN_TRACK = 3
+MIN_OBSERVATIONS = 60
+MIN_UNBROKEN = 5
+"""intervals"""
+
+Span = tuple[int, int]
+"""first frame and number of frames of a window"""
+
+
+def spread_spans(n_frames: int) -> list[Span]:
+    """Windows spread evenly over the recording; neighbors share a frame, so that no interval is left out."""
+    size = min(FRAMES, n_frames)
+    count = max(1, min(MAX_WINDOWS, -(-(n_frames - 1) // (size - 1))))
+    return [(int(start), size) for start in np.unique(np.linspace(0, n_frames - size, count).astype(int))]
+
+
+def unbroken_spans(odometry: Odometry) -> list[Span]:
+    """Windows without an interval over which the cameras see nothing, the longest stretches first."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], odometry.known, [False]]).astype(np.int8)))
+    spans: list[Span] = []
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        for first in range(int(start), int(end) - MIN_UNBROKEN + 1, FRAMES):
+            spans.append((first, min(FRAMES, int(end) - first + 1)))
+    spans.sort(key=lambda span: -span[1])
+    return spans[:MAX_UNBROKEN]
+
+
+def windows_of(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]) -> list[Window]:
+    """Data, initial poses and initial points of each window that has enough observations."""
+    o, dt = sequence.observations, sequence.dt
+    chain = _chains(odometry, o.landmark, o.frame)
+    known = odometry.known[:, None, None]
+    step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
+    starts, before = o.frame_starts(sequence.n_frames), 0
+    parts: list[tuple[WindowData, FloatArray]] = []
+    sights, views, rows = [], [], []
+    for start, size in spans:
+        chosen = np.arange(starts[start], starts[start + size])
+        chosen = chosen[chain[chosen] >= 0]
+        _, row, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
+        chosen = chosen[length[row] >= MIN_TRACK]
+        if len(chosen) < MIN_OBSERVATIONS:
+            continue
+        intervals = slice(start, start + size - 1)
+        poses = se3.compose(step[intervals])
+        row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
+        frame = o.frame[chosen] - start
+        data = WindowData(frame, row, measured_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        parts.append((data, poses))
+        sights.append(chosen)
+        views.append((poses @ sequence.imu_T_cam)[frame])
+        rows.append(row + before)
+        before += int(row.max()) + 1
+    if not parts:
+        return []
+    pixel, row = o.pixel[np.concatenate(sights)], np.concatenate(rows)
+    unit = StereoMeasurement(sequence.camera, 1.0, HuberKernel())
+    points = triangulate_tracks(unit, np.concatenate(views), row, pixel, before).position
+    ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
+    return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]
+
+
+def _chains(odometry: Odometry, landmark: IntArray, frame: IntArray) -> IntArray:
+    """(n,) a number for each observation: equal for those that inlier links join, -1 where none does."""
+    n = len(landmark)
+    linked = np.zeros(n, dtype=np.bool_)
+    joined = np.zeros(n, dtype=np.bool_)
+    inlier = odometry.inlier
+    joined[odometry.links.after[inlier]] = True
+    linked[odometry.links.after[inlier]] = linked[odometry.links.before[inlier]] = True
+    order = np.lexsort((frame, landmark))
+    chain = np.empty(n, dtype=np.int64)
+    chain[order] = np.cumsum(~joined[order])
+    return np.where(linked, chain, -1)
