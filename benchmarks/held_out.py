@@ -27,7 +27,7 @@ import pandas as pd
 from scipy.stats import kendalltau
 
 from fgbaseline import compare
-from fgbaseline.compare.held_out import half_errors
+from fgbaseline.compare.residuals.held_out_tracks import half_errors
 from fgbaseline.data import HeldOut, Sequence, calibrated, find_estimator, hold_out, read
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import FloatArray, se3, so3

@@ -1,13 +1,36 @@
 """Trajectory divergence, reprojection statistics, consistency and trust: arrays in, tables out."""
 
-from .absolute import absolute_errors
-from .alignment import Align, Alignment, align, align_se3
-from .association import Association, Matched, associate
-from .block_bootstrap import error_statistics
-from .carried_covariance import of_other_body, scaled, since_first
-from .common_moments import common_moments, taking_part
-from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
-from .conventions import (
+from .consistency.anees import Consistency, consistency_of, mean_of, nees_over_runs, ranking
+from .consistency.covariance import of_other_body, scaled, since_first
+from .consistency.nees import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
+from .consistency.nis import NisSummary, nis_per_degree, nis_summary
+from .consistency.reference_nees import DifferenceNees, difference_nees
+from .landmarks.dynamic_landmarks import moved_points
+from .landmarks.map_difference import map_by_depth, map_difference
+from .residuals.held_out_tracks import HeldOutErrors, held_out_errors, held_out_ranking
+from .residuals.patterns import residual_patterns
+from .residuals.reprojection import (
+    commonly_used,
+    component_summary,
+    reprojection,
+    reprojection_by,
+    reprojection_summary,
+)
+from .residuals.whitening import track_chi_square, whitened_summary
+from .statistics.block_bootstrap import error_statistics
+from .statistics.descriptive import summarised
+from .statistics.paired_bootstrap import PairedRanking, RmseDifference, paired_ranking, rmse_difference
+from .trajectory.absolute import absolute_errors
+from .trajectory.alignment import Align, Alignment, align, align_se3
+from .trajectory.association import Association, Matched, associate
+from .trajectory.ate_rpe import Difference, absolute_difference, motion_difference
+from .trajectory.common_moments import common_moments, taking_part
+from .trajectory.coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
+from .trajectory.delta_pairs import Unit, pose_pairs
+from .trajectory.divergence import divergence, divergence_summary, pose_errors, truth_errors
+from .trajectory.drift import drift
+from .trajectory.error_decomposition import DifferenceShares, difference_shares
+from .trajectory.frame_conventions import (
     BodyRotation,
     are_conjugated,
     body_rotation,
@@ -19,36 +42,13 @@ from .conventions import (
     turning_rotation,
     world_rotation,
 )
-from .coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
-from .difference_shares import DifferenceShares, difference_shares
-from .drift import drift
-from .growth import Passing, first_beyond, growing_divergence, growth_by_part
-from .held_out import HeldOutErrors, held_out_errors, held_out_ranking
-from .innovation import NisSummary, nis_per_degree, nis_summary
-from .interpolation import interpolated
-from .maps import map_by_depth, map_difference
-from .moved import moved_points
-from .over_runs import Consistency, consistency_of, mean_of, nees_over_runs, ranking
-from .paired import PairedRanking, RmseDifference, paired_ranking, rmse_difference
-from .pairs import Unit, pose_pairs
-from .pose_difference import Difference, absolute_difference, motion_difference
-from .relative import matched_pairs, relative_errors
-from .reprojection import (
-    commonly_used,
-    component_summary,
-    reprojection,
-    reprojection_by,
-    reprojection_summary,
-)
-from .residual_patterns import residual_patterns
-from .segments import SegmentErrors, segment_errors
-from .share_intervals import share_intervals
-from .shared_data import DifferenceNees, difference_nees
-from .statistics import summarised
-from .time_offset import TimeOffset, time_offset
-from .trajectory import divergence, divergence_summary, pose_errors, truth_errors
+from .trajectory.growth import Passing, first_beyond, growing_divergence, growth_by_part
+from .trajectory.interpolation import interpolated
+from .trajectory.relative import matched_pairs, relative_errors
+from .trajectory.segments import SegmentErrors, segment_errors
+from .trajectory.share_intervals import share_intervals
+from .trajectory.time_offset import TimeOffset, time_offset
 from .trust import Trust, Verdict, trust
-from .whitened import track_chi_square, whitened_summary
 
 __all__ = [
     "FEWEST_STRETCHES",

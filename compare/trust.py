@@ -9,8 +9,8 @@ from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import disparity
 
-from .cost import cost
-from .noise_scale import motion_scale, pixel_scale
+from .residuals.cost import cost
+from .residuals.noise_scale import motion_scale, pixel_scale
 
 FAR_POINT = 1.0
 """px of disparity"""

@@ -9,7 +9,7 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import CovarianceState
-from fgbaseline.compare.chi_square import share_inside
+from fgbaseline.compare.statistics.chi_square import share_inside
 from fgbaseline.geometry import FloatArray
 
 from .comparison import Result, Run

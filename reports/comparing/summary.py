@@ -10,7 +10,7 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors
-from fgbaseline.compare.travel import distance_travelled
+from fgbaseline.compare.trajectory.path import distance_travelled
 
 from ..json_numbers import finite, nulls
 from ..schema_base import INFINITE

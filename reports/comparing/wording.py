@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, RmseDifference, Verdict, too_small
-from fgbaseline.compare.travel import distance_travelled
+from fgbaseline.compare.trajectory.path import distance_travelled
 
 from ..page.numbers import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline.compare import track_chi_square
-from fgbaseline.compare.whitened import judged
+from fgbaseline.compare.residuals.whitening import judged
 from fgbaseline.reports.comparison import Result, Run
 
 from .frames import log_where_positive

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare.statistics.chi_square import bounds
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.compare import reprojection_by
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare.statistics.chi_square import bounds
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM, NEES_BOUNDS

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare.statistics.chi_square import bounds
 from fgbaseline.geometry import FloatArray
 
 from ..figures.frames import fit_log, fit_log_or_linear

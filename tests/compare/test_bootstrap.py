@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
-from fgbaseline.compare.block_bootstrap import tails
-from fgbaseline.compare.block_draws import BlockDraws, draw_blocks
-from fgbaseline.compare.block_length import autocovariance, block_length
+from fgbaseline.compare.statistics.block_bootstrap import tails
+from fgbaseline.compare.statistics.block_draws import BlockDraws, draw_blocks
+from fgbaseline.compare.statistics.block_length import autocovariance, block_length
 from fgbaseline.geometry import FloatArray, InputError
 
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.chi_square import bounds, quantile, share_inside
-from fgbaseline.compare.consistency import HELD, CovarianceState, is_positive_definite
+from fgbaseline.compare.consistency.nees import HELD, CovarianceState, is_positive_definite
+from fgbaseline.compare.statistics.chi_square import bounds, quantile, share_inside
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 

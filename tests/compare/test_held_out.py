@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.compare.held_out import HeldOutErrors, half_errors
+from fgbaseline.compare.residuals.held_out_tracks import HeldOutErrors, half_errors
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.statistics import quantile
+from fgbaseline.compare.statistics.descriptive import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.reports import comparison, page

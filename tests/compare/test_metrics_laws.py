@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Matched
-from fgbaseline.compare.best_rotation import best_rotation
+from fgbaseline.compare.trajectory.wahba import best_rotation
 from fgbaseline.data import Trajectory
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, se3, so3

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare
 from fgbaseline.compare import Unit
-from fgbaseline.compare import pairs as pairs_module
-from fgbaseline.compare.pairs import chained_pairs, nearest_delta_pairs, turned_pairs
+from fgbaseline.compare.trajectory import delta_pairs as pairs_module
+from fgbaseline.compare.trajectory.delta_pairs import chained_pairs, nearest_delta_pairs, turned_pairs
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.shared_data import difference_covariance
+from fgbaseline.compare.consistency.reference_nees import difference_covariance
 from fgbaseline.data import Estimate
 from fgbaseline.ekf import joint_ekf
 from fgbaseline.geometry import FloatArray, se3

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from fgbaseline import compare, data
-from fgbaseline.compare.residual_patterns import _p95
-from fgbaseline.compare.whitened import whitened_rows
+from fgbaseline.compare.residuals.patterns import _p95
+from fgbaseline.compare.residuals.whitening import whitened_rows
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, se3

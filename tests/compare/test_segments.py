@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.compare.segments import fitted_lengths
+from fgbaseline.compare.trajectory.segments import fitted_lengths
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 

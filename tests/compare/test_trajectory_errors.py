@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.travel import distance_travelled, travel_frame
+from fgbaseline.compare.trajectory.path import distance_travelled, travel_frame
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3
 

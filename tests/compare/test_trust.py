@@ -9,8 +9,8 @@ import pytest
 
 from fgbaseline import compare, data, ekf, smoother
 from fgbaseline.compare import Verdict
-from fgbaseline.compare.cost import cost
-from fgbaseline.compare.noise_scale import expected_square, motion_scale, pixel_scale
+from fgbaseline.compare.residuals.cost import cost
+from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
 from fgbaseline.compare.trust import TrustLimits, _above, _below, offered
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, smoother
-from fgbaseline.compare.cost import cost
+from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.data import HuberKernel
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings

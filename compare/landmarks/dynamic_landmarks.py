@@ -11,8 +11,8 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import measured_rows
 
-from .chi_square import probability_beyond
-from .whitened import judged
+from ..residuals.whitening import judged
+from ..statistics.chi_square import probability_beyond
 
 MIN_SIGHTS = 4
 """of a track: a point and a velocity are six numbers"""

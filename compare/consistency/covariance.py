@@ -7,7 +7,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3
 
-from .consistency import HELD, is_positive_definite
+from .nees import HELD, is_positive_definite
 
 MOSTLY = 0.5
 """of the poses: where the covariances of so many grow from that of the first pose, they are of the motion since it"""

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from .travel import distance_travelled
+from .path import distance_travelled
 
 ROUNDING = 1e-9
 """of a delta: so much less than it still counts, so that rounding does not decide where steps add up to it exactly"""

@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from fgbaseline.geometry import FloatArray
 
-from .chi_square import PROBABILITY, bounds
+from ..statistics.chi_square import PROBABILITY, bounds
 
 POSE_DEGREES = 6
 

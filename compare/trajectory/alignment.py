@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
-from .best_rotation import best_rotation, best_turn
+from .wahba import best_rotation, best_turn
 
 
 class Align(StrEnum):

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import InputError
 
+from ..statistics.descriptive import summarised
 from .association import Matched
-from .statistics import summarised
-from .trajectory import pose_errors
+from .divergence import pose_errors
 
 PARTS = 10
 

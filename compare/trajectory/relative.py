@@ -6,9 +6,9 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import InputError
 
 from .association import Matched
-from .pairs import TOLERANCE, Unit, pose_pairs
-from .pose_difference import Difference, motion_difference
-from .travel import distance_travelled
+from .ate_rpe import Difference, motion_difference
+from .delta_pairs import TOLERANCE, Unit, pose_pairs
+from .path import distance_travelled
 
 OF_MOTIONS = (
     Difference.TRANSLATION,

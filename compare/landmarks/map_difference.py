@@ -9,8 +9,8 @@ from fgbaseline.data import Estimate, Sequence
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import se3
 
-from .consistency import is_positive_definite, squared_norm
-from .shared_data import difference_covariance
+from ..consistency.nees import is_positive_definite, squared_norm
+from ..consistency.reference_nees import difference_covariance
 
 DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
 """m, edges of the classes by depth"""

@@ -8,7 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from .block_draws import BlockDraws, draw_blocks
 from .block_length import block_length
-from .statistics import known, mean, quantile
+from .descriptive import known, mean, quantile
 
 REPETITIONS = 1000
 CONFIDENCE = 0.95

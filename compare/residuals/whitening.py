@@ -6,7 +6,7 @@ import pandas as pd
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray
 
-from .chi_square import probability_beyond
+from ..statistics.chi_square import probability_beyond
 
 WHITE_ROWS = ("uL", "uR", "v")
 

@@ -9,7 +9,7 @@ from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import se3
 
-from .statistics import known, mean, summarised
+from ..statistics.descriptive import known, mean, summarised
 
 ROWS = ("uL", "vL", "uR", "vR")
 NEAR = 3.0

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, so3
 
+from ..statistics.descriptive import summarised
 from .alignment import align_se3
-from .statistics import summarised
-from .travel import distance_travelled, travel_frame
+from .path import distance_travelled, travel_frame
 
 
 def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:

@@ -6,12 +6,12 @@ import pandas as pd
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..statistics.block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
 from .association import Matched
-from .block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
-from .pairs import nearest_delta_pairs
-from .pose_difference import Difference, motion_difference
+from .ate_rpe import Difference, motion_difference
+from .delta_pairs import nearest_delta_pairs
+from .path import distance_travelled
 from .relative import require_stamps
-from .travel import distance_travelled
 
 SHARE = 0.1
 """of the path and of its duration: over so much the drift is measured by default, or one step where that is more"""

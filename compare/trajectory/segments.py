@@ -9,10 +9,10 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..statistics.block_bootstrap import error_statistics
 from .association import Matched
-from .block_bootstrap import error_statistics
-from .pose_difference import Difference, motion_difference
-from .travel import distance_travelled
+from .ate_rpe import Difference, motion_difference
+from .path import distance_travelled
 
 OFFICIAL_LENGTHS = tuple(range(100, 900, 100))
 OFFICIAL_STEP = 10

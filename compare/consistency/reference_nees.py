@@ -8,7 +8,7 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
 
-from .consistency import CovarianceState, covariance_state, is_positive_definite, squared_norm
+from .nees import CovarianceState, covariance_state, is_positive_definite, squared_norm
 
 NEGLIGIBLE = 1e-6
 """of the filter's own variance: a direction in which the difference claims less has no covariance to speak of"""

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data import Estimate
 from fgbaseline.geometry import FloatArray
 
-from .chi_square import bounds, share_inside
+from ..statistics.chi_square import bounds, share_inside
 
 
 @dataclass(frozen=True, slots=True)

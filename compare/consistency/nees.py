@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
-from .over_runs import nees_over_runs
+from .anees import nees_over_runs
 
 PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
 HELD = 1e-11

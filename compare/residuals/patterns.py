@@ -10,7 +10,7 @@ from pandas.api.typing import SeriesGroupBy
 from fgbaseline.data import Sequence
 from fgbaseline.data.observations import IntArray
 
-from .maps import DEPTHS, depth_classes
+from ..landmarks.map_difference import DEPTHS, depth_classes
 
 AGES = (1, 2, 4, 7, 13, 26)
 """sights from which on a class of track age begins"""

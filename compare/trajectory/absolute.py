@@ -3,7 +3,7 @@
 import pandas as pd
 
 from .association import Matched
-from .pose_difference import Difference, absolute_difference
+from .ate_rpe import Difference, absolute_difference
 
 OF_POSES = (Difference.TRANSLATION, Difference.ROTATION_DEG, Difference.ROTATION_CHORD, Difference.POSE)
 

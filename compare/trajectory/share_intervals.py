@@ -6,11 +6,11 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import FloatArray
 
+from ..statistics.block_bootstrap import CONFIDENCE, FEWEST_BLOCKS, MOST_BLOCKS, REPETITIONS, tails
+from ..statistics.block_draws import draw_blocks
+from ..statistics.block_length import block_length
 from .association import Matched
-from .block_bootstrap import CONFIDENCE, FEWEST_BLOCKS, MOST_BLOCKS, REPETITIONS, tails
-from .block_draws import draw_blocks
-from .block_length import block_length
-from .difference_shares import SCALE, WHOLE, difference_basis, difference_shares
+from .error_decomposition import SCALE, WHOLE, difference_basis, difference_shares
 
 NAMES = ("scale", "heading", "noise")
 
