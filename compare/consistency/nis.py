@@ -1,4 +1,4 @@
-"""Whether a filter's innovations are as large as it expected them."""
+"""Normalized innovation squared (NIS) of a filter, with its chi-square bounds."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,25 @@ import numpy as np
 from fgbaseline.data import Estimate
 from fgbaseline.geometry import FloatArray
 
-from ..statistics.chi_square import bounds, share_inside
+from ..statistics.chi_square import chi_square_bounds, share_inside_bounds
 
 
 @dataclass(frozen=True, slots=True)
 class NisSummary:
-    """Innovations of a run beside chi-square; NaN where a filter recorded none."""
+    """NIS of a run with its chi-square bounds; NaN where the filter records none."""
 
     per_degree: float
-    """sum of the NIS over the sum of its degrees of freedom: 1 for a filter that knows its errors"""
+    """sum of the NIS over the sum of its degrees of freedom (expected 1)"""
     low: float
     high: float
-    """95 % bounds of `per_degree`, the frames' innovations being independent, as those of a consistent filter are"""
+    """95 % bounds of `per_degree` for innovations independent between frames, as those of a consistent filter"""
     inside_95: float
-    """share of the frames whose NIS lies inside its own 95 % bounds, which assume nothing of other frames"""
+    """share of the frames whose NIS lies inside its own 95 % bounds (expected 0.95)"""
     frames: int
 
 
 def nis_per_degree(estimate: Estimate) -> FloatArray:
-    """(T,) NIS over its degrees of freedom, 1 on average; NaN where the filter recorded none."""
+    """NIS over its degrees of freedom (T,), expected 1; NaN where the filter records none."""
     T, recorded = len(estimate.world_T_imu), estimate.innovations
     if recorded is None:
         return np.full(T, np.nan)
@@ -33,7 +33,7 @@ def nis_per_degree(estimate: Estimate) -> FloatArray:
 
 
 def nis_summary(estimate: Estimate) -> NisSummary:
-    """All frames in which the filter recorded a NIS, be it infinite, at least one landmark being known before."""
+    """Summary over the frames in which the filter records a NIS, finite or not."""
     recorded = estimate.innovations
     known = ~np.isnan(nis_per_degree(estimate))
     if recorded is None or not known.any():
@@ -41,11 +41,11 @@ def nis_summary(estimate: Estimate) -> NisSummary:
         return NisSummary(nan, nan, nan, nan, 0)
     nis, degrees = recorded.nis[known], recorded.degrees[known].astype(np.float64)
     total = float(degrees.sum())
-    low, high = bounds(total)
+    low, high = chi_square_bounds(total)
     return NisSummary(
         per_degree=float(nis.sum()) / total,
         low=float(low) / total,
         high=float(high) / total,
-        inside_95=share_inside(nis, degrees),
+        inside_95=share_inside_bounds(nis, degrees),
         frames=int(known.sum()),
     )

@@ -1,6 +1,4 @@
-"""Where the landmarks of two estimates differ, matched by their number."""
-
-from itertools import pairwise
+"""Difference of two landmark maps, matched by landmark index."""
 
 import numpy as np
 import pandas as pd
@@ -9,25 +7,23 @@ from fgbaseline.data import Estimate, Sequence
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import se3
 
-from ..consistency.nees import is_positive_definite, squared_norm
+from ..consistency.covariance import is_positive_definite
+from ..consistency.nees import mahalanobis_squared
 from ..consistency.reference_nees import difference_covariance
-
-DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
-"""m, edges of the classes by depth"""
+from ..residuals.patterns import DEPTHS, depth_classes
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
-    """One row per `landmark` that both have, at a place that is not NaN, and some frame with both poses sees:
+    """Difference of each landmark that both maps have and a frame with both poses observes, one row per `landmark`:
 
-    `distance` in the world as it is, m, with whatever drift the paths have; `seen` the distance of the two points as
-    the two cameras see them, each in its own camera frame at the sight nearest to the reference's camera, m, which has
-    no drift in it; `depth` of the reference's point at that sight, m; `sigmas` the world difference over the covariance
-    of the difference, sqrt(d^T (P - P_ref)^-1 d), since the two share their data. `sigmas` is NaN where an estimator
-    gives no covariance, and `left_out` where P - P_ref is not positive definite. For a consistent pair the square of
-    `sigmas` is chi-square with 3 degrees of freedom.
+    `distance` in the world, m, drift of the paths included; `seen`, the distance of the two points in their own camera
+    frames at the observation nearest to the reference's camera, m, free of drift; `depth` of the reference's point
+    there, m; `sigmas`, the Mahalanobis norm sqrt(d^T (P - P_ref)^-1 d) of the world difference, as the two share their
+    data. `sigmas` is NaN without covariances, and `left_out` where P - P_ref is not positive definite. For a consistent
+    pair the square of `sigmas` is chi-square with 3 degrees of freedom.
     """
     index, mine, its = np.intersect1d(estimate.landmarks.index, reference.landmarks.index, return_indices=True)
-    frame = _nearest_sight(sequence, estimate, reference)[index]
+    frame = _nearest_observation(sequence, estimate, reference)[index]
     known = (frame >= 0) & ~np.isnan(estimate.landmarks.position[mine]).any(axis=1)
     index, mine, its, frame = index[known], mine[known], its[known], frame[known]
     p, q = estimate.landmarks.position[mine], reference.landmarks.position[its]
@@ -44,7 +40,7 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
         D = difference_covariance(P[sound], Q[sound])
         positive = np.isfinite(D).all(axis=(1, 2))
         left_out[sound[~positive]] = True
-        sigmas[sound[positive]] = np.sqrt(squared_norm((p - q)[sound[positive]], D[positive]))
+        sigmas[sound[positive]] = np.sqrt(mahalanobis_squared((p - q)[sound[positive]], D[positive]))
     return pd.DataFrame(
         {
             "landmark": index,
@@ -58,9 +54,9 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
 
 
 def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
-    """Medians of a `map_difference` for each class of depth: `n`, `distance`, `seen`, `sigmas` and how many have them.
+    """Medians of a `map_difference` by depth class: `n`, `distance`, `seen`, `sigmas` and the number `with_sigmas`.
 
-    Rows are named by their edges in m; points that lie behind the camera are in none.
+    Rows are named by their edges in m; points behind the camera belong to none.
     """
     groups = table.groupby(pd.cut(table["depth"], DEPTHS, labels=depth_classes(), right=False), observed=False)
     return pd.DataFrame(
@@ -72,15 +68,10 @@ def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def depth_classes() -> list[str]:
-    """The classes by depth, as tables name them."""
-    return [f"{low:g} to {high:g} m" if np.isfinite(high) else f"{low:g} m and more" for low, high in pairwise(DEPTHS)]
+def _nearest_observation(sequence: Sequence, estimate: Estimate, reference: Estimate) -> IntArray:
+    """Frame (N,) that observes each landmark from nearest on the reference's path; -1 where none does.
 
-
-def _nearest_sight(sequence: Sequence, estimate: Estimate, reference: Estimate) -> IntArray:
-    """(N,) the frame that sees each landmark from nearest along the reference's path; -1 where none does.
-
-    Of frames in which both have a pose; a landmark the reference does not have counts as seen nowhere.
+    Over frames in which both have a pose; landmarks that the reference lacks have none.
     """
     o = sequence.observations
     position = np.full((sequence.n_landmarks, 3), np.nan)

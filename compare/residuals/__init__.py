@@ -1,1 +1,1 @@
-"""Reprojection and motion residuals: raw, whitened, by class, their cost, the noise scale they imply, held-out tracks."""
+"""Reprojection and motion residuals: raw, whitened, by class; cost, noise scale, prediction of held-out tracks."""

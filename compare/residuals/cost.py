@@ -1,4 +1,4 @@
-"""The cost of a problem at an estimate, as the problem's docstring defines it: numpy only, whatever solved it."""
+"""Cost of a problem at an estimate: half the sum of squared whitened residuals, in numpy only."""
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from .reprojection import ROWS, reprojection
 def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
     """Half the sum of squared whitened residuals over the observations `taken` (n,) of the sequence's.
 
-    Under the problem's kernel, with the increments and the landmarks' prior; NaN where the estimate lacks a pose or a
-    landmark of them. The prior of the first pose is left out: it is held, or nearly.
+    Pixels under the problem's kernel, plus motion increments and landmark priors; NaN where the estimate lacks a pose
+    or a landmark of `taken`. The prior of the first pose is left out, since that pose is held.
     """
     table = reprojection(problem.sequence, estimate)
     table = table[taken[table["observation"].to_numpy()]]
@@ -26,24 +26,24 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
 
 
 def pixel_squares(problem: Problem, residual: FloatArray) -> FloatArray:
-    """(n,) whitened squares of residuals (n, 4) in px: of the three rows (uL, uR, (vL + vR) / 2)."""
+    """Squared whitened norms (n,) of residuals (n, 4) in px, over the three rows (uL, uR, (vL + vR) / 2)."""
     return np.asarray(np.sum(problem.measurement.whitened(residual) ** 2, axis=1))
 
 
 def motion_squares(problem: Problem, estimate: Estimate) -> FloatArray:
-    """(T-1,) whitened squares of what `motion_residuals` says."""
+    """Squared whitened norms (T-1,) of `motion_residuals`."""
     residual = motion_residuals(problem, estimate)
     whitened = np.linalg.solve(problem.increment_covariance, residual[:, :, None])[:, :, 0]
     return np.asarray(np.einsum("ti,ti->t", residual, whitened))
 
 
 def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:
-    """(T-1, 6) log(exp(increment)^-1 T_k^-1 T_(k+1)): by how much the estimated motion differs from the measured."""
+    """Motion residuals log(exp(increment)^-1 T_k^-1 T_(k+1)) (T-1, 6), [v, w] in m and rad."""
     return se3.log(se3.inverse(se3.exp(problem.increment)) @ se3.relative(estimate.world_T_imu))
 
 
 def prior_squares(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
-    """Sum of the whitened squares of the priors of the landmarks that the observations `taken` (n,) see."""
+    """Sum of squared whitened prior residuals of the landmarks in the observations `taken` (n,)."""
     prior = problem.landmark_prior
     if prior is None:
         return 0.0

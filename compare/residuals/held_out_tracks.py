@@ -1,12 +1,11 @@
-"""Paths ranked by tracks that none of them has seen, without ground truth.
+"""Cross-validation of trajectories on held-out feature tracks, without ground truth.
 
-Each piece of a held-out track is triangulated along a path from one half of its sights and predicted into the other
-half, and the other way round. What errs is the path between the two halves, so that a track of 13 frames tells of the
-motion over about a second; drift over longer times it cannot see.
+Each piece of a held-out track is triangulated along a path from one half of its observations and predicted in the other
+half, and vice versa. The error measures the path between the two halves: a track of 13 frames covers about one second
+of motion, and drift over longer times does not show.
 
-One mask for all paths: a piece takes part where at least one path explains it, its smallest error over the paths being
-below `GATE` times the median of these (3 to 12 px). What is left out is explained by no path, so that leaving it out
-favours none; what one path explains counts against all others.
+All paths share one mask. A piece is an inlier where its smallest error over the paths is below `GATE` times the median
+of these (3 to 12 px). An outlier is explained by no path, so its exclusion favors none.
 """
 
 from collections.abc import Hashable, Mapping
@@ -24,43 +23,46 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from .reprojection import NEAR
 
 GATE = 6.0
+"""times the median of the smallest errors"""
 GATE_RANGE = (3.0, 12.0)
-"""px"""
+"""px; bounds of the gate"""
 BLOCK = 5.0
-"""s: tracks that begin in the same stretch of so long share the errors of a path, and are drawn together"""
+"""s; tracks that begin within one block share the errors of a path and are drawn together"""
 RESAMPLES = 400
 SEED = 20264
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HeldOutErrors:
-    """The errors of several paths on the same observations."""
+    """Prediction errors of several paths on the same held-out observations."""
 
     table: pd.DataFrame
-    """one row per observation that takes part: `piece`, `landmark`, `frame`, `start` (s, when its piece begins)"""
+    """one row per inlier observation: `piece`, `landmark`, `frame`, `start` (s, of its piece)"""
     error: pd.DataFrame
-    """beside it a column for each path, px: norm of the four differences; infinite behind the camera"""
+    """a column per path, px: norm of the four pixel residuals; infinite behind the camera"""
     gate: float
     """px"""
     pieces: int
-    """that every path has poses for"""
+    """number of pieces for which every path has poses"""
     inliers: int
-    """of these that take part"""
+    """number of inlier pieces among these"""
 
 
 def held_out_errors(
     sequence: Sequence, held: HeldOut, paths: Mapping[str, FloatArray], pixel_variance: float
 ) -> HeldOutErrors:
-    """What paths (T, 4, 4) say of the held-out pieces, over those that lie where all of them have poses.
+    """Prediction errors of paths (T, 4, 4) on the held-out pieces within the frames that all of them have.
 
-    `sequence` gives stamps, camera and extrinsic, as the estimators had them; `pixel_variance` px^2 scales the kernel
+    `sequence` holds stamps, camera and extrinsic as the estimators use them; `pixel_variance`, px^2, scales the kernel
     of the triangulation. Raises FgbaselineError without a path.
     """
     if not paths:
         raise FgbaselineError("held-out tracks need at least one path to be judged")
     everywhere = np.isfinite(np.stack(list(paths.values()))).all(axis=(0, 2, 3))
     chosen = _by_piece(held, np.asarray(everywhere, dtype=np.bool_))
-    error = np.stack([half_errors(sequence, held, chosen, path, pixel_variance) for path in paths.values()], axis=1)
+    error = np.stack(
+        [cross_prediction_errors(sequence, held, chosen, path, pixel_variance) for path in paths.values()], axis=1
+    )
     piece = np.unique(held.piece[chosen], return_inverse=True)[1]
     n = int(piece.max(initial=-1)) + 1
     count = np.bincount(piece, minlength=n)
@@ -87,12 +89,12 @@ def held_out_errors(
     )
 
 
-def half_errors(
+def cross_prediction_errors(
     sequence: Sequence, held: HeldOut, chosen: IntArray, path: FloatArray, pixel_variance: float
 ) -> FloatArray:
-    """(n,) px: the errors of the held-out observations `chosen` (n,), sorted by piece and frame, along one path.
+    """Errors (n,), px, of the held-out observations `chosen` (n,), sorted by piece and frame, along one path.
 
-    Those of the first half of a piece are predicted from its second half, and those of the second from its first.
+    The first half of a piece is predicted from its second half, and the second from the first.
     """
     o = held.observations
     piece = np.unique(held.piece[chosen], return_inverse=True)[1].astype(np.int64)
@@ -113,12 +115,11 @@ def half_errors(
 
 
 def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
-    """One row per path, the best first: its `median`, `p95` (px) and share `under_3px` over the common observations.
+    """Paths ranked by median error: `median`, `p95` (px) and share `under_3px` over the common observations.
 
-    `low` and `high` are a 95 % interval of the median, `behind` its distance from the best median with `behind_low`
-    and `behind_high`: an interval that holds zero says that the two cannot be told apart. By resampling stretches of
-    `BLOCK` seconds (block bootstrap, 400 draws). Empty without observations. Its `attrs` have
-    `n`, the observations, and `pieces`, those that lie where all paths have poses.
+    `low` and `high` are the 95 % interval of the median, `behind` its difference from the best one with `behind_low`
+    and `behind_high`; an interval that contains zero is a tie. Block bootstrap over `BLOCK` seconds, 400 draws. Empty
+    without observations. Its `attrs` are `n` observations and `pieces`, those within the frames that all paths have.
     """
     values = errors.error.to_numpy()
     attrs: Mapping[Hashable | None, Any] = {"n": len(values), "pieces": errors.pieces}
@@ -153,7 +154,7 @@ def held_out_ranking(errors: HeldOutErrors) -> pd.DataFrame:
 
 
 def _by_piece(held: HeldOut, everywhere: BoolArray) -> IntArray:
-    """(n,) held-out observations of pieces within the frames (T,) that all paths have, sorted by piece, then frame."""
+    """Held-out observations (n,) of pieces within the frames (T,) that all paths have, sorted by piece, then frame."""
     o, piece = held.observations, held.piece
     missing = np.zeros(held.n_pieces, dtype=np.bool_)
     missing[piece[(piece >= 0) & ~everywhere[o.frame]]] = True
@@ -163,7 +164,7 @@ def _by_piece(held: HeldOut, everywhere: BoolArray) -> IntArray:
 
 
 def _drawn_medians(values: FloatArray, block: IntArray) -> FloatArray:
-    """(RESAMPLES, m) medians of values (n, m) over blocks drawn with replacement."""
+    """Medians (RESAMPLES, m) of values (n, m) over blocks drawn with replacement."""
     random = np.random.default_rng(SEED)
     rows = [np.flatnonzero(block == b) for b in np.unique(block)]
     drawn = np.empty((RESAMPLES, values.shape[1]))

@@ -1,4 +1,4 @@
-"""By which factor the residuals are larger than the noise model says: 1 where the model is right."""
+"""Noise scale: estimated over modeled standard deviation of pixel and motion noise (expected 1)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,18 +11,18 @@ from .cost import motion_squares, pixel_squares, prior_squares
 from .reprojection import ROWS, reprojection
 
 RANGE = (1e-9, 1e9)
-"""within which a scale is looked for"""
+"""interval of the search for a scale"""
 
 
 def pixel_scale(problem: Problem, estimate: Estimate) -> float:
-    """The scale s of Gaussian pixel noise, in units of the model's, that explains the residuals an estimate used.
+    """Scale s of Gaussian pixel noise, in units of the model's sigma, that explains the residuals an estimate used.
 
     At s the expected sum of kernel-weighted whitened squares equals the observed one. The residual of an observation
-    is Gaussian over three rows with the variance s^2 (1 - h), h being what the estimated parameters absorb: the
-    landmark 1 / n of a track of n observations (nothing where it has a prior), the poses and the priors what is left of
-    the motion's and the priors' squares. In a linear least-squares problem the expected squares of pixels, motion and
-    priors add up to 3 n - 3 m for m landmarks without a prior (3 n with one): what motion and priors keep is missing
-    from the pixels. NaN where a residual is NaN or no degree of freedom is left, infinite where one is infinite.
+    is Gaussian over three rows with the variance s^2 (1 - h), h being the leverage of the estimated parameters: of the
+    landmark 1 / n in a track of n observations (zero where it has a prior), of the poses what motion and priors retain
+    of their squares. In a linear least-squares problem the expected squares of pixels, motion and
+    priors add up to 3 n - 3 m for m landmarks without a prior (3 n with one): what motion and priors retain is
+    missing from the pixels. NaN for a NaN residual or no degree of freedom, infinite for an infinite residual.
     """
     table = reprojection(problem.sequence, estimate)
     table = table[table["used"]]
@@ -55,13 +55,12 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
 
 
 def motion_scale(problem: Problem, estimate: Estimate) -> float:
-    """Root mean square of the whitened motion residuals, per degree of freedom: at most 1 is expected, since the
-    poses absorb what the pixels determine."""
+    """RMS of the whitened motion residuals per degree of freedom (expected at most 1, as poses also fit the pixels)."""
     return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / 6.0))
 
 
 def expected_square(scale: ArrayLike, threshold: float | None) -> FloatArray:
-    """(...,) the mean of `HuberKernel.weighted` for three independent Gaussian rows of standard deviation `scale`.
+    """Expectation of `HuberKernel.weighted` for three independent Gaussian rows of standard deviation `scale` (...,).
 
     With x = norm / scale, which is chi-distributed with 3 degrees of freedom, and c = threshold / scale:
     scale^2 E[x^2; x < c] + threshold scale E[x; x >= c].

@@ -1,5 +1,6 @@
-"""Where reprojection errors come from: by distance, by how long a track has lasted, by place in the image, by side."""
+"""Residual patterns: reprojection errors by depth, track age, image region and camera."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,22 +11,22 @@ from pandas.api.typing import SeriesGroupBy
 from fgbaseline.data import Sequence
 from fgbaseline.data.observations import IntArray
 
-from ..landmarks.map_difference import DEPTHS, depth_classes
-
+DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
+"""m, edges of the depth classes"""
 AGES = (1, 2, 4, 7, 13, 26)
-"""sights from which on a class of track age begins"""
+"""first observation of each class of track age"""
 DISTANCE, AGE, REGION, SIDE = "distance", "track age", "region", "side"
 ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "middle", "right")
 
 
 def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
-    """Residuals of a reprojection table in classes, one row per class that has any, with the columns
+    """Residuals of a reprojection table in classes, one row per non-empty class, with the columns
 
     `by` (distance, track age, region, side), `of` (the class), `n`, `median`, `mean` and `p95` of the error in px, and
-    the mean residuals `u` and `v` (over both cameras) in px: a mean that is not zero is a bias of that class.
-    `distance` is the depth in front of the left camera, `track age` counts the sights of the track in the recording,
-    `region` is the ninth of the left image (as far as there are observations), and `side` compares the left camera's
-    error, the norm of uL and vL, with the right one's. Observations behind the camera are in no class of distance.
+    the mean residuals `u` and `v` (over both cameras) in px, which are the bias of the class. `distance` is the depth
+    in front of the left camera (no class behind it), `track age` counts the observations of the track so far, `region`
+    is the ninth of the left image within the bounding box of the observations, and `side` compares the error of the
+    left camera, the norm of uL and vL, with that of the right one.
     """
     u, v = 0.5 * (table["uL"] + table["uR"]), 0.5 * (table["vL"] + table["vR"])
     both = pd.DataFrame({"error": table["error"], "u": u, "v": v})
@@ -42,8 +43,13 @@ def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
+def depth_classes() -> list[str]:
+    """Names of the depth classes in tables."""
+    return [f"{low:g} to {high:g} m" if np.isfinite(high) else f"{low:g} m and more" for low, high in pairwise(DEPTHS)]
+
+
 def _classified(values: pd.DataFrame, by: str, code: IntArray, names: list[str]) -> pd.DataFrame:
-    """Statistics of the rows of each class; those with a code that has no name are in none."""
+    """Statistics of the rows of each class; rows whose code has no name are left out."""
     named = (code >= 0) & (code < len(names))
     groups = values[named].groupby(code[named])
     error = groups["error"]
@@ -63,19 +69,19 @@ def _classified(values: pd.DataFrame, by: str, code: IntArray, names: list[str])
 
 
 def _p95(errors: "SeriesGroupBy[Any, Any]") -> "pd.Series[float]":
-    """The 95 % quantile; infinite, not NaN, where it lies between a finite error and an infinite one."""
+    """95th percentile; infinite, not NaN, between a finite error and an infinite one."""
     above = errors.quantile(0.95, interpolation="higher")
     return above.where(np.isinf(above), errors.quantile(0.95))
 
 
 def _classes_of(values: ArrayLike, edges: tuple[float, ...]) -> IntArray:
-    """(n,) the class from its lower edge on up to the next; -1 below the first, and for NaN."""
+    """Class (n,) of each value, from its lower edge up to the next; -1 below the first, and for NaN."""
     v = np.asarray(values, dtype=np.float64)
     return np.where(np.isnan(v), -1, np.searchsorted(edges, v, side="right") - 1).astype(np.int64)
 
 
 def _age(sequence: Sequence) -> IntArray:
-    """(n,) which sight of its track each observation of the sequence is, 1 for the first."""
+    """Ordinal number (n,) of each observation in its track, 1 for the first."""
     o = sequence.observations
     order = o.by_track()
     landmark = o.landmark[order]
@@ -85,7 +91,7 @@ def _age(sequence: Sequence) -> IntArray:
 
 
 def _region(sequence: Sequence, table: pd.DataFrame) -> IntArray:
-    """(n,) the ninth of the left image, row by row, between the outermost observations."""
+    """Ninth (n,) of the left image, row by row, within the bounding box of the observations."""
     pixel = sequence.observations.pixel[:, :2]
     if len(pixel) == 0:
         return np.empty(0, dtype=np.int64)

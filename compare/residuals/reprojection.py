@@ -1,4 +1,4 @@
-"""What an estimate says every pixel should have been, against what was measured."""
+"""Reprojection residuals: measured minus predicted stereo pixels, and their statistics."""
 
 from collections.abc import Iterable
 
@@ -9,19 +9,19 @@ from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import se3
 
-from ..statistics.descriptive import known, mean, summarised
+from ..statistics.descriptive import mean, summarized, without_nan
 
 ROWS = ("uL", "vL", "uR", "vR")
 NEAR = 3.0
-"""px: below it an observation counts as explained"""
+"""px; error below which an observation counts in `under_3px`"""
 
 
 def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
-    """One row for each observation of the sequence whose landmark and pose the estimate has, with the columns
+    """Residuals of every observation whose landmark and pose the estimate has, one row each, with the columns
 
     `observation` (its index in the sequence), `frame`, `landmark`, `uL vL uR vR` measured minus predicted in px,
-    `error` the Euclidean norm of these four, `depth` in m in front of the left camera (the prediction follows the
-    same formula behind it), and `used`, whether the estimator used it. Residuals of a landmark at infinity or
+    `error` the Euclidean norm of these four, `depth` in m along the left camera's axis (the projection formula is
+    also applied behind the camera), and `used`, whether the estimator used it. Residuals of a landmark at infinity or
     in the camera's plane are infinite, those of a landmark that is NaN are NaN.
     """
     o = sequence.observations
@@ -52,11 +52,13 @@ def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
 
 
 def reprojection_summary(table: pd.DataFrame) -> dict[str, float | int]:
-    """Median, mean, RMSE, 95 % and largest error (px), share under 3 px, points behind the camera, the `n` observations
-    that this is over, and how many are `missing` beside them (NaN)."""
-    error = known(table["error"])
+    """RMSE, mean, median, 95th percentile and maximum error (px), share under 3 px and number behind the camera.
+
+    Over `n` observations; `missing` counts those that are NaN.
+    """
+    error = without_nan(table["error"])
     return {
-        **summarised(table["error"]),
+        **summarized(table["error"]),
         "under_3px": float((error < NEAR).mean()) if len(error) else float("nan"),
         "behind_camera": int((table["depth"] <= 0).sum()),
         "n": len(error),
@@ -64,18 +66,17 @@ def reprojection_summary(table: pd.DataFrame) -> dict[str, float | int]:
 
 
 def component_summary(table: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """For each of uL, vL, uR, vR its bias (mean) and spread (standard deviation) over a reprojection table, px."""
+    """Bias (mean) and spread (standard deviation) of uL, vL, uR and vR over a reprojection table, px."""
     found = {}
     for row in ROWS:
-        r = known(table[row])
+        r = without_nan(table[row])
         spread = float("nan") if len(r) == 0 else float(np.std(r)) if np.isfinite(r).all() else float("inf")
         found[row] = {"bias": mean(r) if len(r) else float("nan"), "spread": spread}
     return found
 
 
 def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
-    """Median, mean, RMSE, share under 3 px, points behind the camera, number and how many are `missing` (NaN), for each
-    `frame` or `landmark`."""
+    """Statistics of `reprojection_summary` for each `frame` or `landmark`, 95th percentile and maximum aside."""
     near = (table["error"] < NEAR).where(table["error"].notna()).astype(np.float64)
     squared, behind = table["error"] ** 2, table["depth"] <= 0
     groups = table.assign(squared=squared, near=near, behind=behind).groupby(what)
@@ -92,8 +93,10 @@ def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
     )
 
 
-def commonly_used(estimates: Iterable[Estimate]) -> BoolArray | None:
-    """(n,) the observations that every estimate used. Those that use none by nature, and those that failed on the way,
-    do not count; None where that leaves none."""
+def used_by_all(estimates: Iterable[Estimate]) -> BoolArray | None:
+    """Observations (n,) that every estimate used; None without such an estimate.
+
+    Estimates that use no observation by design and those that failed are ignored.
+    """
     using = [e.used for e in estimates if e.used.any() and e.status is not Status.FAILED]
     return np.asarray(np.logical_and.reduce(using), dtype=np.bool_) if using else None

@@ -1,4 +1,4 @@
-"""Residuals in units of the noise they should have, beside the chi-square they should follow."""
+"""Whitened residuals, in sigmas of the noise model, and their chi-square test by track."""
 
 import numpy as np
 import pandas as pd
@@ -6,28 +6,28 @@ import pandas as pd
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray
 
-from ..statistics.chi_square import probability_beyond
+from ..statistics.chi_square import p_value
 
 WHITE_ROWS = ("uL", "uR", "v")
 
 
 def whitened_rows(problem: Problem, table: pd.DataFrame) -> FloatArray:
-    """(n, 3) residuals of (uL, uR, (vL + vR) / 2) of a reprojection table over the problem's sigma of each."""
+    """Residuals (n, 3) of (uL, uR, (vL + vR) / 2) of a reprojection table, in sigmas of the problem's noise."""
     return problem.measurement.whitened(table[["uL", "vL", "uR", "vR"]].to_numpy(dtype=np.float64))
 
 
-def judged(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a reprojection table that an estimator used; where it uses none by nature, those of the problem."""
+def evaluated_rows(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a reprojection table that the estimator used; those of the problem where it uses none by design."""
     used = table["used"].to_numpy(dtype=np.bool_)
     return table.loc[used if used.any() else problem.mask[table["observation"].to_numpy()]]
 
 
 def track_chi_square(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
-    """One row per landmark of a reprojection table: `n` sights, `squared` the sum of their squared whitened rows,
+    """Chi-square test of each landmark of a reprojection table, one row each, with the columns
 
-    `degrees` of freedom, 3 n - 3 (3 n where landmarks have a prior), and `probability` that chi-square is larger.
-    The landmark takes three away; what the poses take is neglected, which makes the residuals of a good estimate a
-    little too small. Uniform probabilities say that the noise is white, Gaussian and of the size assumed.
+    `n` observations, `squared` the sum of their squared whitened residuals, `degrees` of freedom 3 n - 3 (3 n where
+    landmarks have a prior), and the p-value `probability`. The degrees of freedom of the poses are neglected, so the
+    residuals of a good estimate are slightly small. Uniform p-values: white Gaussian noise of the assumed sigma.
     """
     table = table[table["error"].notna()]
     squared = np.sum(whitened_rows(problem, table) ** 2, axis=1)
@@ -35,17 +35,18 @@ def track_chi_square(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
     result = pd.DataFrame({"n": groups.size(), "squared": groups.sum()})
     result["degrees"] = 3 * result["n"] - (0 if problem.landmark_prior is not None else 3)
     result = result[result["degrees"] > 0].copy()
-    result["probability"] = probability_beyond(result["squared"].to_numpy(), result["degrees"].to_numpy(np.float64))
+    result["probability"] = p_value(result["squared"].to_numpy(), result["degrees"].to_numpy(np.float64))
     return result
 
 
 def whitened_summary(problem: Problem, table: pd.DataFrame) -> dict[str, float | int]:
-    """Over the tracks of `judged` rows: `ratio` of the squared residuals to their degrees of freedom (1 is expected),
+    """Chi-square statistics over the tracks of `evaluated_rows`:
 
-    `beyond_95`, the share of tracks beyond the 95 % quantile (0.05 is expected), `tracks`, and for each row its
-    `spread_*` in sigmas, sqrt(1 - m / n) being expected of m landmarks and n observations.
+    `ratio` of squared residuals to degrees of freedom (expected 1), `beyond_95`, the share of tracks beyond the 95 %
+    quantile (expected 0.05), the number of `tracks`, and the `spread_*` of each row in sigmas (expected
+    sqrt(1 - m / n) for m landmarks and n observations).
     """
-    rows = judged(problem, table)
+    rows = evaluated_rows(problem, table)
     rows = rows[rows["error"].notna()]
     tracks = track_chi_square(problem, rows)
     degrees = float(tracks["degrees"].sum())

@@ -1,4 +1,4 @@
-"""Statistics of a column of errors: what is infinite counts, what is missing (NaN) is counted apart."""
+"""Descriptive statistics of errors: infinite errors count, missing ones (NaN) are left out and counted."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,14 +8,14 @@ from fgbaseline.geometry import FloatArray
 QUANTITIES = ("rmse", "mean", "median", "p95", "max")
 
 
-def known(values: ArrayLike) -> FloatArray:
-    """(m,) the values (n,) that are numbers: finite ones and infinities, without NaN."""
+def without_nan(values: ArrayLike) -> FloatArray:
+    """Values (m,) of (n,) that are not NaN: finite and infinite ones."""
     v = np.asarray(values, dtype=np.float64)
     return np.asarray(v[~np.isnan(v)])
 
 
 def quantile(values: FloatArray, share: float) -> float:
-    """The quantile at `share` (0 to 1) of values (n >= 1,) without NaN, linear between ranks as numpy's.
+    """Quantile at `share` (0 to 1) of values (n >= 1,) without NaN, linear between ranks as numpy's.
 
     Infinite, not NaN, where it lies between a finite value and an infinite one.
     """
@@ -29,13 +29,12 @@ def quantile(values: FloatArray, share: float) -> float:
     return there if np.isinf(there) else here
 
 
-def summarised(errors: ArrayLike) -> dict[str, float]:
-    """RMSE, mean, median, 95th percentile and largest size of the errors (n,), and how many are `missing`.
+def summarized(errors: ArrayLike) -> dict[str, float]:
+    """RMSE, mean, median, 95th percentile and largest magnitude of errors (n,), and the number `missing` (NaN).
 
-    An infinite error makes RMSE, mean and largest infinite. NaN is no error: it is left out and counted in `missing`.
-    All but `missing` are NaN where no error is left.
+    An infinite error makes RMSE, mean and maximum infinite. All but `missing` are NaN where every error is NaN.
     """
-    e = known(errors)
+    e = without_nan(errors)
     missing = int(np.size(np.asarray(errors)) - len(e))
     if len(e) == 0:
         return {**dict.fromkeys(QUANTITIES, float("nan")), "missing": missing}
@@ -52,6 +51,11 @@ def summarised(errors: ArrayLike) -> dict[str, float]:
 
 
 def mean(values: FloatArray) -> float:
-    """The mean of values (n >= 1,) without NaN; NaN where infinities of both signs leave it open."""
+    """Mean of values (n >= 1,) without NaN; NaN for infinities of both signs."""
     with np.errstate(invalid="ignore"):
         return float(np.mean(values))
+
+
+def rms_norm(vectors: FloatArray) -> float:
+    """Root mean square norm of vectors (n, d)."""
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))

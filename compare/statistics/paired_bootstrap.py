@@ -1,4 +1,4 @@
-"""Which of several estimates is nearer, and whether the recording settles it: all drawn with the same blocks."""
+"""Paired block bootstrap: differences of RMSE between estimates over the same moments, and their ranking."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,26 +8,32 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .block_bootstrap import CONFIDENCE, FEWEST_BLOCKS, MOST_BLOCKS, REPETITIONS, tails
-from .block_draws import draw_blocks
-from .block_length import block_length
+from .block_bootstrap import (
+    CONFIDENCE,
+    MAX_BLOCKS,
+    MIN_BLOCKS,
+    REPETITIONS,
+    block_length,
+    draw_blocks,
+    percentile_interval,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class RmseDifference:
-    """The RMSE of one estimate's errors less that of another's at the same moments."""
+    """Difference of two RMSEs over the same moments, with its interval."""
 
     value: float
     low: float
     high: float
     block: int
-    """moments in a row that are kept together"""
+    """block length, in moments"""
     reliable: bool
-    """whether at least `FEWEST_BLOCKS` fit, and the correlation of the difference ends within the series"""
+    """whether at least `MIN_BLOCKS` blocks fit and the correlation of the difference ends within the series"""
 
     @property
     def settled(self) -> bool:
-        """Whether the interval has a sign, and it is that of the difference."""
+        """Whether the interval excludes zero on the side of the difference."""
         return (self.low > 0.0 and self.value > 0.0) or (self.high < 0.0 and self.value < 0.0)
 
 
@@ -39,13 +45,12 @@ def rmse_difference(
     repetitions: int = REPETITIONS,
     seed: int = 0,
 ) -> RmseDifference:
-    """RMSE of `errors` (n,) less that of `others` (n,), with the interval of a paired moving-block bootstrap.
+    """RMSE of `errors` (n,) minus that of `others` (n,), with the interval of a paired moving-block bootstrap.
 
-    Both have to be of the same moments, in order; moments where either is NaN are left out. Infinite errors count: the
-    difference is then infinite, or NaN and unsettled where both have some. Each repetition
-    draws the same blocks of moments for both, so that what makes a stretch hard for both does not blur which is better:
-    intervals of the two RMSEs can overlap and the order be clear all the same. The block length is Politis and White's
-    for the differences of the squared errors. Raises InputError where they are not of one length.
+    Both are of the same moments, in order; moments where either is NaN are left out. Infinite errors make the
+    difference infinite, or NaN and unsettled where both have some. Each repetition draws the same blocks for both,
+    which cancels variation that they share: the order can be settled although the intervals of the two RMSEs overlap.
+    The block length is Politis and White's for the differences of squared errors. InputError for unequal lengths.
     """
     pair = [np.asarray(e, dtype=np.float64) for e in (errors, others)]
     if pair[0].shape != pair[1].shape or pair[0].ndim != 1:
@@ -61,31 +66,30 @@ def rmse_difference(
         value = float("nan") if infinite.any(axis=0).all() else float(first - second)
         return RmseDifference(value, np.nan, np.nan, 1, False)
     found = block_length(squares[:, 0] - squares[:, 1])
-    block = max(found.length, -(-n // MOST_BLOCKS))
+    block = max(found.length, -(-n // MAX_BLOCKS))
     drawn = np.sqrt(draw_blocks(n, block, repetitions, seed).sums(squares) / n)
-    low, high = tails(drawn[:, :1] - drawn[:, 1:], confidence)[:, 0]
+    low, high = percentile_interval(drawn[:, :1] - drawn[:, 1:], confidence)[:, 0]
     first, second = np.sqrt(squares.mean(axis=0))
-    reliable = n / block >= FEWEST_BLOCKS and found.correlation_ends
+    reliable = n / block >= MIN_BLOCKS and found.correlation_ends
     return RmseDifference(float(first - second), float(low), float(high), block, reliable)
 
 
 @dataclass(frozen=True, slots=True)
 class PairedRanking:
-    """Several estimates over the same moments, the smallest RMSE first."""
+    """Estimates ranked by RMSE over the same moments, smallest first."""
 
     rmse: Mapping[str, float]
-    """in rising order"""
+    """RMSE by name, in rising order"""
     behind: Mapping[str, RmseDifference]
-    """of all but the first: its RMSE less that of the first; value >= 0 where both are finite"""
+    """RMSE of each but the first minus that of the first; value >= 0 where both are finite"""
     moments: int
-    """at which all of them have an error"""
+    """number of moments at which all of them have an error"""
 
 
 def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedRanking:
-    """Ranks errors (n,) at the same n moments by their RMSE over those at which none of them is NaN.
+    """Rank errors (n,) at the same n moments by their RMSE over the moments at which none of them is NaN.
 
-    `behind` says for each whether it is settled that the first one is smaller: see `rmse_difference`. Raises InputError
-    where they are not of one length.
+    `behind` holds `rmse_difference` of each from the first. Raises InputError for unequal lengths.
     """
     columns = {name: np.asarray(e, dtype=np.float64) for name, e in errors.items()}
     if len({column.shape for column in columns.values()}) > 1:

@@ -1,4 +1,4 @@
-"""How one path is laid over another, and what it leaves open."""
+"""Alignment of an estimate to a reference in closed form: first pose, yaw, SE(3), Sim(3) (Umeyama, 1991)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,23 +10,23 @@ from numpy.typing import ArrayLike
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
-from .wahba import best_rotation, best_turn
+from .wahba import solve_wahba, solve_wahba_about_axis
 
 
 class Align(StrEnum):
-    """What an estimate may be moved by before it is compared."""
+    """Group of transformations by which an estimate is aligned."""
 
     NONE = "none"
     FIRST_POSE = "first-pose"
-    """its first pose is put on the reference's"""
+    """the transformation that maps its first pose to the reference's"""
     YAW = "yaw"
-    """rotation about up and position, all that a visual-inertial estimator cannot know"""
+    """rotation about up and translation, the unobservable directions of visual-inertial estimation"""
     SE3 = "se3"
     SIM3 = "sim3"
-    """scale too, for one camera alone"""
+    """scale as well, for a monocular camera"""
 
 
-_SAID = {
+_CAPTIONS = {
     Align.NONE: "not aligned",
     Align.FIRST_POSE: "the first pose put on the reference's",
     Align.YAW: "yaw and position aligned",
@@ -40,7 +40,7 @@ YAW = "yaw"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Alignment:
-    """p -> scale * rotation @ p + translation, and what decided it."""
+    """Transformation p -> scale * rotation @ p + translation, and the pairs that determine it."""
 
     kind: Align = Align.NONE
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
@@ -49,11 +49,11 @@ class Alignment:
     """(3,) m"""
     scale: float = 1.0
     n: int = 0
-    """how many pairs of poses decided it"""
+    """number of pose pairs used"""
     of: int = 0
-    """out of how many"""
+    """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """what the positions of the paths left open: there the orientations decided"""
+    """directions that the positions leave undetermined; the orientations determine them"""
 
     @property
     def matrix(self) -> FloatArray:
@@ -63,7 +63,7 @@ class Alignment:
         return T
 
     def apply(self, poses: FloatArray) -> FloatArray:
-        """New poses (n, 4, 4): positions moved, scaled and turned, orientations turned."""
+        """Transformed copies of poses (n, 4, 4): positions scaled, rotated and translated, orientations rotated."""
         if self.kind is Align.NONE:
             return poses.copy()
         moved = np.empty_like(poses)
@@ -74,8 +74,8 @@ class Alignment:
 
     @property
     def caption(self) -> str:
-        """What was done, for under a table: 'SE(3)-aligned over all 120 poses'."""
-        said = _SAID[self.kind]
+        """Alignment for a table's caption: 'SE(3)-aligned over all 120 poses'."""
+        said = _CAPTIONS[self.kind]
         if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
             said += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
         if self.kind is Align.SIM3:
@@ -93,12 +93,12 @@ def align(
     first: int | None = None,
     up: ArrayLike = (0.0, 0.0, 1.0),
 ) -> Alignment:
-    """The motion of this kind that brings paired positions of poses (n, 4, 4) closest to the reference's (n, 4, 4).
+    """Transformation of this kind that aligns paired positions of poses (n, 4, 4) to the reference's (n, 4, 4).
 
     Least squares in closed form (Umeyama, 1991; for yaw Zhang and Scaramuzza, 2018), never a reflection, over the
     `first` pairs or all. Where the positions leave directions open (a straight line, standing still, a mirror image),
-    the best of the equally good motions is that which turns the orientations nearest to the reference's: so it too is
-    the same in every frame. `up` (3,) is up in the reference's world, for yaw. Raises InputError for a kind that does
+    the equally good transformation that brings the orientations nearest to the reference's is taken, which is
+    independent of the frame. `up` (3,) is up in the reference's world, for yaw. Raises InputError for a kind that does
     not exist, no pairs, or a `first` that is not between 1 and n.
     """
     try:
@@ -116,37 +116,42 @@ def align(
     used = 1 if kind is Align.FIRST_POSE else (first or n)
     there, here = estimate[:used], reference[:used]
 
-    def turns() -> FloatArray:
+    def orientation_moment() -> FloatArray:
         return _side_by_side(here) @ _side_by_side(there).T
 
     if kind is Align.FIRST_POSE:
-        R = turns()
+        R = orientation_moment()
         return Alignment(kind, R, here[0, :3, 3] - R @ there[0, :3, 3], 1.0, 1, n)
-    return _fitted(there[:, :3, 3], here[:, :3, 3], turns, kind, np.asarray(up, dtype=np.float64), n)
+    return _fitted(there[:, :3, 3], here[:, :3, 3], orientation_moment, kind, np.asarray(up, dtype=np.float64), n)
 
 
 def _side_by_side(poses: FloatArray) -> FloatArray:
-    """(3, 3n) the rotations of poses (n, 4, 4): of two of them, A @ B.T is the sum of R_a R_b^T."""
+    """Rotations of poses (n, 4, 4) side by side (3, 3n): for two of these, A @ B.T is the sum of R_a R_b^T."""
     return poses[:, :3, :3].transpose(1, 0, 2).reshape(3, -1)
 
 
 def _fitted(
-    there: FloatArray, here: FloatArray, turns: Callable[[], FloatArray], kind: Align, up: FloatArray, n: int
+    there: FloatArray,
+    here: FloatArray,
+    orientation_moment: Callable[[], FloatArray],
+    kind: Align,
+    up: FloatArray,
+    n: int,
 ) -> Alignment:
     there, here = np.ascontiguousarray(there), np.ascontiguousarray(here)
     centre, goal = there.mean(axis=0), here.mean(axis=0)
     x, y = there - centre, here - goal
     M = y.T @ x
-    # What rounding leaves of a square that should be zero: positions far from the origin keep fewer digits.
+    # Rounding of a square that should be zero: positions far from the origin keep fewer digits.
     rounding = 8 * np.finfo(np.float64).eps * (np.abs(there).max() + np.abs(here).max()) * len(x)
     floor = rounding * max(float(np.abs(x).max()), float(np.abs(y).max())) + np.finfo(np.float64).tiny
     free: tuple[str, ...]
     if kind is Align.YAW:
-        R, yaw_is_free = best_turn(up / np.linalg.norm(up), M, turns, floor)
+        R, yaw_is_free = solve_wahba_about_axis(up / np.linalg.norm(up), M, orientation_moment, floor)
         free = (YAW,) if yaw_is_free else ()
     else:
-        R, axis = best_rotation(M, turns, floor)
-        free = _said_free(axis)
+        R, axis = solve_wahba(M, orientation_moment, floor)
+        free = _free_rotation(axis)
     scale, along, spread = 1.0, float(np.sum(R * M)), float(np.sum(x**2))
     if kind is Align.SIM3 and min(along, spread) > floor:
         scale = along / spread
@@ -155,7 +160,7 @@ def _fitted(
     return Alignment(kind, R, goal - scale * R @ centre, scale, len(x), n, free)
 
 
-def _said_free(axis: FloatArray | None) -> tuple[str, ...]:
+def _free_rotation(axis: FloatArray | None) -> tuple[str, ...]:
     if axis is None:
         return ()
     if not axis.any():
@@ -164,10 +169,10 @@ def _said_free(axis: FloatArray | None) -> tuple[str, ...]:
 
 
 def align_se3(positions: FloatArray, reference: FloatArray) -> FloatArray:
-    """`reference_T_estimate` (4, 4) that minimises the squared distances of paired positions (n, 3), m.
+    """SE(3) alignment `reference_T_estimate` (4, 4) of paired positions (n, 3), m, in the least-squares sense.
 
-    As `align` does for SE(3), but without orientations: where the positions leave directions open it is the smallest
-    of the equally good rotations. Raises FgbaselineError for no pairs or NaN.
+    As `align`, but without orientations: undetermined directions take the smallest of the equally good rotations.
+    Raises FgbaselineError for no pairs or NaN.
     """
     if len(positions) == 0 or positions.shape != reference.shape:
         raise FgbaselineError(f"alignment needs paired positions, got {positions.shape} and {reference.shape}")

@@ -1,5 +1,6 @@
-"""Which pose of an estimate belongs to which of the reference: by time, each at most once, and what is left over."""
+"""Association of trajectories by time stamp: one-to-one pairs, interpolation, and stamps common to several."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -8,17 +9,16 @@ import numpy as np
 from fgbaseline.data import Trajectory
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.plural import plural
-from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .alignment import Align, Alignment, align
-from .interpolation import interpolated
 
 TOLERANCE = 0.01
 """s; at 15 m/s a car has moved by 15 cm"""
 
 
 class Association(StrEnum):
-    """How poses are paired."""
+    """Rule by which poses are paired."""
 
     NEAREST = "nearest"
     """one to one: the closest two stamps first, never crossing in time"""
@@ -27,10 +27,10 @@ class Association(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Matched:
-    """n >= 1 poses of a reference and n of an estimate for the same moments, and how they came to be paired.
+class MatchedTrajectories:
+    """Paired poses of a reference and an estimate, n >= 1 of each, with the record of association and alignment.
 
-    What every metric takes. `aligned` gives the same with the estimate laid over the reference.
+    Input of every trajectory metric. `aligned` returns the same pairs with the estimate aligned to the reference.
     """
 
     reference: Trajectory
@@ -43,19 +43,19 @@ class Matched:
     offset: float
     """s, added to the estimate's stamps before they were compared"""
     left_out_reference: int
-    """how many of the reference's poses have no partner"""
+    """number of reference poses without a partner"""
     left_out_estimate: int
     interpolated: str = ""
     """the name of the trajectory that was interpolated, if one was"""
     alignment: Alignment = field(default_factory=Alignment)
-    """what was done to the estimate"""
+    """alignment applied to the estimate"""
 
     def __len__(self) -> int:
         return len(self.reference)
 
     @property
     def caption(self) -> str:
-        """What was paired and how it was aligned, in a sentence for under a table."""
+        """Association and alignment in one sentence, for a table's caption."""
         how = (
             "within" if self.association is Association.NEAREST else f"{self.interpolated} interpolated, stamps within"
         )
@@ -66,8 +66,8 @@ class Matched:
 
     def aligned(
         self, kind: Align | str, *, first: int | None = None, up: FloatArray | tuple[float, ...] = (0.0, 0.0, 1.0)
-    ) -> "Matched":
-        """The same pairs with the estimate laid over the reference: see `align`. Anew, not on top of what was done."""
+    ) -> "MatchedTrajectories":
+        """Pairs with the estimate aligned to the reference (see `align`); InputError where they are aligned already."""
         if self.alignment.kind is not Align.NONE:
             raise InputError(f"{self.estimate.name}: it is aligned already ({self.alignment.caption}); align it once")
         done = align(self.estimate.world_T_body, self.reference.world_T_body, kind, first=first, up=up)
@@ -82,8 +82,8 @@ def associate(
     how: Association | str = Association.NEAREST,
     tolerance: float | None = None,
     offset: float = 0.0,
-) -> Matched:
-    """Pairs the poses of two trajectories by time, not aligned.
+) -> MatchedTrajectories:
+    """Pair the poses of two trajectories by time, without alignment.
 
     `offset` (s) is added to the estimate's stamps. `tolerance` (s) is the largest difference to the nearest stamp:
     by default TOLERANCE for `nearest`, the median interval of the interpolated trajectory for `interpolated`. Of two
@@ -104,14 +104,14 @@ def associate(
     i, j = nearest_pairs(reference.t, moved.t, tolerance)
     _require_some(len(i), reference, moved, tolerance)
     left = (len(reference) - len(i), len(moved) - len(j))
-    return Matched(reference.at(i), moved.at(j), how, tolerance, offset, *left)
+    return MatchedTrajectories(reference.at(i), moved.at(j), how, tolerance, offset, *left)
 
 
 def nearest_pairs(a: FloatArray, b: FloatArray, tolerance: float) -> tuple[IntArray, IntArray]:
-    """Indices (n,) into rising stamps a and b, both rising: the closest two first, each once, none crossing in time.
+    """Pair rising stamps a and b, s: indices (n,) into each, closest first, one to one, never crossing in time.
 
-    Each round pairs those that are nearest to each other among what is left between the pairs so far; of two equally
-    near ones that is the later for `a` and the earlier for `b`, so that a shift of half an interval pairs neighbours.
+    Each round pairs mutual nearest neighbors among the stamps left between the pairs so far. Of two equally near
+    ones `a` takes the later and `b` the earlier, so that a shift of half an interval pairs neighbors.
     """
     left_a, left_b = np.arange(len(a)), np.arange(len(b))
     paired_a, paired_b = np.empty(0, np.int64), np.empty(0, np.int64)
@@ -130,8 +130,7 @@ def nearest_pairs(a: FloatArray, b: FloatArray, tolerance: float) -> tuple[IntAr
 
 
 def _nearest(stamps: FloatArray, slot: IntArray, others: FloatArray, other_slot: IntArray, later: bool) -> IntArray:
-    """For each stamp the index of the nearest other of the same slot, -1 where that is empty; of two equally near
-    ones the later or the earlier."""
+    """Index of the nearest other stamp in the same slot, -1 where that is empty; ties go to the later or earlier."""
     if len(others) == 0:
         return np.full(len(stamps), -1)
     first, end = np.searchsorted(other_slot, slot, "left"), np.searchsorted(other_slot, slot, "right")
@@ -142,7 +141,9 @@ def _nearest(stamps: FloatArray, slot: IntArray, others: FloatArray, other_slot:
     return np.asarray(np.where(first < end, nearer, -1), dtype=np.int64)
 
 
-def _interpolated(reference: Trajectory, estimate: Trajectory, tolerance: float | None, offset: float) -> Matched:
+def _interpolated(
+    reference: Trajectory, estimate: Trajectory, tolerance: float | None, offset: float
+) -> MatchedTrajectories:
     coarse, dense = (estimate, reference) if _interval(reference) <= _interval(estimate) else (reference, estimate)
     if len(dense) < 2:
         raise InputError(f"{dense.source or dense.name}: it has one pose only, which cannot be interpolated")
@@ -156,7 +157,9 @@ def _interpolated(reference: Trajectory, estimate: Trajectory, tolerance: float 
     first, second = (drawn, kept) if dense is reference else (kept, drawn)
     unused = int(((dense.t < kept.t[0]) | (dense.t > kept.t[-1])).sum())
     left = (unused, len(coarse) - len(kept)) if dense is reference else (len(coarse) - len(kept), unused)
-    return Matched(first, second, Association.INTERPOLATED, tolerance, offset, *left, interpolated=dense.name)
+    return MatchedTrajectories(
+        first, second, Association.INTERPOLATED, tolerance, offset, *left, interpolated=dense.name
+    )
 
 
 def _interval(path: Trajectory) -> float:
@@ -176,3 +179,53 @@ def _require_some(n: int, reference: Trajectory, estimate: Trajectory, tolerance
             f"no pose of {estimate.source or estimate.name} is within {tolerance:.3g} s of one of "
             f"{reference.source or reference.name}: {' and '.join(spans)}; give a larger tolerance or an offset in time"
         )
+
+
+def interpolated(path: Trajectory, t: FloatArray) -> Trajectory:
+    """Trajectory at stamps t (n,), s, within its own: positions linear, rotations by SLERP (shortest way).
+
+    At a stamp of the path the pose is reproduced exactly. Raises ValueError for stamps outside of the path.
+    """
+    if len(t) and (t[0] < path.t[0] or t[-1] > path.t[-1]):
+        raise ValueError("a path cannot be interpolated beyond its ends")
+    after = np.clip(np.searchsorted(path.t, t, side="left"), 1, len(path) - 1)
+    before = after - 1
+    share = (t - path.t[before]) / (path.t[after] - path.t[before])
+    poses = np.array(path.world_T_body[np.where(share == 1.0, after, before)])
+    between = np.flatnonzero((share > 0.0) & (share < 1.0))
+    a, b, s = before[between], after[between], share[between, None]
+    turn = so3.log_so3(np.swapaxes(path.rotation[a], 1, 2) @ path.rotation[b])
+    poses[between, :3, :3] = path.rotation[a] @ so3.exp_so3(s * turn)
+    poses[between, :3, 3] = path.position[a] + s * (path.position[b] - path.position[a])
+    return replace(path, t=t, world_T_body=poses, line=None)
+
+
+RANKABLE_SHARE = 0.1
+"""of the longest estimate's stamps: an estimate with fewer is not ranked, since it would reduce the common stamps of
+the others to its own"""
+
+
+def rankable(counts: Mapping[str, int]) -> list[str]:
+    """Names of the estimates with enough stamps to be ranked together, from the number of stamps of each."""
+    most = max(counts.values(), default=0)
+    return [name for name, n in counts.items() if n and n >= RANKABLE_SHARE * most]
+
+
+def common_stamps(stamps: Mapping[str, FloatArray], tolerance: float) -> dict[str, IntArray]:
+    """Indices (m,) by name into rising stamps (n,), s, that all estimates share, for rankings over the same moments.
+
+    Equal stamps; where fewer than two are equal, stamps within `tolerance` (s) of the shortest estimate's.
+    """
+    if not stamps:
+        return {}
+    exact = _common(stamps, 0.0)
+    return exact if len(next(iter(exact.values()))) > 1 else _common(stamps, tolerance)
+
+
+def _common(stamps: Mapping[str, FloatArray], tolerance: float) -> dict[str, IntArray]:
+    base = min(stamps.values(), key=len)
+    pairs = {name: nearest_pairs(base, t, tolerance) for name, t in stamps.items()}
+    kept = np.arange(len(base))
+    for i, _ in pairs.values():
+        kept = np.intersect1d(kept, i, assume_unique=True)
+    return {name: np.asarray(j[np.searchsorted(i, kept)], dtype=np.int64) for name, (i, j) in pairs.items()}

@@ -1,4 +1,4 @@
-"""How much of a time a set of poses, or of stretches between poses, covers."""
+"""Coverage: share of a time span covered by poses or intervals, and the smallest sample for a verdict."""
 
 from collections.abc import Mapping
 
@@ -6,29 +6,29 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-LONG_GAP = 3.0
-"""median intervals of a trajectory: two poses that are further apart have a gap between them"""
+GAP = 3.0
+"""median intervals between stamps: a longer interval is a gap"""
 
-SMALLEST_SAMPLE = 30
-"""poses or other items that a figure must be over to be judged"""
-SMALLEST_COVERAGE = 0.5
-"""share of the time that they must cover"""
-FEWEST_STRETCHES = 3
-"""of errors of motions over a stretch of the path: of fewer, no statistic says more than a single one"""
+MIN_SAMPLE_SIZE = 30
+"""poses or other items below which a figure is not judged"""
+MIN_COVERAGE = 0.5
+"""share of the time span below which a figure is not judged"""
+MIN_STRETCHES = 3
+"""disjoint stretches of the path below which relative errors are not judged"""
 
 
-def covered(t: FloatArray, whole: FloatArray) -> float:
-    """The share of the time of rising stamps `whole` (n,) in which there are rising stamps t (m,).
+def time_coverage(t: FloatArray, whole: FloatArray) -> float:
+    """Share of the time of rising stamps `whole` (n,), s, that rising stamps t (m,), s, cover.
 
-    The time between two stamps counts unless they are more than LONG_GAP of their median interval apart: gaps of
-    `whole` are not asked for, and a slow t under a fast `whole` covers all of it.
+    The time between two stamps counts unless it exceeds GAP median intervals. Gaps of `whole` are excluded, and a slow
+    t under a fast `whole` covers all of it.
     """
     time = _without_gaps(whole)
     return min(1.0, _without_gaps(t) / time) if time else 1.0
 
 
-def spanned(start: FloatArray, end: FloatArray, whole: FloatArray) -> float:
-    """The share of the time of rising stamps `whole` (n,) that stretches from `start` to `end` (m,) cover together."""
+def interval_coverage(start: FloatArray, end: FloatArray, whole: FloatArray) -> float:
+    """Share of the time of rising stamps `whole` (n,), s, in the union of intervals `start` to `end` (m,), s."""
     time = _without_gaps(whole)
     if not time:
         return 1.0
@@ -38,15 +38,15 @@ def spanned(start: FloatArray, end: FloatArray, whole: FloatArray) -> float:
     return min(1.0, float(np.maximum(end - np.maximum(start, before), 0.0).sum()) / time)
 
 
-def too_small(sample: Mapping[str, float], smallest: int, coverage: float) -> bool:
-    """Whether a sample has `n` below the smallest, or a `coverage`, where it has any, below that asked for, or
+def is_insufficient(sample: Mapping[str, float], smallest: int, coverage: float) -> bool:
+    """Whether a sample has `n` below `smallest`, or (where given) a `coverage` below the required one or
 
-    `stretches`, where it has any, below FEWEST_STRETCHES.
+    `stretches` below MIN_STRETCHES.
     """
-    few = sample.get("stretches", FEWEST_STRETCHES) < min(FEWEST_STRETCHES, smallest)
+    few = sample.get("stretches", MIN_STRETCHES) < min(MIN_STRETCHES, smallest)
     return few or sample["n"] < smallest or sample.get("coverage", 1.0) < coverage
 
 
 def _without_gaps(t: FloatArray) -> float:
     gaps = np.diff(t)
-    return float(gaps[gaps <= LONG_GAP * np.median(gaps)].sum()) if len(gaps) else 0.0
+    return float(gaps[gaps <= GAP * np.median(gaps)].sum()) if len(gaps) else 0.0

@@ -1,4 +1,4 @@
-"""Which two poses of a path are one delta apart: by frames, seconds, metres travelled or degrees turned."""
+"""Pairs of poses one delta apart: frames, seconds, meters of path, or degrees of rotation (as evo and RPE use them)."""
 
 from enum import StrEnum
 
@@ -7,18 +7,18 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from .path import distance_travelled
+from .path import distance_traveled
 
 ROUNDING = 1e-9
-"""of a delta: so much less than it still counts, so that rounding does not decide where steps add up to it exactly"""
+"""of a delta: slack for steps that add up to it exactly but for rounding"""
 TOLERANCE = 0.1
-"""of a delta: by how much all pairs may miss it"""
+"""of a delta: largest deviation for all pairs"""
 AT_ONCE = 4_000_000
-"""pairs looked at together, to bound the memory"""
+"""pairs per batch, to bound the memory"""
 
 
 class Unit(StrEnum):
-    """What a delta is measured in."""
+    """Unit of a delta."""
 
     FRAMES = "frames"
     SECONDS = "s"
@@ -35,10 +35,10 @@ def pose_pairs(
     all_pairs: bool = False,
     tolerance: float = TOLERANCE,
 ) -> IntArray:
-    """(m, 2) indices of poses (n, 4, 4) at stamps t (n,), s, that are one delta apart.
+    """Index pairs (m, 2) of poses (n, 4, 4) at stamps t (n,), s, that are one delta apart.
 
-    Consecutive: each pair begins where the one before ended, and ends with the first pose that is a delta away or more.
-    All: for each pose the later one whose distance in time or along the path is nearest to the delta, if within
+    Consecutive: each pair begins where the previous one ends, and ends at the first pose at least a delta away.
+    All pairs: for each pose the later one whose distance in time or along the path is nearest to the delta, if within
     `tolerance` (a share of it; frames are counted exactly); for degrees every later pose whose orientation is a delta
     away within `tolerance`, the direct angle and not the accumulated one. Raises InputError where there is no pair.
     """
@@ -62,7 +62,7 @@ def pose_pairs(
 
 
 def chained_pairs(along: FloatArray, delta: float) -> IntArray:
-    """(m, 2) indices into rising `along` (n,): from each end to the first that is a delta further or more."""
+    """Consecutive index pairs (m, 2) into rising `along` (n,): from each end to the first entry at least a delta on."""
     following = np.searchsorted(along, along + delta * (1.0 - ROUNDING))
     following = np.maximum(following, np.arange(len(along)) + 1).tolist()  # a delta may be below rounding
     chain = [0]
@@ -72,7 +72,7 @@ def chained_pairs(along: FloatArray, delta: float) -> IntArray:
 
 
 def nearest_delta_pairs(along: FloatArray, delta: float, tolerance: float) -> IntArray:
-    """(m, 2) indices into rising `along` (n,): for each the (first) later one nearest to a delta away."""
+    """Index pairs (m, 2) into rising `along` (n,): from each entry to the (first) later one nearest to a delta on."""
     start = np.arange(len(along) - 1)
     after = np.clip(np.searchsorted(along, along[:-1] + delta * (1.0 - ROUNDING)), start + 1, len(along) - 1)
     before = np.maximum(np.searchsorted(along, along[np.maximum(after - 1, start + 1)]), start + 1)
@@ -83,9 +83,9 @@ def nearest_delta_pairs(along: FloatArray, delta: float, tolerance: float) -> In
 
 
 def turned_pairs(rotations: FloatArray, angle: float, tolerance: float) -> IntArray:
-    """(m, 2) indices of all rotations (n, 3, 3) whose relative angle is `angle` within `tolerance`, rad.
+    """Index pairs (m, 2) of all rotations (n, 3, 3) whose relative angle is `angle` within `tolerance`, rad.
 
-    Every pair is looked at, by blocks: n^2 / 2 of them, each one a product of nine numbers.
+    Cost: n^2 / 2 pairs in batches, nine multiplications each.
     """
     n, flat = len(rotations), rotations.reshape(-1, 9)
     most, least = (np.cos(np.clip(edge, 0.0, np.pi)) for edge in (angle - tolerance, angle + tolerance))
@@ -108,6 +108,6 @@ def _coordinate(poses: FloatArray, t: FloatArray, unit: Unit) -> FloatArray:
     if unit is Unit.SECONDS:
         return np.asarray(t - t[0])
     if unit is Unit.METRES:
-        return distance_travelled(poses[:, :3, 3])
+        return distance_traveled(poses[:, :3, 3])
     turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
     return np.asarray(np.rad2deg(np.concatenate([[0.0], np.cumsum(so3.rotation_angle(turns))])))

@@ -1,4 +1,4 @@
-"""How much error each metre and each second adds."""
+"""Drift rates: error of the motion per meter of path and per second."""
 
 import numpy as np
 import pandas as pd
@@ -7,20 +7,19 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..statistics.block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
-from .association import Matched
-from .ate_rpe import Difference, motion_difference
+from .association import MatchedTrajectories
+from .ate_rpe import PoseRelation, relative_pose_error, require_stamps
 from .delta_pairs import nearest_delta_pairs
-from .path import distance_travelled
-from .relative import require_stamps
+from .path import distance_traveled
 
 SHARE = 0.1
-"""of the path and of its duration: over so much the drift is measured by default, or one step where that is more"""
+"""of the path and of its duration: the default interval of drift, or one step where that is longer"""
 TOLERANCE = 0.5
-"""of the length wanted: rates are over what a stretch really measures, so a coarse path may miss it by so much"""
+"""of the requested interval: largest deviation of a stretch, since rates divide by the stretch's own length"""
 
 
 def drift(
-    matched: Matched,
+    matched: MatchedTrajectories,
     metres: float | None = None,
     seconds: float | None = None,
     *,
@@ -28,17 +27,17 @@ def drift(
     repetitions: int = REPETITIONS,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """Mean error of the motion over `metres` of the reference's path, per metre, and over `seconds`, per second.
+    """Mean error of the motion over `metres` of the reference's path, per meter, and over `seconds`, per second.
 
-    One row per rate, indexed by `quantity`: `value` with `low` and `high` of a block bootstrap, `unit`, and `over` and
-    `n` that say over what and from how many overlapping stretches, each from a pose to the later one that is nearest to
-    so far away. Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
-    stamps), each divided by what the stretch really measures; `end translation` (%) and `end rotation` (deg/m): the
+    One row per rate, indexed by `quantity`: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over`
+    and the number `n` of overlapping stretches, each from a pose to the later one nearest to that interval.
+    Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
+    stamps), each divided by the stretch's own length; `end translation` (%) and `end rotation` (deg/m): the
     error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
-    does not move or no stretch is as long as asked for.
+    does not move or no stretch has the requested length.
     """
     reference = matched.reference
-    travelled = distance_travelled(reference.position)
+    travelled = distance_traveled(reference.position)
     path = float(travelled[-1])
     if len(reference) < 2 or path == 0.0:
         raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per metre")
@@ -46,8 +45,8 @@ def drift(
     pairs = _stretches(travelled, metres, "m")
     over = travelled[pairs[:, 1]] - travelled[pairs[:, 0]]
     rates = [
-        ("translation", "%", 100.0, Difference.TRANSLATION, pairs, over, f"{metres:.4g} m"),
-        ("rotation", "deg/m", 1.0, Difference.ROTATION_DEG, pairs, over, f"{metres:.4g} m"),
+        ("translation", "%", 100.0, PoseRelation.TRANSLATION, pairs, over, f"{metres:.4g} m"),
+        ("rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{metres:.4g} m"),
     ]
     if seconds is not None:
         require_stamps(matched)
@@ -57,18 +56,18 @@ def drift(
         pairs = _stretches(t, seconds, "s")
         over = t[pairs[:, 1]] - t[pairs[:, 0]]
         rates += [
-            ("translation per second", "m/s", 1.0, Difference.TRANSLATION, pairs, over, f"{seconds:.4g} s"),
-            ("rotation per second", "deg/s", 1.0, Difference.ROTATION_DEG, pairs, over, f"{seconds:.4g} s"),
+            ("translation per second", "m/s", 1.0, PoseRelation.TRANSLATION, pairs, over, f"{seconds:.4g} s"),
+            ("rotation per second", "deg/s", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{seconds:.4g} s"),
         ]
     whole, path_length = np.array([[0, len(reference) - 1]]), np.array([path])
     rates += [
-        ("end translation", "%", 100.0, Difference.TRANSLATION, whole, path_length, f"{path:.4g} m"),
-        ("end rotation", "deg/m", 1.0, Difference.ROTATION_DEG, whole, path_length, f"{path:.4g} m"),
+        ("end translation", "%", 100.0, PoseRelation.TRANSLATION, whole, path_length, f"{path:.4g} m"),
+        ("end rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, whole, path_length, f"{path:.4g} m"),
     ]
     poses, truth = matched.estimate.world_T_body, reference.world_T_body
     rows = []
     for quantity, unit, factor, what, stretch, length, said in rates:
-        errors = factor * motion_difference(poses, truth, stretch, what) / length
+        errors = factor * relative_pose_error(poses, truth, stretch, what) / length
         mean = error_statistics(errors, confidence=confidence, repetitions=repetitions, seed=seed).loc["mean"]
         rows.append((quantity, *mean, unit, said, len(stretch)))
     columns = ["quantity", "value", "low", "high", "unit", "over", "n"]

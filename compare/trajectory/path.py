@@ -1,25 +1,24 @@
-"""How far a path went, and which way it was heading, seen from above."""
+"""Length of a path, and its along-track frame."""
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
 STANDING = 0.1
-"""of the path's brisk steps (their 90th percentile): below it noise decides where a step points, and the path keeps the
-direction it had"""
+"""of the 90th percentile of step lengths: below it the direction of a step is noise, and the last direction is kept"""
 
 
-def distance_travelled(positions: FloatArray) -> FloatArray:
-    """(T,) length of the path through positions (T, 3), m; steps to or from an unknown position count as zero."""
+def distance_traveled(positions: FloatArray) -> FloatArray:
+    """Cumulative length (T,) of the path through positions (T, 3), m; steps to or from NaN positions count as zero."""
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
 
 
-def travel_frame(positions: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Unit vectors forward (T, 3) and left (T, 3) of a path (T, 3) seen from above, and upward (3,).
+def along_track_frame(positions: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit vectors along track (T, 3), across track to the left (T, 3) and up (3,) of positions (T, 3), m.
 
-    Forward is the horizontal part of the step around each frame; where the path stands, that of the last frame that
-    moved (before the first one, of that).
+    Along track is the horizontal part of the central difference. At standstill it is that of the last moving frame,
+    and before the first moving frame that of the first.
     """
     upward = up / np.linalg.norm(up)
     step = np.gradient(positions, axis=0) if len(positions) > 1 else np.zeros_like(positions)

@@ -1,4 +1,4 @@
-"""KITTI's segment errors: how wrong the motion over 100, 200, ... 800 m is, per metre (Geiger et al., 2012)."""
+"""KITTI segment errors: relative motion error over 100, 200, ... 800 m, per meter (Geiger, Lenz and Urtasun, 2012)."""
 
 from dataclasses import dataclass
 
@@ -10,55 +10,55 @@ from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..statistics.block_bootstrap import error_statistics
-from .association import Matched
-from .ate_rpe import Difference, motion_difference
-from .path import distance_travelled
+from .association import MatchedTrajectories
+from .ate_rpe import PoseRelation, relative_pose_error
+from .path import distance_traveled
 
 OFFICIAL_LENGTHS = tuple(range(100, 900, 100))
 OFFICIAL_STEP = 10
-"""every how many poses a segment begins: at KITTI's 10 Hz once a second"""
+"""poses between the starts of segments: 1 s at KITTI's 10 Hz"""
 ROUND = np.array([1.0, 2.0, 2.5, 5.0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SegmentErrors:
-    """The errors of segments, and which lengths they have."""
+    """Errors of segments, and the segment lengths."""
 
     table: pd.DataFrame
     """one row per segment: `start`, `end` (indices of poses), `length` (m, nominal), `translation_percent` (of it),
     `rotation_deg_per_m`, `speed` (m/s; NaN without stamps)"""
     lengths: tuple[float, ...]
-    """m, those that were asked for"""
+    """m, as requested"""
     step: int
     official: bool
-    """whether lengths and step are KITTI's own, so that the figures compare with published ones"""
+    """whether lengths and step are those of KITTI's devkit, so that results compare with published ones"""
 
     @property
     def by_length(self) -> pd.DataFrame:
-        """Mean of each error, and number of segments `n`, for each length that any segment has."""
+        """Mean of each error and number of segments `n` by segment length."""
         errors = ["translation_percent", "rotation_deg_per_m"]
         means = self.table.groupby("length")[errors].mean()
         return means.assign(n=self.table.groupby("length").size())
 
     @property
     def translation_percent(self) -> float:
-        """Mean over all segments, as the KITTI table ranks by, %."""
+        """Mean translation error over all segments, the ranking criterion of the KITTI benchmark, %."""
         return float(self.table["translation_percent"].mean())
 
     @property
     def rotation_deg_per_m(self) -> float:
-        """Mean over all segments, deg/m."""
+        """Mean rotation error over all segments, deg/m."""
         return float(self.table["rotation_deg_per_m"].mean())
 
     def intervals(self, seed: int = 0) -> pd.DataFrame:
-        """`value`, `low`, `high` of both means, in the order of the segments' starts: see `error_statistics`."""
+        """Columns `value`, `low`, `high` of both means by `error_statistics`, segments in order of their starts."""
         columns = ["translation_percent", "rotation_deg_per_m"]
         rows = [error_statistics(self.table[column], seed=seed).loc["mean"] for column in columns]
         return pd.DataFrame(rows, index=pd.Index(columns))
 
     @property
     def caption(self) -> str:
-        """Which segments these are, for under a table."""
+        """Number and lengths of the segments, for a table's caption."""
         whose = "KITTI's lengths" if self.official else "lengths fitted to the path, not KITTI's"
         shortest, longest = min(self.lengths), max(self.lengths)
         every = "pose" if self.step == 1 else f"{self.step} poses"
@@ -68,17 +68,17 @@ class SegmentErrors:
 
 
 def segment_errors(
-    matched: Matched, lengths: tuple[float, ...] | None = None, step: int | None = None
+    matched: MatchedTrajectories, lengths: tuple[float, ...] | None = None, step: int | None = None
 ) -> SegmentErrors:
-    """As KITTI's devkit has it: from every `step`-th pose to the first that is more than a length further along the
-    reference's path, the error of the motion over that length.
+    """Segment errors as in KITTI's devkit: error of the motion from every `step`-th pose to the first one more than a
+    length further along the reference's path, divided by that length.
 
     By default the official lengths and step; where the path is no longer than the shortest of them, eight lengths
-    fitted to it, from every pose. Raises InputError where no segment of the lengths asked for fits, or the reference
-    stands still.
+    fitted to it, from every pose. Raises InputError where no segment of the requested lengths fits, or the reference
+    does not move.
     """
     reference, estimate = matched.reference, matched.estimate
-    travelled = distance_travelled(reference.position)
+    travelled = distance_traveled(reference.position)
     fits = travelled[-1] > OFFICIAL_LENGTHS[0]
     if lengths is None:
         lengths = tuple(map(float, OFFICIAL_LENGTHS)) if fits else fitted_lengths(float(travelled[-1]))
@@ -98,8 +98,8 @@ def segment_errors(
             "start": pairs[:, 0],
             "end": pairs[:, 1],
             "length": length,
-            "translation_percent": 100.0 * motion_difference(poses, truth, pairs, Difference.TRANSLATION) / length,
-            "rotation_deg_per_m": motion_difference(poses, truth, pairs, Difference.ROTATION_DEG) / length,
+            "translation_percent": 100.0 * relative_pose_error(poses, truth, pairs, PoseRelation.TRANSLATION) / length,
+            "rotation_deg_per_m": relative_pose_error(poses, truth, pairs, PoseRelation.ROTATION_DEG) / length,
             "speed": length / seconds if reference.stamped else np.full(len(pairs), np.nan),
         }
     )
@@ -107,7 +107,7 @@ def segment_errors(
 
 
 def fitted_lengths(path: float) -> tuple[float, ...]:
-    """Eight lengths, 1 to 8 times 1, 2, 2.5 or 5 times a power of ten, at most nine tenths of the path (m)."""
+    """Eight segment lengths, 1 to 8 times 1, 2, 2.5 or 5 times a power of ten, at most 0.9 of the path, m."""
     if not path > 0:
         raise InputError("the reference stands still: it has no segments")
     wanted = 0.9 * path / 8.0
@@ -117,7 +117,7 @@ def fitted_lengths(path: float) -> tuple[float, ...]:
 
 
 def _segments(travelled: FloatArray, lengths: FloatArray, step: int) -> tuple[IntArray, FloatArray]:
-    """(m, 2) first and last pose of each segment, by start, then length, and (m,) its length."""
+    """First and last pose (m, 2) of each segment, by start, then length, and its length (m,), m."""
     start = np.repeat(np.arange(0, len(travelled), step), len(lengths))
     length = np.tile(lengths, len(start) // len(lengths))
     end = np.searchsorted(travelled, travelled[start] + length, side="right")

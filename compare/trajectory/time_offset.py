@@ -1,4 +1,4 @@
-"""By how much the clock of an estimate is off that of the reference."""
+"""Time offset between the clocks of an estimate and a reference."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,39 +8,40 @@ import numpy as np
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..statistics.descriptive import rms_norm
 from .alignment import Align, align
-from .interpolation import interpolated
+from .association import interpolated
 
 STEPS = 400
 MOST_POSES = 2000
 AS_GOOD = 1.05
-"""times the smallest RMSE: offsets within it are as good"""
+"""times the smallest RMSE: offsets up to it are equally good"""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeOffset:
-    """The seconds to add to an estimate's stamps so that it fits the reference best, and how sure that is."""
+    """Offset to add to an estimate's stamps to fit the reference best, and its uncertainty."""
 
     seconds: float
     rmse: float
-    """m, of aligned positions, with it"""
+    """m, of aligned positions, with the offset"""
     rmse_without: float
-    """m, over the same poses, without it"""
+    """m, over the same poses, without the offset"""
     low: float
     """s; between low and high the RMSE is at most 5 % above the smallest"""
     high: float
     determined: bool
-    """False where that range reaches an end of the search: search wider, or the path (straight, steady) is mute"""
+    """False where that range reaches an end of the search: widen it, or the path (straight, steady) is uninformative"""
 
 
 def time_offset(
     reference: Trajectory, estimate: Trajectory, within: float, kind: Align | str = Align.SE3
 ) -> TimeOffset:
-    """Searches -`within` to `within` (s) for the offset at which positions differ least (RMSE), aligned as `kind` says.
+    """Offset within -`within` to `within` (s) of the smallest position RMSE after alignment of `kind`.
 
     The trajectory with the denser stamps is interpolated at those of the other (at most MOST_POSES of them, evenly
-    chosen) that overlap at every offset searched, so that all offsets are judged by the same poses. Raises InputError
-    where fewer than three do, there are no stamps, or nothing to search.
+    chosen) that overlap at every offset of the search, so that all offsets use the same poses. Raises InputError
+    for fewer than three such poses, missing stamps or an empty search.
     """
     from scipy.optimize import minimize_scalar
 
@@ -65,7 +66,7 @@ def time_offset(
         moved = interpolated(dense, coarse.t + (-seconds if reference_is_coarse else seconds))
         e, r = (moved, coarse) if reference_is_coarse else (coarse, moved)
         motion = align(e.world_T_body, r.world_T_body, kind)
-        return _rmse(motion.apply(e.world_T_body)[:, :3, 3] - r.position)
+        return rms_norm(motion.apply(e.world_T_body)[:, :3, 3] - r.position)
 
     step = max(float(np.median(np.diff(dense.t))), 2.0 * within / STEPS)
     n = int(np.ceil(within / step))
@@ -85,9 +86,9 @@ def time_offset(
 
 
 def _crossing(misfit: Callable[[float], float], limit: float, good: float, grid: FloatArray, side: int) -> float:
-    """Where the misfit rises to the limit between an offset as good as the best and the next of the grid on that side.
+    """Offset at which the misfit reaches the limit, between a good offset and its neighbor in the grid on that side.
 
-    The offset itself at the end of the grid.
+    The good offset itself at the end of the grid.
     """
     from scipy.optimize import brentq
 
@@ -98,7 +99,3 @@ def _crossing(misfit: Callable[[float], float], limit: float, good: float, grid:
     if misfit(worse) <= limit or misfit(good) >= limit:
         return good
     return float(brentq(lambda seconds: misfit(seconds) - limit, good, worse, xtol=1e-6 * abs(worse - good)))
-
-
-def _rmse(apart: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))

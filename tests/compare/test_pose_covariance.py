@@ -66,7 +66,7 @@ def test_nees_knows_no_body_that_both_are_written_in(
     expected = nees(folder, truth, poses, covariance, align=kind)
     imu_T_cam = se3.exp(twist)
     data.write_kitti(folder / "extrinsic.txt", imu_T_cam[None])
-    of_camera = figures.of_other_body(covariance, imu_T_cam)
+    of_camera = figures.covariance_of_body(covariance, imu_T_cam)
     given_as = {"reference_body": "camera", "estimate_body": "camera", "extrinsic": folder / "extrinsic.txt"}
     found = nees(folder, truth @ imu_T_cam, poses @ imu_T_cam, of_camera, align=kind, **given_as)
     assert found == pytest.approx(expected, rel=1e-6)
@@ -77,7 +77,7 @@ def test_the_adjoint_carries_a_perturbation_to_another_body() -> None:
     body_T_other, pose, e = se3.exp(random.normal(size=6)), se3.exp(random.normal(size=6)), 1e-4 * random.normal(size=6)
     moved = se3.log(se3.inverse(pose @ body_T_other) @ (pose @ se3.exp(e)) @ body_T_other)
     np.testing.assert_allclose(
-        figures.of_other_body(np.outer(e, e)[None], body_T_other)[0], np.outer(moved, moved), atol=1e-14
+        figures.covariance_of_body(np.outer(e, e)[None], body_T_other)[0], np.outer(moved, moved), atol=1e-14
     )
 
 
@@ -105,7 +105,7 @@ def test_covariances_of_absolute_poses_are_held_beside_the_aligned_errors(tmp_pa
     sigma = np.repeat([0.1, 0.01], 3)
     poses = truth @ se3.exp(sigma * np.random.default_rng(5).normal(size=(T, 6)))
     covariance = np.tile(np.diag(sigma**2), (T, 1, 1))
-    assert figures.since_first(poses, covariance) is None
+    assert figures.covariance_since_first(poses, covariance) is None
     moved = nees(tmp_path, truth, se3.exp([9.0, 1.0, -3.0, 0.1, 0.2, 2.0]) @ poses, covariance, align="se3")
     assert moved == pytest.approx(6.0, abs=1.0)
 
