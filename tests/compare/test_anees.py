@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.consistency.nees import CovarianceState
+from fgbaseline.compare.consistency.covariance import CovarianceState
 from fgbaseline.compare.statistics.chi_square import chi_square_bounds, p_value, share_inside_bounds
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3

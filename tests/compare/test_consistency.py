@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.consistency.nees import HELD, CovarianceState, is_positive_definite
+from fgbaseline.compare.consistency.covariance import HELD, CovarianceState, is_positive_definite
 from fgbaseline.compare.statistics.chi_square import chi_square_bounds, chi_square_quantile, share_inside_bounds
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3

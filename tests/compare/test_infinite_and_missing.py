@@ -76,7 +76,7 @@ def test_an_infinite_mean_ranks_last_and_two_of_them_tie() -> None:
 
 
 def test_an_infinite_nees_is_outside_and_makes_the_mean_infinite() -> None:
-    table = compare.over_runs.average_nees([np.array([6.0, np.inf, np.nan]), np.array([6.0, 6.0, 6.0])])
+    table = compare.average_nees([np.array([6.0, np.inf, np.nan]), np.array([6.0, 6.0, 6.0])])
     assert table["anees"].tolist() == [6.0, np.inf, 6.0]
     assert table["runs"].tolist() == [2, 2, 1]
 

@@ -101,6 +101,6 @@ def test_the_ranking_is_worked_out_by_hand() -> None:
     assert table["high"].tolist() == pytest.approx([2.0 + half, 2.0 + half, 4.0 + half])
 
 
-def test_consistency_of_known_figures() -> None:
+def test_anees_summary_of_known_figures() -> None:
     found = compare.anees_summary([np.array([6.0, 6.0, 60.0, 0.0])])
     assert found == pytest.approx((18.0, *stats.chi2.ppf([0.025, 0.975], 6), 0.5, 1))

@@ -87,7 +87,7 @@ def test_a_scale_is_carried_with_the_positions(scale: float, tmp_path: Path) -> 
     expected = nees(tmp_path, truth, poses, covariance, align="sim3")
     smaller = poses.copy()
     smaller[:, :3, 3] *= scale
-    found = nees(tmp_path, truth, smaller, figures.scaled(covariance, scale), align="sim3")
+    found = nees(tmp_path, truth, smaller, figures.scaled_covariance(covariance, scale), align="sim3")
     assert found == pytest.approx(expected, rel=1e-6)
 
 

@@ -149,7 +149,7 @@ def test_a_landmark_at_the_camera_is_an_infinite_error_and_no_warning() -> None:
     assert np.isfinite(summary["median"])
 
 
-def test_commonly_used_is_what_all_that_use_any_have_used() -> None:
+def test_used_by_all_is_what_all_that_use_any_have_used() -> None:
     random = np.random.default_rng(3)
     n = len(EXACT.observations)
     a, b = random.random(n) < 0.7, random.random(n) < 0.7
