@@ -59,8 +59,8 @@ def figures(problem: Problem, estimate: Estimate) -> Figures:
     return {
         "status": str(estimate.status),
         "reason": estimate.reason,
-        "ate_m": compare.summarised(compare.truth_errors(estimate, truth, aligned=True)["position"])["rmse"],
-        "rmse_m": compare.summarised(compare.truth_errors(estimate, truth)["position"])["rmse"],
+        "ate_m": compare.summarized(compare.truth_errors(estimate, truth, aligned=True)["position"])["rmse"],
+        "rmse_m": compare.summarized(compare.truth_errors(estimate, truth)["position"])["rmse"],
         "nees": float(nees[known].mean()) if known.any() else None,
         "nees_median": float(np.median(nees[known])) if known.any() else None,
         "offered": offered,

@@ -27,7 +27,7 @@ import pandas as pd
 from scipy.stats import kendalltau
 
 from fgbaseline import compare
-from fgbaseline.compare.held_out import half_errors
+from fgbaseline.compare.residuals.held_out_tracks import cross_prediction_errors
 from fgbaseline.data import HeldOut, Sequence, find_estimator, read
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import calibrated, hold_out
@@ -97,7 +97,7 @@ def of_truth(sequence: Sequence, held: HeldOut, errors: compare.HeldOutErrors, v
     missing = held.piece[inlier & ~sequence.truth.known[held.observations.frame]]
     chosen = np.flatnonzero(inlier & ~np.isin(held.piece, missing))
     chosen = chosen[np.lexsort((held.observations.frame[chosen], held.piece[chosen]))]
-    return float(np.median(half_errors(sequence, held, chosen, sequence.truth.world_T_imu, variance)))
+    return float(np.median(cross_prediction_errors(sequence, held, chosen, sequence.truth.world_T_imu, variance)))
 
 
 def differences(errors: compare.HeldOutErrors) -> dict[tuple[str, str], tuple[float, float]]:

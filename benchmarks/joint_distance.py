@@ -119,7 +119,7 @@ def ate(estimate: Estimate, sequence: Sequence) -> str:
     """RMSE of position after SE(3) alignment; a dash without truth."""
     if sequence.truth is None:
         return "-"
-    return f"{compare.summarised(compare.truth_errors(estimate, sequence.truth, aligned=True)['position'])['rmse']:.3f}"
+    return f"{compare.summarized(compare.truth_errors(estimate, sequence.truth, aligned=True)['position'])['rmse']:.3f}"
 
 
 @click.command()

@@ -29,19 +29,20 @@ from rich.console import Console
 from rich.table import Table
 
 from fgbaseline import compare, data
-from fgbaseline.compare import Align, Difference, Unit
+from fgbaseline.compare import Align, Unit
+from fgbaseline.compare import PoseRelation as Relation
 from fgbaseline.geometry import FloatArray, se3
 
 OF_POSES = {
-    Difference.TRANSLATION: PoseRelation.translation_part,
-    Difference.ROTATION: PoseRelation.rotation_angle_rad,
-    Difference.ROTATION_DEG: PoseRelation.rotation_angle_deg,
-    Difference.ROTATION_CHORD: PoseRelation.rotation_part,
-    Difference.POSE: PoseRelation.full_transformation,
+    Relation.TRANSLATION: PoseRelation.translation_part,
+    Relation.ROTATION: PoseRelation.rotation_angle_rad,
+    Relation.ROTATION_DEG: PoseRelation.rotation_angle_deg,
+    Relation.ROTATION_CHORD: PoseRelation.rotation_part,
+    Relation.POSE: PoseRelation.full_transformation,
 }
 OF_MOTIONS = OF_POSES | {
-    Difference.DISTANCE: PoseRelation.point_distance,
-    Difference.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
+    Relation.DISTANCE: PoseRelation.point_distance,
+    Relation.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
 }
 UNITS = {Unit.FRAMES: EvoUnit.frames, Unit.METRES: EvoUnit.meters, Unit.DEGREES: EvoUnit.degrees}
 DELTA = {Unit.FRAMES: 10, Unit.METRES: 10.0, Unit.DEGREES: 10.0}
@@ -78,7 +79,7 @@ def evo_pair(d: Drive) -> tuple[PoseTrajectory3D, PoseTrajectory3D]:
     return matched
 
 
-def our_pair(d: Drive) -> compare.Matched:
+def our_pair(d: Drive) -> compare.MatchedTrajectories:
     return compare.associate(data.Trajectory(d.t, d.reference), data.Trajectory(d.t, d.estimate))
 
 
@@ -89,7 +90,7 @@ def rmse_of(metric: PE, pair: tuple[PoseTrajectory3D, PoseTrajectory3D]) -> floa
     return float(metric.get_statistic(StatisticsType.rmse))
 
 
-def absolute_row(d: Drive, kind: Align, what: Difference) -> Row:
+def absolute_row(d: Drive, kind: Align, what: Relation) -> Row:
     def evo() -> float:
         reference, estimate = evo_pair(d)
         estimate.align(reference, correct_scale=kind is Align.SIM3)
@@ -98,12 +99,12 @@ def absolute_row(d: Drive, kind: Align, what: Difference) -> Row:
     def ours() -> float:
         matched = our_pair(d).aligned(kind)
         poses, truth = matched.estimate.world_T_body, matched.reference.world_T_body
-        return compare.summarised(compare.absolute_difference(poses, truth, what))["rmse"]
+        return compare.summarized(compare.absolute_pose_error(poses, truth, what))["rmse"]
 
     return Row(f"ATE {kind}, {len(d.t):,} poses: {what}", evo, ours)
 
 
-def relative_row(d: Drive, unit: Unit, all_pairs: bool, what: Difference) -> Row:
+def relative_row(d: Drive, unit: Unit, all_pairs: bool, what: Relation) -> Row:
     delta = DELTA[unit]
     pair, matched = evo_pair(d), our_pair(d)  # as it is after the ATE: matched already
 
@@ -114,7 +115,7 @@ def relative_row(d: Drive, unit: Unit, all_pairs: bool, what: Difference) -> Row
     def ours() -> float:
         pairs = compare.matched_pairs(matched, delta, unit, all_pairs=all_pairs)
         poses, truth = matched.estimate.world_T_body, matched.reference.world_T_body
-        return compare.summarised(compare.motion_difference(poses, truth, pairs, what))["rmse"]
+        return compare.summarized(compare.relative_pose_error(poses, truth, pairs, what))["rmse"]
 
     which = "all pairs" if all_pairs else "consecutive"
     return Row(f"RPE {delta:g} {unit} {which}, {len(d.t):,} poses: {what}", evo, ours)

@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fgbaseline import compare, data, diagnosis, smoother
-from fgbaseline.compare.cost import cost
+from fgbaseline.compare import cost
 from fgbaseline.data import Estimate, Problem, Sequence, Status
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.smoother import ISAM2Settings

@@ -1,147 +1,185 @@
 """Trajectory divergence, reprojection statistics, consistency and trust: arrays in, tables out."""
 
-from .absolute import absolute_errors
-from .alignment import Align, Alignment, align, align_se3
-from .association import Association, Matched, associate
-from .block_bootstrap import error_statistics
-from .carried_covariance import of_other_body, scaled, since_first
-from .common_moments import common_moments, taking_part
-from .consistency import CovarianceState, anees, body_error, covariance_state, nees, nees_table, sigma_ratio
-from .conventions import (
-    BodyRotation,
-    are_conjugated,
-    body_rotation,
-    fits_clearly_better,
-    is_constant,
-    rmse_of_inverses,
-    travel_misfit,
-    turning_misfit,
-    turning_rotation,
-    world_rotation,
+from .consistency.anees import AneesSummary, anees, anees_summary, average_nees
+from .consistency.covariance import (
+    CovarianceState,
+    covariance_of_body,
+    covariance_since_first,
+    covariance_state,
+    scaled_covariance,
 )
-from .coverage import FEWEST_STRETCHES, SMALLEST_COVERAGE, SMALLEST_SAMPLE, covered, spanned, too_small
-from .difference_shares import DifferenceShares, difference_shares
-from .drift import drift
-from .growth import Passing, first_beyond, growing_divergence, growth_by_part
-from .held_out import HeldOutErrors, held_out_errors, held_out_ranking
-from .innovation import NisSummary, nis_per_degree, nis_summary
-from .interpolation import interpolated
-from .maps import map_by_depth, map_difference
-from .moved import moved_points
-from .over_runs import Consistency, consistency_of, mean_of, nees_over_runs, ranking
-from .paired import PairedRanking, RmseDifference, paired_ranking, rmse_difference
-from .pairs import Unit, pose_pairs
-from .pose_difference import Difference, absolute_difference, motion_difference
-from .relative import matched_pairs, relative_errors
-from .reprojection import (
-    commonly_used,
+from .consistency.nees import body_error, nees, nees_table, sigma_ratio
+from .consistency.nis import NisSummary, nis_per_degree, nis_summary
+from .consistency.reference_nees import ReferenceNees, reference_nees
+from .landmarks.dynamic_landmarks import dynamic_landmarks
+from .landmarks.map_difference import map_by_depth, map_difference
+from .residuals.cost import cost
+from .residuals.held_out_tracks import HeldOutErrors, held_out_errors, held_out_ranking
+from .residuals.patterns import residual_patterns
+from .residuals.reprojection import (
     component_summary,
     reprojection,
     reprojection_by,
     reprojection_summary,
+    used_by_all,
 )
-from .residual_patterns import residual_patterns
-from .segments import SegmentErrors, segment_errors
-from .share_intervals import share_intervals
-from .shared_data import DifferenceNees, difference_nees
-from .statistics import summarised
-from .time_offset import TimeOffset, time_offset
-from .trajectory import divergence, divergence_summary, pose_errors, truth_errors
+from .residuals.whitening import evaluated_rows, track_chi_square, whitened_summary
+from .statistics.block_bootstrap import error_statistics
+from .statistics.chi_square import chi_square_bounds, share_inside_bounds
+from .statistics.descriptive import summarized
+from .statistics.monte_carlo import MeanInterval, mean_interval, monte_carlo_ranking
+from .statistics.paired_bootstrap import PairedRanking, RmseDifference, paired_ranking, rmse_difference
+from .trajectory.alignment import Align, Alignment, align, align_se3
+from .trajectory.association import (
+    Association,
+    MatchedTrajectories,
+    associate,
+    common_stamps,
+    interpolated,
+    rankable,
+)
+from .trajectory.ate_rpe import (
+    PoseRelation,
+    absolute_errors,
+    absolute_pose_error,
+    matched_pairs,
+    relative_errors,
+    relative_pose_error,
+)
+from .trajectory.coverage import (
+    MIN_COVERAGE,
+    MIN_SAMPLE_SIZE,
+    MIN_STRETCHES,
+    interval_coverage,
+    is_insufficient,
+    time_coverage,
+)
+from .trajectory.delta_pairs import Unit, pose_pairs
+from .trajectory.divergence import (
+    Exceedance,
+    divergence,
+    divergence_along_path,
+    divergence_growth,
+    divergence_summary,
+    first_exceedance,
+    pose_errors,
+    truth_errors,
+)
+from .trajectory.drift import drift
+from .trajectory.error_decomposition import ErrorDecomposition, decomposition_intervals, error_decomposition
+from .trajectory.frame_conventions import (
+    BodyRotation,
+    body_rotation,
+    fits_clearly_better,
+    has_conjugated_orientations,
+    rmse_of_inverse_poses,
+    rotation_misfit,
+    travel_direction_misfit,
+    world_rotation_from_orientations,
+    world_rotation_from_positions,
+)
+from .trajectory.path import distance_traveled
+from .trajectory.segments import SegmentErrors, segment_errors
+from .trajectory.time_offset import TimeOffset, time_offset
 from .trust import Trust, Verdict, trust
-from .whitened import track_chi_square, whitened_summary
 
 __all__ = [
-    "FEWEST_STRETCHES",
-    "SMALLEST_COVERAGE",
-    "SMALLEST_SAMPLE",
+    "MIN_COVERAGE",
+    "MIN_SAMPLE_SIZE",
+    "MIN_STRETCHES",
     "Align",
     "Alignment",
+    "AneesSummary",
     "Association",
     "BodyRotation",
-    "Consistency",
     "CovarianceState",
-    "Difference",
-    "DifferenceNees",
-    "DifferenceShares",
+    "ErrorDecomposition",
+    "Exceedance",
     "HeldOutErrors",
-    "Matched",
+    "MatchedTrajectories",
+    "MeanInterval",
     "NisSummary",
     "PairedRanking",
-    "Passing",
+    "PoseRelation",
+    "ReferenceNees",
     "RmseDifference",
     "SegmentErrors",
     "TimeOffset",
     "Trust",
     "Unit",
     "Verdict",
-    "absolute_difference",
     "absolute_errors",
+    "absolute_pose_error",
     "align",
     "align_se3",
     "anees",
-    "are_conjugated",
+    "anees_summary",
     "associate",
+    "average_nees",
     "body_error",
     "body_rotation",
-    "common_moments",
-    "commonly_used",
+    "chi_square_bounds",
+    "common_stamps",
     "component_summary",
-    "consistency_of",
+    "cost",
+    "covariance_of_body",
+    "covariance_since_first",
     "covariance_state",
-    "covered",
-    "difference_nees",
-    "difference_shares",
+    "decomposition_intervals",
+    "distance_traveled",
     "divergence",
+    "divergence_along_path",
+    "divergence_growth",
     "divergence_summary",
     "drift",
+    "dynamic_landmarks",
+    "error_decomposition",
     "error_statistics",
-    "first_beyond",
+    "evaluated_rows",
+    "first_exceedance",
     "fits_clearly_better",
-    "growing_divergence",
-    "growth_by_part",
+    "has_conjugated_orientations",
     "held_out_errors",
     "held_out_ranking",
     "interpolated",
-    "is_constant",
+    "interval_coverage",
+    "is_insufficient",
     "map_by_depth",
     "map_difference",
     "matched_pairs",
-    "mean_of",
-    "motion_difference",
-    "moved_points",
+    "mean_interval",
+    "monte_carlo_ranking",
     "nees",
-    "nees_over_runs",
     "nees_table",
     "nis_per_degree",
     "nis_summary",
-    "of_other_body",
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
-    "ranking",
+    "rankable",
+    "reference_nees",
     "relative_errors",
+    "relative_pose_error",
     "reprojection",
     "reprojection_by",
     "reprojection_summary",
     "residual_patterns",
     "rmse_difference",
-    "rmse_of_inverses",
-    "scaled",
+    "rmse_of_inverse_poses",
+    "rotation_misfit",
+    "scaled_covariance",
     "segment_errors",
-    "share_intervals",
+    "share_inside_bounds",
     "sigma_ratio",
-    "since_first",
-    "spanned",
-    "summarised",
-    "taking_part",
+    "summarized",
+    "time_coverage",
     "time_offset",
-    "too_small",
     "track_chi_square",
-    "travel_misfit",
+    "travel_direction_misfit",
     "trust",
     "truth_errors",
-    "turning_misfit",
-    "turning_rotation",
+    "used_by_all",
     "whitened_summary",
-    "world_rotation",
+    "world_rotation_from_orientations",
+    "world_rotation_from_positions",
 ]

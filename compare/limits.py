@@ -1,4 +1,4 @@
-"""Whether a figure keeps within what was promised for it."""
+"""Acceptance limits of a figure: bounds, absolute or around a baseline, and their outcome."""
 
 import math
 from dataclasses import dataclass
@@ -9,36 +9,36 @@ EXACT = 12
 
 
 class Outcome(StrEnum):
-    """What a limit comes to, worst last in what it says of the figure."""
+    """Outcome of a limit."""
 
     HOLDS = "holds"
     CANNOT_TELL = "cannot tell"
-    """there is no figure (NaN), or nothing that it can be held against"""
+    """no figure (NaN), or no bounds to compare it with"""
     FALLS_SHORT = "falls short"
 
 
 class Better(StrEnum):
-    """Which way a figure may leave its baseline as far as it likes."""
+    """Direction of improvement: a figure may leave its baseline without limit in it."""
 
     LOWER = "lower"
     HIGHER = "higher"
     NEITHER = "neither"
-    """any change beyond the tolerance is one for the worse"""
+    """any change beyond the tolerance is a regression"""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """A closed interval, in the unit of the figure; infinite where it is open."""
+    """Closed interval in the unit of the figure; infinite bounds leave it open."""
 
     at_least: float = -math.inf
     at_most: float = math.inf
 
     def margin(self, value: float) -> float:
-        """How far inside the nearer bound a finite value is, in its unit; negative outside."""
+        """Distance of a finite value to the nearer bound, in its unit; negative outside."""
         return min(value - self.at_least, self.at_most - value)
 
     def judge(self, value: float | None) -> Outcome:
-        """HOLDS for a finite value within, bounds included; an infinite one never does, of NaN nothing is known."""
+        """HOLDS for a finite value inside or on the bounds, CANNOT_TELL for None and NaN, FALLS_SHORT otherwise."""
         if value is None or math.isnan(value):
             return Outcome.CANNOT_TELL
         held = math.isfinite(value) and self.at_least <= value <= self.at_most
@@ -46,7 +46,7 @@ class Bounds:
 
 
 def around(baseline: float, better: Better, *, relative: float = 0.0, absolute: float = 0.0) -> Bounds:
-    """The bounds that a baseline sets: it may be worse by `absolute` or by `relative * |baseline|`, the larger one."""
+    """Bounds around a baseline: a figure may be worse by the larger of `absolute` and `relative * |baseline|`."""
     allowed = max(absolute, relative * abs(baseline))
     return Bounds(
         at_least=-math.inf if better is Better.LOWER else rounded(baseline - allowed, EXACT),
@@ -55,5 +55,5 @@ def around(baseline: float, better: Better, *, relative: float = 0.0, absolute: 
 
 
 def rounded(value: float, digits: int) -> float:
-    """A finite value to so many significant digits."""
+    """Finite value rounded to significant digits."""
     return float(f"{value:.{digits - 1}e}")

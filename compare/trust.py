@@ -1,4 +1,4 @@
-"""Is the reference to be trusted? From its own evidence, never from truth."""
+"""Trust in the reference: a verdict from its residuals and its agreement with a batch solution, never from truth."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -9,17 +9,18 @@ from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import disparity
 
-from .cost import cost
-from .noise_scale import motion_scale, pixel_scale
+from .residuals.cost import cost
+from .residuals.noise_scale import motion_scale, pixel_scale
+from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
-"""px of disparity"""
+"""px; disparity up to which a point is far"""
 NOTABLE = 0.05
-"""share of impossible observations from which on it is reported"""
+"""share of observations without positive disparity above which it is reported"""
 
 
 class Verdict(IntEnum):
-    """How far a reference can be leaned on; the worst finding decides."""
+    """Trust in a reference; the worst finding decides."""
 
     TRUSTED = 0
     DOUBTFUL = 1
@@ -28,7 +29,7 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """A verdict and the sentences it rests on, worst first."""
+    """Verdict and its reasons in sentences, worst first."""
 
     verdict: Verdict
     reasons: tuple[str, ...]
@@ -36,35 +37,35 @@ class Trust:
 
 @dataclass(frozen=True, slots=True)
 class TrustLimits:
-    """Where a finding turns doubtful, and where untrusted."""
+    """Limits of each finding: doubtful, untrusted."""
 
     pixel_scale: tuple[float, float] = (1.6, 3.0)
-    """pixel noise that explains the residuals over that of the model: see `pixel_scale`"""
+    """estimated over modeled sigma of the pixel noise: see `pixel_scale`"""
     motion_scale: tuple[float, float] = (1.4, 2.4)
-    """the same of the motion increments: see `motion_scale`"""
+    """estimated over modeled sigma of the motion increments: see `motion_scale`"""
     used_share: tuple[float, float] = (0.6, 0.3)
-    """of the `offered` observations"""
+    """share of the `expected_observations` that were used"""
     weak_frames: tuple[float, float] = (0.05, 0.25)
     """share of frames with fewer than `weak_below` used observations"""
     weak_below: int = 6
     untied_intervals: tuple[float, float] = (0.25, 0.6)
-    """share of the intervals that no used landmark is seen on both sides of"""
+    """share of the intervals between frames across which no used landmark is tracked"""
     given_up_frames: tuple[float, float] = (0.0, 0.05)
-    """share of frames whose observations had to be given up"""
+    """share of frames whose observations were dropped"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
-    """share by which its cost is above that of the batch solution"""
+    """relative excess of its cost over that of the batch solution"""
     batch_position: tuple[float, float] = (0.1, 2.0)
-    """baselines of the rig, RMSE of its positions from those of the batch solution"""
+    """RMSE of its positions from those of the batch solution, in baselines of the stereo rig"""
     impossible_share: tuple[float, float] = (0.2, 0.5)
-    """of the `offered` observations: those without a positive disparity"""
+    """share of the `expected_observations` without positive disparity"""
 
 
 def trust(
     problem: Problem, reference: Estimate, batch: Estimate | None = None, limits: TrustLimits | None = None
 ) -> Trust:
-    """The verdict on an estimate, from whitened residuals, the share of observations used, weak frames and `batch`.
+    """Verdict on a reference from its whitened residuals, share of observations used, weak frames and `batch`.
 
-    Residuals are held against the problem's own noise model: see `pixel_scale` and `motion_scale`.
+    Residuals are compared with the problem's own noise model: see `pixel_scale` and `motion_scale`.
     """
     if reference.status is Status.FAILED:
         return Trust(Verdict.UNTRUSTED, (f"it failed: {reference.reason}",))
@@ -73,10 +74,10 @@ def trust(
     if n_used == 0:
         return Trust(Verdict.UNTRUSTED, ("it used no observation",))
     pixel, motion = pixel_scale(problem, reference), motion_scale(problem, reference)
-    counted = offered(problem)
+    counted = expected_observations(problem)
     n_offered = max(1, int(counted.sum()))
     share = int((reference.used & counted).sum()) / n_offered
-    impossible = int((counted & ~possible(problem)).sum()) / n_offered
+    impossible = int((counted & ~has_positive_disparity(problem)).sum()) / n_offered
     per_frame = np.bincount(problem.sequence.observations.frame[reference.used], minlength=problem.n_frames)
     weak = float(np.mean(per_frame < limit.weak_below))
     lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
@@ -107,24 +108,26 @@ def trust(
     return Trust(max(verdict for verdict, _ in findings), tuple(text for _, text in findings))
 
 
-def offered(problem: Problem) -> BoolArray:
-    """(n,) the observations that an estimator is expected to use: all of the problem, and those of the wanted features
-    that it excludes, but for far points: a disparity above 0 and of at most 1 px is possible and says little of the
-    depth. What is impossible (no positive disparity) is counted."""
+def expected_observations(problem: Problem) -> BoolArray:
+    """Observations (n,) that an estimator should use: those of the problem, and excluded ones of chosen features.
+
+    Excluded far points (disparity above 0, at most FAR_POINT) do not count, as they determine no depth. Observations
+    without positive disparity, which are impossible, do count.
+    """
     d = disparity(problem.sequence.observations.pixel)
     wanted = problem.excluded != Excluded.FEATURE_NOT_CHOSEN
     return np.asarray(problem.mask | (wanted & ~((d > 0.0) & (d <= FAR_POINT))), dtype=np.bool_)
 
 
-def possible(problem: Problem) -> BoolArray:
-    """(n,) whether an observation has a positive disparity, as every point in front of the cameras has."""
+def has_positive_disparity(problem: Problem) -> BoolArray:
+    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has."""
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 
 def _beside_batch(
     problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits
 ) -> tuple[Verdict, str]:
-    """Has the reference found the minimum? Costs are compared over the observations that both used."""
+    """Whether the reference is at the minimum of the cost, over the observations that both used."""
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
         return Verdict.TRUSTED, f"not compared with a batch solution{why}"
@@ -138,7 +141,7 @@ def _beside_batch(
     both = reference.used & batch.used
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
-    rmse = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    rmse = rms_norm(apart)
     baselines = rmse / problem.sequence.camera.baseline
     verdict = max(_above(excess, limit.batch_cost), _above(baselines, limit.batch_position))
     said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"

@@ -28,16 +28,16 @@ def known(table: pd.DataFrame) -> BoolArray:
 def common_rmse(tables: Mapping[str, pd.DataFrame]) -> dict[str, CommonRmse]:
     """By name the RMSE over the frames that all tables of `compare.pose_errors` have; empty without such a frame.
 
-    An estimator with far fewer frames than the others takes no part: see `compare.taking_part`.
+    An estimator with far fewer frames than the others takes no part: see `compare.rankable`.
     """
     there = {name: known(table) for name, table in tables.items()}
-    names = compare.taking_part({name: int(frames.sum()) for name, frames in there.items()})
+    names = compare.rankable({name: int(frames.sum()) for name, frames in there.items()})
     if not names:
         return {}
     common = np.logical_and.reduce([there[name] for name in names])
     n = int(common.sum())
     errors = {name: tables[name]["position"].to_numpy(dtype=np.float64)[common] for name in names}
-    return {name: CommonRmse(compare.summarised(errors[name])["rmse"], n) for name in names} if n else {}
+    return {name: CommonRmse(compare.summarized(errors[name])["rmse"], n) for name in names} if n else {}
 
 
 def same_frames(frames: Iterable[BoolArray]) -> bool:
@@ -47,5 +47,5 @@ def same_frames(frames: Iterable[BoolArray]) -> bool:
 
 
 def share_of_time(t: FloatArray, frames: BoolArray) -> float:
-    """The share of the recording's time in which there are these frames (T,): see `compare.covered`."""
-    return compare.covered(t[frames], t)
+    """The share of the recording's time in which there are these frames (T,): see `compare.time_coverage`."""
+    return compare.time_coverage(t[frames], t)

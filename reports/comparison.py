@@ -100,7 +100,7 @@ def compare_all(
         for name, result in results.items()
     }
     held_out = None if held is None else held_out_report(problem, estimates.values(), held)
-    return Run(problem, results, reference, trusted, compare.commonly_used(estimates.values()), settings, held_out)
+    return Run(problem, results, reference, trusted, compare.used_by_all(estimates.values()), settings, held_out)
 
 
 def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> dict[str, Any]:

@@ -22,7 +22,7 @@ class Evidence:
     """(T, 6) in the body frame: see `compare.body_error`; None without truth"""
     nees: pd.DataFrame | None
     """see `compare.nees_table`; None without truth"""
-    difference: compare.DifferenceNees | None
+    difference: compare.ReferenceNees | None
     """against the reference; None for the reference itself, and without one"""
     sigma_ratio: pd.DataFrame | None
     """its sigmas over those of the reference, by frame; None likewise"""
@@ -34,7 +34,7 @@ class Evidence:
     patterns: pd.DataFrame
     """see `compare.residual_patterns`"""
     moved: pd.DataFrame
-    """see `compare.moved_points`"""
+    """see `compare.dynamic_landmarks`"""
     map: pd.DataFrame | None
     """see `compare.map_difference`; None for the reference itself, and without one"""
 
@@ -58,13 +58,13 @@ def gathered(problem: Problem, estimate: Estimate, reprojection: pd.DataFrame, r
         covariance=compare.covariance_state(estimate),
         error=None if truth is None else compare.body_error(estimate, truth),
         nees=None if truth is None else compare.nees_table(estimate, truth),
-        difference=None if other is None else compare.difference_nees(estimate, other),
+        difference=None if other is None else compare.reference_nees(estimate, other),
         sigma_ratio=None if other is None else compare.sigma_ratio(estimate, other),
         nis_per_degree=compare.nis_per_degree(estimate),
         nis=compare.nis_summary(estimate),
         whitened=compare.whitened_summary(problem, reprojection),
         patterns=compare.residual_patterns(problem.sequence, reprojection),
-        moved=compare.moved_points(problem, estimate, reprojection),
+        moved=compare.dynamic_landmarks(problem, estimate, reprojection),
         map=None if other is None else compare.map_difference(problem.sequence, estimate, other),
     )
 

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.compare import CovarianceState
-from fgbaseline.compare.chi_square import share_inside
+from fgbaseline.compare import CovarianceState, share_inside_bounds
 from fgbaseline.geometry import FloatArray
 
 from .comparison import Result, Run
@@ -88,7 +87,7 @@ def _nees(table: pd.DataFrame) -> dict[str, float | int]:
         "median": _or_nan(np.median, values),
         "position_mean": _or_nan(np.mean, _known(table["position"].to_numpy())),
         "rotation_mean": _or_nan(np.mean, _known(table["rotation"].to_numpy())),
-        "inside_95": share_inside(values, 6.0),
+        "inside_95": share_inside_bounds(values, 6.0),
         "frames": len(values),
     }
 
@@ -104,12 +103,12 @@ def _covariance(evidence: Evidence) -> dict[str, int | str]:
     }
 
 
-def _difference(difference: compare.DifferenceNees) -> dict[str, float | int]:
+def _difference(difference: compare.ReferenceNees) -> dict[str, float | int]:
     values = _known(difference.nees)
     return {
         "mean": _or_nan(np.mean, values),
         "median": _or_nan(np.median, values),
-        "inside_95": share_inside(values, 6.0),
+        "inside_95": share_inside_bounds(values, 6.0),
         "frames": len(values),
         "left_out": int(difference.left_out.sum()),
     }

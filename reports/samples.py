@@ -21,7 +21,7 @@ def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
 
     def of_frames(frames: BoolArray, *keys: str) -> None:
-        sample = {"n": int(frames.sum()), "coverage": compare.covered(t[frames], t)}
+        sample = {"n": int(frames.sum()), "coverage": compare.time_coverage(t[frames], t)}
         found.update(dict.fromkeys(keys, sample))
 
     if result.divergence is not None:
@@ -54,7 +54,7 @@ def _of_observations(run: Run, result: Result) -> dict[str, dict[str, float]]:
         "reprojection_common": table[common[table["observation"]]],
     }
     return {
-        key: {"n": len(part), "coverage": compare.covered(t[np.unique(part["frame"])], t)}
+        key: {"n": len(part), "coverage": compare.time_coverage(t[np.unique(part["frame"])], t)}
         for key, part in parts.items()
     }
 
@@ -72,4 +72,6 @@ def _without_time(run: Run, result: Result) -> dict[str, dict[str, float]]:
 def of_truth(run: Run) -> Mapping[str, float] | None:
     """The sample that errors to the truth rest on at best: the frames that have one; None without truth."""
     truth, t = run.problem.sequence.truth, run.problem.sequence.t
-    return None if truth is None else {"n": int(truth.known.sum()), "coverage": compare.covered(t[truth.known], t)}
+    return (
+        None if truth is None else {"n": int(truth.known.sum()), "coverage": compare.time_coverage(t[truth.known], t)}
+    )

@@ -127,7 +127,7 @@ def _estimator(run: Run, result: Result) -> dict[str, Any]:
         "coverage": share_of_time(run.problem.sequence.t, np.isfinite(estimate.world_T_imu[:, 0, 0])),
         "divergence_common": None if result.divergence_common is None else asdict(result.divergence_common),
         "ate_common": None if result.ate_common is None else asdict(result.ate_common),
-        "ate": None if result.truth_aligned is None else compare.summarised(result.truth_aligned["position"]),
+        "ate": None if result.truth_aligned is None else compare.summarized(result.truth_aligned["position"]),
         "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
         "truth": None if result.truth is None else _truth_count(result.truth),
         **evidence_summary(run, result),

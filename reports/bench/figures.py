@@ -162,7 +162,7 @@ def nees_over_time(results: Results, case: str) -> Figure | None:
     figure, (axes,) = sheet(3.9)
     colours, handles, values = _colours(results), [], []
     for name, own in columns.items():
-        table = compare.nees_over_runs(own)
+        table = compare.average_nees(own)
         handles += axes.plot(table.index, table["anees"], color=colours[name], linewidth=1.2, label=plain(name))
         values.append(table["anees"].to_numpy(dtype=np.float64))
         if len(own) == runs:

@@ -26,7 +26,7 @@ def cases(results: Results) -> pd.DataFrame:
             "trust": _least(group["trust"]),
         }
         for metric in METRICS:
-            mean = compare.mean_of(group[metric.name].to_numpy(dtype=np.float64))
+            mean = compare.mean_interval(group[metric.name].to_numpy(dtype=np.float64))
             low, high = max(mean.low, 0.0), min(mean.high, metric.most)
             row |= {metric.name: mean.value, f"{metric.name}_low": low, f"{metric.name}_high": high}
         rows.append(row)
@@ -36,12 +36,12 @@ def cases(results: Results) -> pd.DataFrame:
 
 
 def rankings(results: Results) -> pd.DataFrame:
-    """Estimators ranked in every case by each metric that stands for accuracy: see `compare.ranking`."""
+    """Estimators ranked in every case by each metric that stands for accuracy: see `compare.monte_carlo_ranking`."""
     parts = []
     for case in results.cases:
         for metric in (metric for metric in METRICS if metric.ranked):
             of_case = results.runs[results.runs["case"] == case]
-            ranked = compare.ranking(_wide(of_case, metric.name, results.estimators)).reset_index()
+            ranked = compare.monte_carlo_ranking(_wide(of_case, metric.name, results.estimators)).reset_index()
             if len(ranked):
                 ranked["low"] = ranked["low"].clip(lower=0.0)
                 ranked.insert(0, "metric", metric.name)
@@ -62,7 +62,7 @@ def overall(results: Results) -> pd.DataFrame:
         places = of_metric.reindex(columns=results.estimators).fillna(len(results.estimators))
         if len(places) < 2:
             continue
-        means = {name: compare.mean_of(places[name].to_numpy(dtype=np.float64)) for name in places}
+        means = {name: compare.mean_interval(places[name].to_numpy(dtype=np.float64)) for name in places}
         rows = [
             {
                 "metric": metric,
@@ -87,16 +87,16 @@ def consistency(results: Results) -> pd.DataFrame:
             columns = results.nees.get((case, name))
             if columns is None:
                 continue
-            found = compare.consistency_of(columns)
+            found = compare.anees_summary(columns)
             rows.append({"case": case, "estimator": name, **found._asdict(), "verdict": _judged(found)})
     return pd.DataFrame(rows)
 
 
 def nees_over_time(results: Results) -> pd.DataFrame:
-    """ANEES frame by frame of each case and estimator, with its bounds: see `compare.nees_over_runs`."""
+    """ANEES frame by frame of each case and estimator, with its bounds: see `compare.average_nees`."""
     parts = []
     for (case, name), columns in results.nees.items():
-        table = compare.nees_over_runs(columns).reset_index()
+        table = compare.average_nees(columns).reset_index()
         table.insert(0, "estimator", name)
         table.insert(0, "case", case)
         parts.append(table)
@@ -107,7 +107,7 @@ def costs(results: Results) -> pd.DataFrame:
     """One row per case and estimator: seconds (mean over seeds, interval), ms a frame and the largest peak memory."""
     rows = []
     for (case, estimator), group in results.costs.groupby(["case", "estimator"], sort=False):
-        seconds = compare.mean_of(group["seconds"].to_numpy(dtype=np.float64))
+        seconds = compare.mean_interval(group["seconds"].to_numpy(dtype=np.float64))
         rows.append(
             {
                 "case": case,
@@ -149,7 +149,7 @@ def _least(trust: pd.Series) -> str:
     return next((word for word in ("untrusted", "doubtful", "trusted") if word in found), "")
 
 
-def _judged(found: compare.Consistency) -> str:
+def _judged(found: compare.AneesSummary) -> str:
     if not np.isfinite(found.anees):
         return ""
     if found.anees > found.high:

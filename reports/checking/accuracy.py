@@ -10,7 +10,15 @@ from typing import TypeAlias
 import numpy as np
 import pandas as pd
 
-from fgbaseline.compare import SMALLEST_SAMPLE, Align, Matched, absolute_errors, associate, covered, summarised
+from fgbaseline.compare import (
+    MIN_SAMPLE_SIZE,
+    Align,
+    MatchedTrajectories,
+    absolute_errors,
+    associate,
+    summarized,
+    time_coverage,
+)
 from fgbaseline.compare.limits import Bounds, Outcome
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
 from fgbaseline.data.formats import read_trajectory
@@ -50,7 +58,7 @@ def assert_accuracy(
     divergence_max: float | None = None,
     rotation_deg: float | None = None,
     coverage: float = 0.95,
-    smallest_sample: int = SMALLEST_SAMPLE,
+    smallest_sample: int = MIN_SAMPLE_SIZE,
     align: Align | str = Align.SE3,
     tolerance: float | None = None,
     figure: FilePath | None = None,
@@ -83,7 +91,7 @@ def assert_accuracy(
     aligned = matched.aligned(align)
     tables = {"divergence": absolute_errors(matched), "ate": absolute_errors(aligned)}
     span = _trajectory(reference, "reference").t
-    values = _values(tables, covered(matched.reference.t, span)) | {"pairs": float(len(matched))}
+    values = _values(tables, time_coverage(matched.reference.t, span)) | {"pairs": float(len(matched))}
     figures = [_figure(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
     figures = [each for each in figures if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
     if all(each.outcome is Outcome.HOLDS for each in figures):
@@ -99,7 +107,7 @@ def _require_bounds(asked: dict[str, float | None]) -> None:
             raise InputError(f"accuracy: the limit on {metric} is {limit!r}; give a number of at least 0")
 
 
-def _paired(estimate: AnyTrajectory, reference: AnyTrajectory, tolerance: float | None) -> Matched:
+def _paired(estimate: AnyTrajectory, reference: AnyTrajectory, tolerance: float | None) -> MatchedTrajectories:
     by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
     if any(by_frame) and not all(by_frame):
         raise InputError(
@@ -129,9 +137,9 @@ def _trajectory(path: AnyTrajectory, name: str) -> Trajectory:
 
 
 def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:
-    values = {"coverage": coverage, "rotation.rmse": summarised(tables["ate"]["rotation_deg"])["rmse"]}
+    values = {"coverage": coverage, "rotation.rmse": summarized(tables["ate"]["rotation_deg"])["rmse"]}
     for name, table in tables.items():
-        statistics = summarised(table["translation"])
+        statistics = summarized(table["translation"])
         values |= {f"{name}.rmse": statistics["rmse"], f"{name}.max": statistics["max"]}
     return dict(sorted(values.items()))
 
@@ -142,7 +150,10 @@ def _figure(metric: str, value: float, limit: float) -> Figure:
 
 
 def _drawn(
-    aligned: Matched, tables: dict[str, pd.DataFrame], asked: dict[str, float | None], place: FilePath | None
+    aligned: MatchedTrajectories,
+    tables: dict[str, pd.DataFrame],
+    asked: dict[str, float | None],
+    place: FilePath | None,
 ) -> Path:
     from .accuracy_figure import draw  # matplotlib: only where something fell short
 
@@ -153,7 +164,7 @@ def _drawn(
     return path
 
 
-def _message(figures: Sequence[Figure], aligned: Matched, drawn: Path) -> str:
+def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, drawn: Path) -> str:
     rows = [("limit", "metric", "value", "bound", "margin")]
     for each in figures:
         unit = f" ({each.unit})" if each.unit else ""

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import Matched
+from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
@@ -21,7 +21,7 @@ COLOURS = {"ate": "#0072b2", "divergence": "#d55e00"}
 SAID = {"ate": "aligned", "divergence": "not aligned"}
 
 
-def draw(aligned: Matched, errors: Mapping[str, tuple[pd.DataFrame, float | None]], path: Path) -> None:
+def draw(aligned: MatchedTrajectories, errors: Mapping[str, tuple[pd.DataFrame, float | None]], path: Path) -> None:
     """Draws into the PNG `path`, whose folder is made: both paths, and each table's `translation` with its bound.
 
     `errors` has the tables of `absolute_errors` by what was aligned, and the largest distance allowed, m.
@@ -47,7 +47,7 @@ def draw(aligned: Matched, errors: Mapping[str, tuple[pd.DataFrame, float | None
         file.write(stream.getvalue())
 
 
-def _paths(axes: Axes, aligned: Matched) -> None:
+def _paths(axes: Axes, aligned: MatchedTrajectories) -> None:
     plane = widest_plane(aligned.reference.position)
     here = aligned.reference.position @ plane
     axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=plain(aligned.reference.name))

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
-from fgbaseline.compare import FEWEST_STRETCHES, too_small
+from fgbaseline.compare import MIN_STRETCHES, is_insufficient
 from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile, key_path
@@ -141,11 +141,11 @@ def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shorta
     sample = sample_of(values, limit.metric)
     smallest = limit.smallest_sample or limits.smallest_sample
     coverage = limits.smallest_coverage if limit.smallest_coverage is None else limit.smallest_coverage
-    if sample is None or not too_small(sample, smallest, coverage):
+    if sample is None or not is_insufficient(sample, smallest, coverage):
         return None
-    stretches = int(sample.get("stretches", FEWEST_STRETCHES))
-    if sample["n"] >= smallest and stretches < FEWEST_STRETCHES:
-        return Shortage(stretches, sample.get("coverage"), FEWEST_STRETCHES, coverage)
+    stretches = int(sample.get("stretches", MIN_STRETCHES))
+    if sample["n"] >= smallest and stretches < MIN_STRETCHES:
+        return Shortage(stretches, sample.get("coverage"), MIN_STRETCHES, coverage)
     return Shortage(int(sample["n"]), sample.get("coverage"), smallest, coverage)
 
 

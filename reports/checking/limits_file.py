@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.limits import Better, Bounds
 from fgbaseline.data.toml_file import TomlFile, read_toml
 
@@ -96,9 +96,9 @@ class Limits(_Part):
     """The file."""
 
     reference: Needed = Needed.DOUBTFUL
-    smallest_sample: Count = SMALLEST_SAMPLE
+    smallest_sample: Count = MIN_SAMPLE_SIZE
     """poses, frames, observations: whatever a figure is taken over"""
-    smallest_coverage: Share = SMALLEST_COVERAGE
+    smallest_coverage: Share = MIN_COVERAGE
     """of the time of the estimate; of a run, of the recording"""
     limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
 

@@ -29,7 +29,7 @@ def moved_body(entry: Entry, body_T_other: FloatArray) -> Entry:
         )
     covariance = entry.covariance
     if covariance is not None:
-        covariance = compare.of_other_body(covariance, body_T_other)
+        covariance = compare.covariance_of_body(covariance, body_T_other)
     return replace(entry, trajectory=path.with_poses(path.world_T_body @ body_T_other), covariance=covariance)
 
 
@@ -48,21 +48,21 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     matched = paired(reference, entry.trajectory, settings)
     if matched is None or len(matched) < 2:
         return entry
-    rmse, inverted = compare.rmse_of_inverses(matched)
+    rmse, inverted = compare.rmse_of_inverse_poses(matched)
     if compare.fits_clearly_better(inverted, rmse, least=0.0) and rmse > LEAST_MISFIT * _extent(matched.reference):
         return _remarked(
             entry,
             f"the inverses of its poses fit {reference.name} to {inverted:.3g} m after SE(3) alignment, and they "
             f"themselves to {rmse:.3g} m: it has body_T_world (camera) poses; write their inverses",
         )
-    if compare.are_conjugated(matched):
+    if compare.has_conjugated_orientations(matched):
         return _remarked(
             entry,
             "its orientations fit once transposed: its quaternions are conjugated, as in JPL's convention; write "
             "Hamilton's, with the signs of x, y and z changed",
         )
     found = compare.body_rotation(matched)
-    if found is None or not (compare.is_constant(found) or settings.align_body):
+    if found is None or not (found.is_significant or settings.align_body):
         return entry
     axis = ", ".join(f"{x:.3f}" for x in found.axis)
     said = (

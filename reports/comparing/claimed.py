@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare import Align, Association, CovarianceState, Matched
+from fgbaseline.compare import Align, Association, CovarianceState, MatchedTrajectories
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -31,12 +31,12 @@ class Claimed:
     """what an alignment means for errors and covariances"""
 
 
-def claimed_by(reference: Entry, entry: Entry, matched: Matched) -> Claimed:
+def claimed_by(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> Claimed:
     """What each pair says against a reference that is taken for the truth.
 
     Without an alignment both are as they came. With one, errors and covariances are those of the motion since the
-    first pose, where the covariances are of that kind (see `compare.since_first`): then it does not matter which
-    alignment it is. Other covariances are taken as they are beside the aligned errors. An alignment with a scale
+    first pose, where the covariances are of that kind (see `compare.covariance_since_first`): then it does not matter
+    which alignment it is. Other covariances are taken as they are beside the aligned errors. An alignment with a scale
     scales the covariances.
 
     Raises InputError, saying why, where it would not mean anything: without covariances, between interpolated poses,
@@ -50,9 +50,9 @@ def claimed_by(reference: Entry, entry: Entry, matched: Matched) -> Claimed:
         raise InputError("the reference shares its data with the estimate: compare with the truth for this")
     chosen = np.searchsorted((entry.trajectory.t + matched.offset), matched.estimate.t)
     poses, truth = matched.estimate.world_T_body, matched.reference.world_T_body
-    covariance, remark = compare.scaled(entry.covariance[chosen], matched.alignment.scale), ""
+    covariance, remark = compare.scaled_covariance(entry.covariance[chosen], matched.alignment.scale), ""
     if matched.alignment.kind is not Align.NONE:
-        motions, remark = compare.since_first(poses, covariance), ALIGNED
+        motions, remark = compare.covariance_since_first(poses, covariance), ALIGNED
         if motions is not None:
             poses = compare.align(poses, truth, Align.FIRST_POSE).apply(poses)
             covariance, remark = motions, SINCE_FIRST

@@ -6,7 +6,14 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import DifferenceShares, Matched, Passing, RmseDifference, SegmentErrors, TimeOffset
+from fgbaseline.compare import (
+    ErrorDecomposition,
+    Exceedance,
+    MatchedTrajectories,
+    RmseDifference,
+    SegmentErrors,
+    TimeOffset,
+)
 from fgbaseline.geometry import FloatArray
 
 from .claimed import Claimed
@@ -21,25 +28,25 @@ class Result:
     """One estimate, compared."""
 
     entry: Entry
-    matched: Matched
+    matched: MatchedTrajectories
     """aligned"""
     offset: TimeOffset | None
     """where it was searched for"""
     absolute: pd.DataFrame
     """see `compare.absolute_errors`"""
     departure: pd.DataFrame
-    """see `compare.growing_divergence`: along, across, up, heading, per metre travelled"""
+    """see `compare.divergence_along_path`: along, across, up, heading, per metre travelled"""
     relative: dict[str, pd.DataFrame]
     """by delta, such as `10 m`: see `compare.relative_errors`; those that the path is too short for are missing"""
     segments: SegmentErrors | None
     drift: pd.DataFrame | None
     """see `compare.drift`"""
-    shares: DifferenceShares
+    shares: ErrorDecomposition
     share_intervals: pd.DataFrame
-    """see `compare.share_intervals`"""
+    """see `compare.decomposition_intervals`"""
     bound: float
     """m: 1 % of the path, at most 5 m"""
-    passing: Passing | None
+    passing: Exceedance | None
     """where the position is first farther off than `bound`"""
     statistics: dict[str, pd.DataFrame]
     """of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.compare import Align, Matched, Passing, TimeOffset
+from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -120,7 +120,7 @@ def _compared(
     notes = {} if pixels is None else dict(pixels.notes)
     matched, offset = _matched(reference, entry, kind, up, settings)
     absolute = compare.absolute_errors(matched)
-    departure = compare.growing_divergence(matched, up)
+    departure = compare.divergence_along_path(matched, up)
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:
         absolute[["rotation_deg", "rotation_chord", "pose"]] = np.nan
@@ -140,8 +140,8 @@ def _compared(
         segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
         claimed=_or_note("nees", notes, lambda: claimed_by(reference, entry, _oriented(matched))),
         drift=_or_note("drift", notes, lambda: compare.drift(_oriented(matched), seed=seed)),
-        shares=compare.difference_shares(matched, up),
-        share_intervals=compare.share_intervals(matched, up, seed=seed),
+        shares=compare.error_decomposition(matched, up),
+        share_intervals=compare.decomposition_intervals(matched, up, seed=seed),
         bound=bound,
         passing=_passing(matched, departure, bound, notes),
         statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
@@ -155,7 +155,7 @@ def _compared(
     )
 
 
-def _oriented(matched: Matched) -> Matched:
+def _oriented(matched: MatchedTrajectories) -> MatchedTrajectories:
     """The same. Raises InputError where reference or estimate has positions only."""
     for path in (matched.reference, matched.estimate):
         if not path.oriented:
@@ -163,15 +163,19 @@ def _oriented(matched: Matched) -> Matched:
     return matched
 
 
-def _passing(matched: Matched, departure: pd.DataFrame, bound: float, notes: dict[str, str]) -> Passing | None:
+def _passing(
+    matched: MatchedTrajectories, departure: pd.DataFrame, bound: float, notes: dict[str, str]
+) -> Exceedance | None:
     """Where the estimate leaves the reference; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
-        return compare.first_beyond(departure, bound)
+        return compare.first_exceedance(departure, bound)
     notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
     return None
 
 
-def _relative(matched: Matched, delta: Delta, settings: Settings, notes: dict[str, str]) -> pd.DataFrame | None:
+def _relative(
+    matched: MatchedTrajectories, delta: Delta, settings: Settings, notes: dict[str, str]
+) -> pd.DataFrame | None:
     return _or_note(
         f"relative.{delta.text}",
         notes,
@@ -190,7 +194,7 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
 
 def _matched(
     reference: Entry, entry: Entry, kind: Align | str, up: FloatArray, settings: Settings
-) -> tuple[Matched, TimeOffset | None]:
+) -> tuple[MatchedTrajectories, TimeOffset | None]:
     there, here = reference.trajectory, entry.trajectory
     if there.stamped != here.stamped:
         bare = there if here.stamped else here

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.compare import Alignment, Matched
+from fgbaseline.compare import Alignment, MatchedTrajectories
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -14,7 +14,11 @@ from .entry import Entry
 
 
 def map_of(
-    problem: Problem | None, paths: Mapping[str, FloatArray], reference: Entry, entry: Entry, matched: Matched
+    problem: Problem | None,
+    paths: Mapping[str, FloatArray],
+    reference: Entry,
+    entry: Entry,
+    matched: MatchedTrajectories,
 ) -> pd.DataFrame:
     """`compare.map_difference` of the landmarks of an entry, aligned as its path is, from those of the reference.
 

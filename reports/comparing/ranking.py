@@ -15,7 +15,7 @@ from .spreading import spread
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ranking:
-    """The errors of positions over the moments that all estimates have which take part: see `compare.taking_part`."""
+    """The errors of positions over the moments that all estimates have which take part: see `compare.rankable`."""
 
     at: dict[str, IntArray]
     """by name, nearest first: which of its own pairs of poses are of these moments"""
@@ -53,8 +53,8 @@ def ranking_of(
 
     Stamps within `tolerance` (s) are one moment where the estimates do not have the same ones.
     """
-    chosen = compare.taking_part({name: len(t) for name, t in stamps.items()})
-    at = compare.common_moments({name: stamps[name] for name in chosen}, tolerance)
+    chosen = compare.rankable({name: len(t) for name, t in stamps.items()})
+    at = compare.common_stamps({name: stamps[name] for name in chosen}, tolerance)
     at = {name: index for name, index in at.items() if len(index)}
     there = {name: errors[name].iloc[index] for name, index in at.items()}
     common = {name: spread(error, seed) for name, error in there.items()}

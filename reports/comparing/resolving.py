@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare import Matched
+from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.data import TimeUnit, Trajectory
 from fgbaseline.data.formats import Order, TrajectoryFile
 from fgbaseline.data.formats.shared_clock import Spans, units_in_common
@@ -168,9 +168,11 @@ def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Se
             if matched is None or len(matched) < FEWEST or not (_vary(matched.reference) and _vary(matched.estimate)):
                 return None
             rotations = matched.reference.rotation, matched.estimate.rotation
-            world = compare.world_rotation(matched)
+            world = compare.world_rotation_from_positions(matched)
             cells.append(
-                compare.turning_misfit(*rotations, compare.turning_rotation(*rotations) if world is None else world)
+                compare.rotation_misfit(
+                    *rotations, compare.world_rotation_from_orientations(*rotations) if world is None else world
+                )
             )
         rows.append(cells)
     return np.array(rows)
@@ -181,7 +183,7 @@ def _travel_misfits(each: Resolved, times: Times) -> tuple[float, ...]:
     if len(each.orders) == 1:
         return ()
     paths = [each.trajectory(times, order) for order in each.orders]
-    return tuple(compare.travel_misfit(path.position, path.rotation) for path in paths)
+    return tuple(compare.travel_direction_misfit(path.position, path.rotation) for path in paths)
 
 
 def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[Resolved, int]:
@@ -196,7 +198,7 @@ def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[
     return replace(each, order=order, remarks=(*each.remarks, said)), 1
 
 
-def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> Matched | None:
+def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> MatchedTrajectories | None:
     """The pairs of poses, not aligned; None where there are none (which is reported later) or no orientations."""
     if reference.stamped != estimate.stamped or not (reference.oriented and estimate.oriented):
         return None

@@ -12,8 +12,8 @@ OF_POSES = ("translation", "rotation_deg", "pose", "drift", "shares", "final_m",
 
 
 def coverage(comparison: Comparison, result: Result) -> float:
-    """The share of the reference's time in which there are paired poses: see `compare.covered`."""
-    return compare.covered(result.matched.reference.t, comparison.reference.trajectory.t)
+    """The share of the reference's time in which there are paired poses: see `compare.time_coverage`."""
+    return compare.time_coverage(result.matched.reference.t, comparison.reference.trajectory.t)
 
 
 def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float]]:
@@ -26,7 +26,7 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
     t = matched.estimate.t - matched.offset
 
     def of(stamps: FloatArray) -> dict[str, float]:
-        return {"n": len(stamps), "coverage": compare.covered(stamps, whole)}
+        return {"n": len(stamps), "coverage": compare.time_coverage(stamps, whole)}
 
     found: dict[str, dict[str, float]] = dict.fromkeys(OF_POSES, of(t))
     stretches = {f"relative.{delta}": table for delta, table in result.relative.items()}
@@ -34,7 +34,7 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
         stretches["segments"] = result.segments.table
     for key, table in stretches.items():
         start, end = (t[table[column].to_numpy()] for column in ("start", "end"))
-        found[key] = {"n": len(t), "coverage": compare.spanned(start, end, whole), "stretches": len(table)}
+        found[key] = {"n": len(t), "coverage": compare.interval_coverage(start, end, whole), "stretches": len(table)}
     if result.claimed is not None:
         found["nees"] = of(t[np.isfinite(result.claimed.nees)])
     if result.name in comparison.ranking.at:

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.compare import SegmentErrors
-from fgbaseline.compare.travel import distance_travelled
+from fgbaseline.compare import SegmentErrors, distance_traveled
 
 from ..results.tree import INFINITE, finite, nulls
 from .claimed import Claimed
@@ -46,7 +45,7 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
         "source": path.source,
         "poses": len(path),
         "duration_s": float(path.t[-1] - path.t[0]) if path.stamped else None,
-        "path_m": float(distance_travelled(path.position)[-1]),
+        "path_m": float(distance_traveled(path.position)[-1]),
         "trust": None if trust is None else trust.verdict.name.lower(),
         "reasons": [] if trust is None else list(trust.reasons),
         **_pixels(comparison.reference_pixels),
@@ -156,7 +155,7 @@ def _map(table: pd.DataFrame) -> dict[str, Any]:
     return {
         "n": len(table),
         "median": float(table["distance"].median()),
-        "p95": compare.summarised(table["distance"])["p95"],
+        "p95": compare.summarized(table["distance"])["p95"],
         "median_seen": float(table["seen"].median()),
         "by_depth": by_depth.rename_axis("depth").reset_index().astype({"depth": str}).to_dict(orient="records"),
     }

@@ -4,8 +4,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, RmseDifference, Verdict, too_small
-from fgbaseline.compare.travel import distance_travelled
+from fgbaseline.compare import (
+    MIN_COVERAGE,
+    MIN_SAMPLE_SIZE,
+    RmseDifference,
+    Verdict,
+    distance_traveled,
+    is_insufficient,
+)
 
 from ..formatting import counted, listed, number, per_cent
 from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
@@ -59,13 +65,13 @@ def _too_little(comparison: Comparison) -> list[str]:
     sentences = []
     for name, result in comparison.results.items():
         sample = samples(comparison, result)["translation"]
-        if too_small(sample, SMALLEST_SAMPLE, SMALLEST_COVERAGE):
+        if is_insufficient(sample, MIN_SAMPLE_SIZE, MIN_COVERAGE):
             n, poses = len(result.matched), len(result.entry.trajectory)
             sentences.append(
                 f"Too little to judge {name} by: {number(n)} of its {number(poses)} poses "
                 f"{'has' if n == 1 else 'have'} a partner in {comparison.reference.name}, over "
-                f"{per_cent(sample['coverage'])} of its time; fgbaseline check asks for {SMALLEST_SAMPLE} over "
-                f"{per_cent(SMALLEST_COVERAGE)}."
+                f"{per_cent(sample['coverage'])} of its time; fgbaseline check asks for {MIN_SAMPLE_SIZE} over "
+                f"{per_cent(MIN_COVERAGE)}."
             )
     return sentences
 
@@ -201,8 +207,8 @@ def _lengths(comparison: Comparison) -> list[str]:
     sentences = []
     for result in comparison.results.values():
         matched = result.matched
-        own = float(distance_travelled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
-        path = float(distance_travelled(matched.reference.position)[-1])
+        own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
+        path = float(distance_traveled(matched.reference.position)[-1])
         if not path > 0.0 or number(own) == number(path):
             continue
         than = "longer" if own > path else "shorter"

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import track_chi_square
-from fgbaseline.compare.whitened import judged
+from fgbaseline.compare import evaluated_rows, track_chi_square
 from fgbaseline.reports.comparison import Result, Run
 
 from .frames import log_where_positive
@@ -53,7 +52,7 @@ def _medians(run: Run, panel: Axes, results: list[Result], by: str) -> list[Any]
 def _probabilities(run: Run, panel: Axes, results: list[Result]) -> list[Any]:
     """The share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
     for result in results:
-        tracks = track_chi_square(run.problem, judged(run.problem, result.reprojection))
+        tracks = track_chi_square(run.problem, evaluated_rows(run.problem, result.reprojection))
         p = np.sort(tracks["probability"].dropna().to_numpy())
         share = np.arange(1, len(p) + 1) / max(1, len(p))
         panel.plot(p, 100.0 * share, **{**line(run, result), "label": None})

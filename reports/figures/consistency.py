@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare import chi_square_bounds
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 
@@ -89,7 +89,7 @@ def _ratio(run: Run, part: str) -> dict[str, FloatArray]:
 def _expected(panel: Axes, name: str, run: Run) -> list[Any]:
     """What a consistent estimator shows."""
     if name == "NEES of difference":
-        low, high = (float(limit) for limit in bounds(6.0))
+        low, high = (float(limit) for limit in chi_square_bounds(6.0))
         panel.axhline(6.0, **MIDDLE)
     elif name == "NIS per row":
         counts = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
@@ -97,7 +97,7 @@ def _expected(panel: Axes, name: str, run: Run) -> list[Any]:
         if not seen.any():
             return []
         rows = float(np.median(seen[seen > 0]))
-        low, high = (float(limit) / rows for limit in bounds(rows))
+        low, high = (float(limit) / rows for limit in chi_square_bounds(rows))
         panel.axhline(1.0, **MIDDLE)
     else:
         panel.axhline(1.0, **MIDDLE)

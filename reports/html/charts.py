@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.compare import reprojection_by
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare import chi_square_bounds, reprojection_by
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
 from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM, NEES_BOUNDS
@@ -79,7 +78,7 @@ def _innovation_band(run: Run) -> tuple[float, ...] | None:
     if len(rows) == 0:
         return None
     n = float(np.median(rows))
-    return tuple(float(limit) / n for limit in bounds(n))
+    return tuple(float(limit) / n for limit in chi_square_bounds(n))
 
 
 def _cost(run: Run) -> Iterable[dict[str, Any] | None]:

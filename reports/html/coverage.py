@@ -1,6 +1,6 @@
 """What a run's figures rest on, in words: too little truth, and frames that not every estimator has."""
 
-from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, too_small
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
 from fgbaseline.reports.common_frames import known, same_frames, share_of_time
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.samples import of_truth
@@ -11,13 +11,13 @@ from ..formatting import listed, number, per_cent
 def little_truth_sentences(run: Run) -> list[str]:
     """That the truth is too little to judge by, where it is."""
     sample = of_truth(run)
-    if sample is None or not too_small(sample, SMALLEST_SAMPLE, SMALLEST_COVERAGE):
+    if sample is None or not is_insufficient(sample, MIN_SAMPLE_SIZE, MIN_COVERAGE):
         return []
     n = int(sample["n"])
     return [
         f"Too little truth to judge by: {number(n)} of {number(run.problem.n_frames)} frames "
         f"{'has' if n == 1 else 'have'} one, over {per_cent(sample['coverage'])} of the recording's time; "
-        f"fgbaseline check asks for {SMALLEST_SAMPLE} over {per_cent(SMALLEST_COVERAGE)}."
+        f"fgbaseline check asks for {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}."
     ]
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from fgbaseline.compare.chi_square import bounds
+from fgbaseline.compare import chi_square_bounds
 from fgbaseline.geometry import FloatArray
 
 from ..figures.frames import fit_log, fit_log_or_linear
@@ -105,7 +105,7 @@ def _with_nis(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _band(degrees: float) -> tuple[float, float, float]:
-    low, high = bounds(degrees)
+    low, high = chi_square_bounds(degrees)
     return float(low), degrees, float(high)
 
 

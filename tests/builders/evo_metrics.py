@@ -11,20 +11,21 @@ from evo.core.metrics import APE, RPE, PoseRelation
 from evo.core.metrics import Unit as EvoUnit
 from evo.core.trajectory import PosePath3D, PoseTrajectory3D
 
-from fgbaseline.compare import Align, Difference, Unit
+from fgbaseline.compare import Align, Unit
+from fgbaseline.compare import PoseRelation as Relation
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray
 
 OF_POSES = {
-    Difference.TRANSLATION: PoseRelation.translation_part,
-    Difference.ROTATION: PoseRelation.rotation_angle_rad,
-    Difference.ROTATION_DEG: PoseRelation.rotation_angle_deg,
-    Difference.ROTATION_CHORD: PoseRelation.rotation_part,
-    Difference.POSE: PoseRelation.full_transformation,
+    Relation.TRANSLATION: PoseRelation.translation_part,
+    Relation.ROTATION: PoseRelation.rotation_angle_rad,
+    Relation.ROTATION_DEG: PoseRelation.rotation_angle_deg,
+    Relation.ROTATION_CHORD: PoseRelation.rotation_part,
+    Relation.POSE: PoseRelation.full_transformation,
 }
 OF_MOTIONS = OF_POSES | {
-    Difference.DISTANCE: PoseRelation.point_distance,
-    Difference.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
+    Relation.DISTANCE: PoseRelation.point_distance,
+    Relation.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
 }
 UNITS = {Unit.FRAMES: EvoUnit.frames, Unit.METRES: EvoUnit.meters, Unit.DEGREES: EvoUnit.degrees}
 ALIGNMENTS: dict[str, tuple[Align, int | None]] = {
@@ -51,7 +52,7 @@ def evo_aligned(estimate: FloatArray, reference: FloatArray, alignment: str) -> 
     return path
 
 
-def evo_ape(reference: FloatArray, path: PosePath3D, what: Difference) -> FloatArray:
+def evo_ape(reference: FloatArray, path: PosePath3D, what: Relation) -> FloatArray:
     metric = APE(OF_POSES[what])
     metric.process_data((PosePath3D(poses_se3=list(reference)), path))
     return np.asarray(metric.error)
@@ -59,7 +60,7 @@ def evo_ape(reference: FloatArray, path: PosePath3D, what: Difference) -> FloatA
 
 def evo_rpe(
     reference: FloatArray, path: PosePath3D, delta: float, unit: Unit, all_pairs: bool, from_reference: bool
-) -> Iterator[tuple[Difference, FloatArray]]:
+) -> Iterator[tuple[Relation, FloatArray]]:
     """Each relation's errors; nothing where evo finds no pair. Percentages without those of standing references."""
     goal = PosePath3D(poses_se3=list(reference))
     for what, relation in OF_MOTIONS.items():

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.chi_square import bounds, probability_beyond, share_inside
-from fgbaseline.compare.consistency import CovarianceState
+from fgbaseline.compare.consistency.covariance import CovarianceState
+from fgbaseline.compare.statistics.chi_square import chi_square_bounds, p_value, share_inside_bounds
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
@@ -41,13 +41,13 @@ def test_consistent_runs_stay_in_the_bounds_and_dishonest_ones_do_not() -> None:
 
 
 def test_the_bounds_are_those_of_the_textbook() -> None:
-    low, high = bounds(6.0, 50)
+    low, high = chi_square_bounds(6.0, 50)
     assert (float(low), float(high)) == pytest.approx(tuple(chi2.ppf([0.025, 0.975], 300) / 50))
-    np.testing.assert_allclose(probability_beyond(np.array([3.0, 9.0]), 6.0), chi2.sf([3.0, 9.0], 6))
+    np.testing.assert_allclose(p_value(np.array([3.0, 9.0]), 6.0), chi2.sf([3.0, 9.0], 6))
     drawn = np.random.default_rng(2).chisquare(6, 20000)
-    assert share_inside(drawn, 6.0) == pytest.approx(0.95, abs=0.005)
-    assert share_inside(drawn, 6.0, 0.5) == pytest.approx(0.5, abs=0.01)
-    assert np.isnan(share_inside(np.array([np.nan]), 6.0))
+    assert share_inside_bounds(drawn, 6.0) == pytest.approx(0.95, abs=0.005)
+    assert share_inside_bounds(drawn, 6.0, 0.5) == pytest.approx(0.5, abs=0.01)
+    assert np.isnan(share_inside_bounds(np.array([np.nan]), 6.0))
 
 
 def test_runs_that_end_early_count_where_they_are() -> None:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from fgbaseline import compare
 from fgbaseline.compare import Association
-from fgbaseline.compare.association import nearest_pairs
+from fgbaseline.compare.trajectory.association import nearest_pairs
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 

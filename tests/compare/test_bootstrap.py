@@ -8,9 +8,13 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
-from fgbaseline.compare.block_bootstrap import tails
-from fgbaseline.compare.block_draws import BlockDraws, draw_blocks
-from fgbaseline.compare.block_length import autocovariance, block_length
+from fgbaseline.compare.statistics.block_bootstrap import (
+    BlockDraws,
+    autocovariance,
+    block_length,
+    draw_blocks,
+    percentile_interval,
+)
 from fgbaseline.geometry import FloatArray, InputError
 
 
@@ -240,8 +244,8 @@ def test_the_table_of_statistics_is_named() -> None:
 
 def test_an_interval_leaves_out_the_same_share_at_both_ends() -> None:
     drawn = np.arange(101.0)[:, None] * [1.0, -1.0]
-    np.testing.assert_allclose(tails(drawn, 0.5), [[25.0, -75.0], [75.0, -25.0]])
-    np.testing.assert_allclose(tails(drawn), [[2.5, -97.5], [97.5, -2.5]])
+    np.testing.assert_allclose(percentile_interval(drawn, 0.5), [[25.0, -75.0], [75.0, -25.0]])
+    np.testing.assert_allclose(percentile_interval(drawn), [[2.5, -97.5], [97.5, -2.5]])
     errors, others = np.random.default_rng(4).normal(size=(2, 60))
     wide, narrow = (compare.rmse_difference(errors, others, confidence=c) for c in (0.95, 0.5))
     assert wide.low < narrow.low < narrow.high < wide.high

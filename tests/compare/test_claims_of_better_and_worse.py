@@ -132,7 +132,7 @@ ATE = next(metric for metric in METRICS if metric.name == "ate")
 
 
 def ranked(**columns: list[float]) -> pd.DataFrame:
-    return compare.ranking(pd.DataFrame(columns)).reset_index()
+    return compare.monte_carlo_ranking(pd.DataFrame(columns)).reset_index()
 
 
 @settings(max_examples=40, deadline=None)
@@ -142,14 +142,14 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
     table = pd.DataFrame(1.0 + 0.1 * random.random((runs, 3)), columns=["a", "b", "c"])
     table["b"] += apart
     table["c"] = table["c"].where(random.random(runs) < 0.8)
-    sentence = _winner("drive", compare.ranking(table).reset_index(), ATE, frozenset())
+    sentence = _winner("drive", compare.monte_carlo_ranking(table).reset_index(), ATE, frozenset())
     whole = [name for name in table if table[name].notna().all()]
     means = table[whole].mean()
     first = str(means.idxmin())
     claims = "the least" in sentence
     separated = []
     for name in whole:
-        interval = compare.mean_of((table[name] - table[first]).to_numpy())
+        interval = compare.mean_interval((table[name] - table[first]).to_numpy())
         if name != first and interval.low > 0.0 and number(float(means[name])) != number(float(means[first])):
             separated.append(name)
     assert claims == (len(whole) > 1 and len(separated) == len(whole) - 1 and runs > 1)

@@ -52,7 +52,7 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
     errors = {name: pd.Series(e) for name, (_, e) in drawn.items()}
     stamps = {name: t for name, (t, _) in drawn.items()}
     ranking = ranking_of(errors, stamps, tolerance=0.01, by_products=frozenset(), seed=0)
-    taking_part = figures.taking_part({name: len(t) for name, t in stamps.items()})
+    taking_part = figures.rankable({name: len(t) for name, t in stamps.items()})
     common = set.intersection(*(set(stamps[name].tolist()) for name in taking_part))
     assert ranking.moments == len(common)
     if not common:
@@ -178,7 +178,7 @@ def test_a_run_ranks_over_the_frames_that_all_estimators_have() -> None:
 def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_than_nothing(
     runs: list[list[float]],
 ) -> None:
-    table = figures.ranking(pd.DataFrame(runs, columns=list(NAMES)))
+    table = figures.monte_carlo_ranking(pd.DataFrame(runs, columns=list(NAMES)))
     if len(table):
         alike = table[table["runs"] == table["runs"].iloc[0]]
         assert (alike["behind"].dropna() >= 0.0).all()
@@ -186,7 +186,7 @@ def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_
 
 def test_a_bench_says_of_the_best_that_others_with_fewer_answers_are_below_it() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2]})
-    said = _winner("town", figures.ranking(errors).reset_index(), METRICS[0], frozenset())
+    said = _winner("town", figures.monte_carlo_ranking(errors).reset_index(), METRICS[0], frozenset())
     assert said.startswith("town: the error to truth of sound is")
     assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound there)" in said
 

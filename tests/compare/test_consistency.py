@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.chi_square import bounds, quantile, share_inside
-from fgbaseline.compare.consistency import HELD, CovarianceState, is_positive_definite
+from fgbaseline.compare.consistency.covariance import HELD, CovarianceState, is_positive_definite
+from fgbaseline.compare.statistics.chi_square import chi_square_bounds, chi_square_quantile, share_inside_bounds
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
@@ -133,9 +133,11 @@ def test_a_pose_is_held_up_to_a_variance_and_not_beyond() -> None:
 
 
 def test_bounds_hold_with_the_probability_that_is_asked_for() -> None:
-    low, high = bounds(3.0, 4, 0.5)
+    low, high = chi_square_bounds(3.0, 4, 0.5)
     assert (float(low), float(high)) == pytest.approx(tuple(chi2.ppf([0.25, 0.75], 12) / 4))
-    assert tuple(map(float, bounds(3))) == pytest.approx(tuple(chi2.ppf([0.025, 0.975], 3)))
-    assert float(quantile(0.9, 2)) == pytest.approx(chi2.ppf(0.9, 2))
+    assert tuple(map(float, chi_square_bounds(3))) == pytest.approx(tuple(chi2.ppf([0.025, 0.975], 3)))
+    assert float(chi_square_quantile(0.9, 2)) == pytest.approx(chi2.ppf(0.9, 2))
     # A value that is not finite takes no part; each is held against its own degrees of freedom.
-    assert share_inside(np.array([3.0, 3.0, 300.0, np.nan]), np.array([3.0, 300.0, 300.0, 3.0])) == pytest.approx(2 / 3)
+    assert share_inside_bounds(
+        np.array([3.0, 3.0, 300.0, np.nan]), np.array([3.0, 300.0, 300.0, 3.0])
+    ) == pytest.approx(2 / 3)

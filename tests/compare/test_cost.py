@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fgbaseline.compare.cost import cost
+from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.data import Estimate, HuberKernel, LandmarkPrior, Landmarks, Problem
 from fgbaseline.geometry import se3
 

@@ -24,7 +24,7 @@ def winding(scale: float = 1.0, heading_rate: float = 0.0, noise: float = 0.0, s
     return poses
 
 
-def matched(estimate: FloatArray, reference: FloatArray | None = None) -> compare.Matched:
+def matched(estimate: FloatArray, reference: FloatArray | None = None) -> compare.MatchedTrajectories:
     t = DT * np.arange(len(estimate))
     truth = winding() if reference is None else reference
     return compare.associate(Trajectory(t, truth, "reference"), Trajectory(t, estimate, "estimate"))
@@ -38,7 +38,7 @@ def test_a_wrong_scale_drifts_by_its_percentage_of_every_metre() -> None:
     assert rates.loc["rotation", "value"] == pytest.approx(0.0, abs=1e-9)
     assert rates.loc["translation", "over"] == "1 m"
     end = np.linalg.norm(pair.estimate.position[-1] - pair.reference.position[-1])
-    length = compare.growing_divergence(pair)["travelled"].iloc[-1]
+    length = compare.divergence_along_path(pair)["travelled"].iloc[-1]
     assert rates.loc["end translation", "value"] == pytest.approx(100.0 * end / length)
 
 
@@ -65,18 +65,18 @@ def test_without_stamps_nothing_is_said_per_second() -> None:
 
 
 def test_heading_to_the_left_is_positive_and_grows_as_it_was_made_to() -> None:
-    table = compare.growing_divergence(matched(winding(heading_rate=np.deg2rad(0.5))))
+    table = compare.divergence_along_path(matched(winding(heading_rate=np.deg2rad(0.5))))
     np.testing.assert_allclose(table["heading_deg"], 0.5 * table["t"], atol=1e-9)
     np.testing.assert_allclose(table["rotation_deg"], np.abs(table["heading_deg"]), atol=1e-9)
     down = np.diag([1.0, -1.0, -1.0, 1.0])
     pair = matched(down @ winding(heading_rate=np.deg2rad(0.5)) @ down, down @ winding() @ down)
-    other = compare.growing_divergence(pair, up=(0.0, 0.0, -1.0))
+    other = compare.divergence_along_path(pair, up=(0.0, 0.0, -1.0))
     np.testing.assert_allclose(other["heading_deg"], table["heading_deg"], atol=1e-9)
 
 
 def test_the_parts_of_the_path_add_up() -> None:
-    table = compare.growing_divergence(matched(winding(scale=1.02, heading_rate=0.002)))
-    parts = compare.growth_by_part(table, 8)
+    table = compare.divergence_along_path(matched(winding(scale=1.02, heading_rate=0.002)))
+    parts = compare.divergence_growth(table, 8)
     assert parts["frames"].sum() == N
     squares = (parts["rmse"] ** 2 * parts["frames"]).sum()
     assert squares == pytest.approx((table["position"] ** 2).sum())
@@ -87,20 +87,20 @@ def test_the_parts_of_the_path_add_up() -> None:
     assert parts["from_m"].iloc[0] == 0.0
     assert parts["to_m"].iloc[-1] == table["travelled"].iloc[-1]
     with pytest.raises(InputError, match="a path that stands still cannot be split"):
-        compare.growth_by_part(compare.growing_divergence(matched(winding(), np.tile(np.eye(4), (N, 1, 1)))))
+        compare.divergence_growth(compare.divergence_along_path(matched(winding(), np.tile(np.eye(4), (N, 1, 1)))))
 
 
 def test_the_first_time_beyond_a_bound() -> None:
-    table = compare.growing_divergence(matched(winding(scale=1.02)))
-    passed = compare.first_beyond(table, 1.0)
+    table = compare.divergence_along_path(matched(winding(scale=1.02)))
+    passed = compare.first_exceedance(table, 1.0)
     assert passed is not None
     assert (table["position"].iloc[: passed.frame] <= 1.0).all()
     assert passed.value == table["position"].iloc[passed.frame] > 1.0
     assert passed.t == pytest.approx(passed.frame * DT)
     assert passed.travelled == table["travelled"].iloc[passed.frame]
-    assert compare.first_beyond(table, 1e6) is None
-    turned = compare.growing_divergence(matched(winding(heading_rate=-0.01)))
-    right = compare.first_beyond(turned, 2.0, "heading_deg")
+    assert compare.first_exceedance(table, 1e6) is None
+    turned = compare.divergence_along_path(matched(winding(heading_rate=-0.01)))
+    right = compare.first_exceedance(turned, 2.0, "heading_deg")
     assert right is not None
     assert right.value < -2.0
 
@@ -130,7 +130,7 @@ def test_two_poses_have_their_rates() -> None:
     [({"scale": 1.02}, "scale"), ({"heading_rate": 2e-4}, "heading"), ({"noise": 0.5}, "noise")],
 )
 def test_one_kind_of_error_has_all_of_the_share(wrong: dict[str, float], share: str) -> None:
-    found = compare.difference_shares(matched(winding(**wrong)))
+    found = compare.error_decomposition(matched(winding(**wrong)))
     assert getattr(found, share) > 0.99
     assert found.scale + found.heading + found.noise == pytest.approx(1.0)
     if share == "scale":
@@ -141,10 +141,10 @@ def test_one_kind_of_error_has_all_of_the_share(wrong: dict[str, float], share: 
 
 def test_a_constant_heading_error_is_found_and_first_pose_alignment_takes_it_out() -> None:
     turn = se3.exp([0.0, 0, 0, 0, 0, np.deg2rad(1.0)])
-    found = compare.difference_shares(matched(turn @ winding()))
+    found = compare.error_decomposition(matched(turn @ winding()))
     assert found.heading > 0.9999
     assert found.heading_deg == pytest.approx(1.0, rel=1e-3)
-    aligned = compare.difference_shares(matched(turn @ winding()).aligned("first-pose"))
+    aligned = compare.error_decomposition(matched(turn @ winding()).aligned("first-pose"))
     assert aligned.rms < 1e-9
 
 
@@ -153,7 +153,7 @@ def test_shares_are_shares(seed: int, kind: compare.Align) -> None:
     random = np.random.default_rng(seed)
     reference = se3.compose(se3.exp(random.normal(size=(20, 6))))
     estimate = reference @ se3.exp(0.3 * random.normal(size=(21, 6)))
-    found = compare.difference_shares(matched(estimate, reference).aligned(kind), random.normal(size=3))
+    found = compare.error_decomposition(matched(estimate, reference).aligned(kind), random.normal(size=3))
     assert found.scale + found.heading + found.noise == pytest.approx(1.0)
     assert min(found.scale, found.heading, found.noise) >= -1e-12
 
@@ -163,9 +163,9 @@ def test_shares_are_shares(seed: int, kind: compare.Align) -> None:
     [({"scale": 1.02}, "scale"), ({"heading_rate": 2e-4}, "heading"), ({"noise": 0.5}, "noise")],
 )
 def test_shares_are_sure_where_there_is_one_kind_of_error(wrong: dict[str, float], share: str) -> None:
-    table = compare.share_intervals(matched(winding(**wrong)), repetitions=100)
+    table = compare.decomposition_intervals(matched(winding(**wrong)), repetitions=100)
     assert table.loc[share, "low"] > 0.95
-    assert table.loc[share, "value"] == getattr(compare.difference_shares(matched(winding(**wrong))), share)
+    assert table.loc[share, "value"] == getattr(compare.error_decomposition(matched(winding(**wrong))), share)
 
 
 @given(seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(compare.Align))
@@ -173,7 +173,7 @@ def test_intervals_of_shares_are_shares_and_hold_them(seed: int, kind: compare.A
     random = np.random.default_rng(seed)
     reference = se3.compose(se3.exp(random.normal(size=(20, 6))))
     pair = matched(reference @ se3.exp(0.3 * random.normal(size=(21, 6))), reference).aligned(kind)
-    table = compare.share_intervals(pair, repetitions=20)
+    table = compare.decomposition_intervals(pair, repetitions=20)
     assert (table["low"] <= table["value"]).all()
     assert (table["value"] <= table["high"]).all()
     assert table["low"].min() > -1e-9
@@ -181,19 +181,19 @@ def test_intervals_of_shares_are_shares_and_hold_them(seed: int, kind: compare.A
 
 
 def test_no_difference_has_no_intervals_either() -> None:
-    table = compare.share_intervals(matched(winding()))
+    table = compare.decomposition_intervals(matched(winding()))
     assert table.columns.tolist() == ["value", "low", "high"]
     assert table.index.tolist() == ["scale", "heading", "noise"]
     assert table.isna().all(axis=None)
-    still = compare.share_intervals(matched(winding(), np.tile(np.eye(4), (N, 1, 1))), repetitions=5)
+    still = compare.decomposition_intervals(matched(winding(), np.tile(np.eye(4), (N, 1, 1))), repetitions=5)
     assert still["high"].tolist() == [0.0, 0.0, 1.0]
 
 
 def test_no_difference_has_no_shares_and_a_standing_reference_only_noise() -> None:
-    same = compare.difference_shares(matched(winding()))
+    same = compare.error_decomposition(matched(winding()))
     assert same.rms == 0.0
     assert np.isnan([same.scale, same.heading, same.noise]).all()
-    still = compare.difference_shares(matched(winding(), np.tile(np.eye(4), (N, 1, 1))))
+    still = compare.error_decomposition(matched(winding(), np.tile(np.eye(4), (N, 1, 1))))
     assert (still.scale, still.heading, still.noise) == (0.0, 0.0, 1.0)
     assert still.scale_percent == 0.0
 
@@ -235,11 +235,11 @@ def test_drift_over_a_stretch_that_is_missed_by_half_is_still_told() -> None:
 
 
 def test_growth_is_worked_out_by_hand() -> None:
-    table = compare.growing_divergence(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
+    table = compare.divergence_along_path(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
     assert table.index.name == "frame"
     assert table.columns.tolist()[-2:] == ["t", "percent_of_path"]
     assert table["percent_of_path"].tolist() == pytest.approx([np.nan, 10.0, 10.0, 10.0, 10.0], nan_ok=True)
-    parts = compare.growth_by_part(table, 2)
+    parts = compare.divergence_growth(table, 2)
     assert parts.index.name == "part"
     assert parts.to_dict("list") == {
         "from_m": [0.0, 2.0],
@@ -250,25 +250,25 @@ def test_growth_is_worked_out_by_hand() -> None:
         "per_frame": pytest.approx([0.1, 0.1]),
         "heading_deg": [0.0, 0.0],
     }
-    assert compare.growth_by_part(table, 1)["frames"].tolist() == [5]
-    assert len(compare.growth_by_part(table)) == 10
-    assert compare.growth_by_part(table)["frames"].sum() == 5
+    assert compare.divergence_growth(table, 1)["frames"].tolist() == [5]
+    assert len(compare.divergence_growth(table)) == 10
+    assert compare.divergence_growth(table)["frames"].sum() == 5
     for parts_wanted in (0, -1):
         with pytest.raises(InputError, match="fewer than 1 part"):
-            compare.growth_by_part(table, parts_wanted)
+            compare.divergence_growth(table, parts_wanted)
 
 
 def test_poses_that_are_unknown_take_no_part_in_the_growth() -> None:
-    table = compare.growing_divergence(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
+    table = compare.divergence_along_path(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
     table.loc[3, "position"] = np.nan
-    assert compare.growth_by_part(table, 2)["rmse"].tolist() == pytest.approx([0.005**0.5, 0.1**0.5])
+    assert compare.divergence_growth(table, 2)["rmse"].tolist() == pytest.approx([0.005**0.5, 0.1**0.5])
 
 
 def test_a_bound_that_is_reached_is_not_passed() -> None:
-    table = compare.growing_divergence(matched(ahead([0.0, 1.5, 3.0]), ahead(np.arange(3.0))))
-    assert compare.first_beyond(table, 1.0) is None
-    assert compare.first_beyond(table, 0.5) == compare.Passing(2, 2 * DT, 2.0, 1.0)
-    assert compare.first_beyond(table, 0.0) == compare.Passing(1, DT, 1.0, 0.5)
+    table = compare.divergence_along_path(matched(ahead([0.0, 1.5, 3.0]), ahead(np.arange(3.0))))
+    assert compare.first_exceedance(table, 1.0) is None
+    assert compare.first_exceedance(table, 0.5) == compare.Exceedance(2, 2 * DT, 2.0, 1.0)
+    assert compare.first_exceedance(table, 0.0) == compare.Exceedance(1, DT, 1.0, 0.5)
 
 
 def test_the_table_of_shares_says_how_it_was_drawn() -> None:
@@ -277,16 +277,16 @@ def test_the_table_of_shares_says_how_it_was_drawn() -> None:
         reference = ahead(np.arange(float(n)))
         beside = reference.copy()
         beside[:, 1, 3] = 1.0
-        table = compare.share_intervals(matched(beside, reference), repetitions=3)
+        table = compare.decomposition_intervals(matched(beside, reference), repetitions=3)
         assert table.index.name == "share"
         assert table.attrs == {"block": block, "reliable": reliable}
 
 
 def test_one_pose_has_shares_without_intervals_and_two_have_both() -> None:
-    one = compare.share_intervals(matched(ahead([1.0]), ahead([0.0])))
+    one = compare.decomposition_intervals(matched(ahead([1.0]), ahead([0.0])))
     assert one["value"].tolist() == [0.0, 0.0, 1.0]
     assert one[["low", "high"]].isna().all(axis=None)
-    two = compare.share_intervals(matched(ahead([1.0, 3.0]), ahead([0.0, 1.0])), repetitions=3)
+    two = compare.decomposition_intervals(matched(ahead([1.0, 3.0]), ahead([0.0, 1.0])), repetitions=3)
     assert two[["low", "high"]].notna().all(axis=None)
 
 
@@ -295,7 +295,7 @@ def test_draws_without_any_difference_are_left_out() -> None:
     reference = ahead(np.arange(30.0))
     one_off = reference.copy()
     one_off[7, 1, 3] += 1.0
-    table = compare.share_intervals(matched(one_off, reference), repetitions=50)
+    table = compare.decomposition_intervals(matched(one_off, reference), repetitions=50)
     assert table.notna().all(axis=None)
     assert (table["low"] <= table["value"]).all()
     assert (table["value"] <= table["high"]).all()
@@ -304,7 +304,7 @@ def test_draws_without_any_difference_are_left_out() -> None:
 def test_the_intervals_of_shares_depend_on_the_confidence_and_the_seed() -> None:
     pair = matched(winding(scale=1.001, heading_rate=2e-4, noise=0.5))
     wide, narrow, other = (
-        compare.share_intervals(pair, repetitions=200, confidence=c, seed=s)
+        compare.decomposition_intervals(pair, repetitions=200, confidence=c, seed=s)
         for c, s in ((0.95, 0), (0.5, 0), (0.95, 1))
     )
     assert (wide["low"] <= narrow["low"]).all()

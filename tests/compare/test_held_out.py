@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from fgbaseline import compare, data, diagnosis
-from fgbaseline.compare.held_out import HeldOutErrors, half_errors
+from fgbaseline.compare.residuals.held_out_tracks import HeldOutErrors, cross_prediction_errors
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
@@ -142,7 +142,7 @@ def test_a_spoiled_sight_errs_itself_and_the_half_that_is_predicted_from_it(
     pixel = o.pixel.copy()
     pixel[chosen[spoiled]] += [3.0, 1.0, -1.0, 2.0]
     other = replace(out, observations=data.Observations(o.frame, o.landmark, pixel))
-    before, after = (half_errors(sequence, each, chosen, true_path(), 0.25) for each in (out, other))
+    before, after = (cross_prediction_errors(sequence, each, chosen, true_path(), 0.25) for each in (out, other))
     assert np.flatnonzero(before != after).tolist() == touched
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.statistics import quantile
+from fgbaseline.compare.statistics.descriptive import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.reports import comparison, html
@@ -26,7 +26,7 @@ ERRORS = st.lists(st.sampled_from([0.0, 1.0, 2.5, 40.0, np.inf, np.nan]), max_si
 
 @given(ERRORS)
 def test_infinite_stays_infinite_and_nan_is_counted(errors: list[float]) -> None:
-    summary = compare.summarised(errors)
+    summary = compare.summarized(errors)
     known = [e for e in errors if not np.isnan(e)]
     assert summary["missing"] == len(errors) - len(known)
     for name in ("rmse", "mean", "max"):
@@ -39,14 +39,14 @@ def test_infinite_stays_infinite_and_nan_is_counted(errors: list[float]) -> None
 
 
 def test_one_and_two_infinite_errors_have_no_finite_rmse() -> None:
-    assert compare.summarised([1.0, np.inf, np.inf])["rmse"] == np.inf
+    assert compare.summarized([1.0, np.inf, np.inf])["rmse"] == np.inf
     assert compare.error_statistics([1.0, np.inf, np.inf]).loc["rmse", "value"] == np.inf
-    assert compare.mean_of(np.array([1.0, np.inf]))[:1] == (np.inf,)
+    assert compare.mean_interval(np.array([1.0, np.inf]))[:1] == (np.inf,)
 
 
 @given(ERRORS)
 def test_the_statistics_of_a_series_count_like_its_summary(errors: list[float]) -> None:
-    table, summary = compare.error_statistics(errors, repetitions=3), compare.summarised(errors)
+    table, summary = compare.error_statistics(errors, repetitions=3), compare.summarized(errors)
     assert table.attrs["missing"] == summary["missing"]
     assert table.loc["n", "value"] == len(errors) - summary["missing"]
     for name in ("rmse", "mean", "median", "p95"):
@@ -68,15 +68,15 @@ def test_an_infinite_error_settles_nothing_and_is_not_left_out() -> None:
 
 
 def test_an_infinite_mean_ranks_last_and_two_of_them_tie() -> None:
-    ranked = compare.ranking(pd.DataFrame({"a": [np.inf, np.inf], "b": [1.0, 2.0], "c": [np.inf, 3.0]}))
+    ranked = compare.monte_carlo_ranking(pd.DataFrame({"a": [np.inf, np.inf], "b": [1.0, 2.0], "c": [np.inf, 3.0]}))
     assert ranked.index[0] == "b"
     assert ranked.loc["c", "mean"] == np.inf
-    tie = compare.ranking(pd.DataFrame({"a": [np.inf, 1.0], "c": [np.inf, 1.0]}))
+    tie = compare.monte_carlo_ranking(pd.DataFrame({"a": [np.inf, 1.0], "c": [np.inf, 1.0]}))
     assert tie["tied"].all()
 
 
 def test_an_infinite_nees_is_outside_and_makes_the_mean_infinite() -> None:
-    table = compare.over_runs.nees_over_runs([np.array([6.0, np.inf, np.nan]), np.array([6.0, 6.0, 6.0])])
+    table = compare.average_nees([np.array([6.0, np.inf, np.nan]), np.array([6.0, 6.0, 6.0])])
     assert table["anees"].tolist() == [6.0, np.inf, 6.0]
     assert table["runs"].tolist() == [2, 2, 1]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.compare import Difference, Unit
+from fgbaseline.compare import PoseRelation, Unit
 from fgbaseline.data import Sequence, Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
@@ -32,7 +32,7 @@ def random_pair(seed: int) -> tuple[FloatArray, FloatArray]:
     return reference, se3.exp(random.normal(size=6) * np.repeat([size, 1.0], 3)) @ estimate
 
 
-def matched(reference: FloatArray, estimate: FloatArray) -> compare.Matched:
+def matched(reference: FloatArray, estimate: FloatArray) -> compare.MatchedTrajectories:
     t = 0.1 * np.arange(len(reference))
     return compare.associate(Trajectory(t, reference, "reference"), Trajectory(t, estimate, "estimate"))
 
@@ -51,7 +51,7 @@ def assert_absolute_as_evo(reference: FloatArray, estimate: FloatArray, alignmen
     np.testing.assert_allclose(ours.estimate.world_T_body, np.array(path.poses_se3), rtol=1e-9, atol=1e-9 * size)
     table = compare.absolute_errors(ours)
     for what in OF_POSES:
-        errors = compare.absolute_difference(ours.estimate.world_T_body, ours.reference.world_T_body, what)
+        errors = compare.absolute_pose_error(ours.estimate.world_T_body, ours.reference.world_T_body, what)
         assert_same(errors, evo_ape(reference, path, what), size)
         if what in table:
             np.testing.assert_array_equal(table[what], errors)
@@ -67,8 +67,8 @@ def assert_relative_as_evo(
     n, size = 0, float(np.abs(ours.estimate.position).max())
     for what, errors in evo_rpe(reference, path, delta, unit, all_pairs, mine):
         pairs = compare.matched_pairs(ours, delta, unit, all_pairs=all_pairs, from_reference=mine)
-        own = compare.motion_difference(ours.estimate.world_T_body, ours.reference.world_T_body, pairs, what)
-        assert_same(own[np.isfinite(own)] if what is Difference.DISTANCE_PERCENT else own, errors, size)
+        own = compare.relative_pose_error(ours.estimate.world_T_body, ours.reference.world_T_body, pairs, what)
+        assert_same(own[np.isfinite(own)] if what is PoseRelation.DISTANCE_PERCENT else own, errors, size)
         n = len(pairs)
     if n == 0:
         with pytest.raises(InputError, match="no two of the"):

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fgbaseline import compare
-from fgbaseline.compare import Align, Matched
-from fgbaseline.compare.best_rotation import best_rotation
+from fgbaseline.compare import Align, MatchedTrajectories
+from fgbaseline.compare.trajectory.wahba import solve_wahba
 from fgbaseline.data import Trajectory
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, se3, so3
@@ -50,7 +50,7 @@ def disturbed(poses: FloatArray, seed: int, position: float = 0.1) -> FloatArray
     return wrong
 
 
-def matched(reference: FloatArray, estimate: FloatArray) -> Matched:
+def matched(reference: FloatArray, estimate: FloatArray) -> MatchedTrajectories:
     t = 0.5 * np.arange(len(reference))
     return compare.associate(Trajectory(t, reference, "reference"), Trajectory(t, estimate, "estimate"))
 
@@ -60,7 +60,7 @@ def motion(seed: int, about_up: bool = False) -> FloatArray:
     return se3.exp(random.normal(size=6) * ([5, 5, 5, 0, 0, 2] if about_up else [5, 5, 5, 2, 2, 2]))
 
 
-def all_metrics(pair: Matched, up: FloatArray) -> pd.Series:
+def all_metrics(pair: MatchedTrajectories, up: FloatArray) -> pd.Series:
     """Every figure there is of a pair, under names."""
     parts = {"absolute": compare.absolute_errors(pair)}
     for unit, delta in (("frames", 3), ("s", 1.6), ("m", 1.7), ("deg", 25.0)):
@@ -69,11 +69,11 @@ def all_metrics(pair: Matched, up: FloatArray) -> pd.Series:
                 parts[f"{unit} {every}"] = compare.relative_errors(pair, delta, unit, all_pairs=every)
             except InputError:
                 parts[f"{unit} {every}"] = pd.DataFrame()
-    growth = compare.growing_divergence(pair, up)
-    parts["growth"], parts["by part"] = growth, compare.growth_by_part(growth, 4)
+    growth = compare.divergence_along_path(pair, up)
+    parts["growth"], parts["by part"] = growth, compare.divergence_growth(growth, 4)
     parts["segments"] = compare.segment_errors(pair).table
     parts["drift"] = compare.drift(pair, repetitions=20).select_dtypes("number")
-    shares = compare.difference_shares(pair, up)
+    shares = compare.error_decomposition(pair, up)
     parts["shares"] = pd.DataFrame([{name: getattr(shares, name) for name in shares.__slots__}])
     columns = {f"{name}: {c}": table[c].reset_index(drop=True) for name, table in parts.items() for c in table}
     return pd.concat(columns)
@@ -238,7 +238,7 @@ def test_where_neither_positions_nor_orientations_say_anything_nothing_is_turned
 
 def test_no_vectors_at_all_leave_the_whole_rotation_to_the_tie() -> None:
     turn = so3.exp_so3(np.array([0.1, -0.4, 0.3]))
-    R, axis = best_rotation(np.zeros((3, 3)), lambda: turn, 0.0)
+    R, axis = solve_wahba(np.zeros((3, 3)), lambda: turn, 0.0)
     np.testing.assert_allclose(R, turn, atol=1e-12)
     assert axis is not None
     np.testing.assert_array_equal(axis, np.zeros(3))
@@ -252,7 +252,8 @@ def test_up_is_a_direction_of_any_length(length: float) -> None:
     other = all_metrics(pair.aligned("yaw", up=length * UP), length * UP)
     pd.testing.assert_series_equal(unit, other, rtol=1e-9, atol=1e-9)
     pd.testing.assert_frame_equal(
-        compare.share_intervals(pair, UP, repetitions=5), compare.share_intervals(pair, length * UP, repetitions=5)
+        compare.decomposition_intervals(pair, UP, repetitions=5),
+        compare.decomposition_intervals(pair, length * UP, repetitions=5),
     )
 
 

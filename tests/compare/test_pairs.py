@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare
 from fgbaseline.compare import Unit
-from fgbaseline.compare import pairs as pairs_module
-from fgbaseline.compare.pairs import chained_pairs, nearest_delta_pairs, turned_pairs
+from fgbaseline.compare.trajectory import delta_pairs as pairs_module
+from fgbaseline.compare.trajectory.delta_pairs import chained_pairs, nearest_delta_pairs, turned_pairs
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
@@ -118,13 +118,13 @@ def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
     estimate[1] = estimate[1] @ se3.exp([0, 0, 0, 0, 0, np.pi / 2])
     estimate[2, :3, 3] = [1.0, 2.0, 0.0]
     pairs = np.array([[1, 2]])
-    assert compare.motion_difference(estimate, reference, pairs, "translation") == pytest.approx([1.0])
-    assert compare.motion_difference(estimate, reference, pairs, "rotation_deg") == pytest.approx([90.0])
-    assert compare.motion_difference(estimate, reference, pairs, "distance_percent") == pytest.approx([100.0])
-    assert compare.absolute_difference(estimate, reference, "translation")[2] == pytest.approx(np.sqrt(5.0))
-    assert compare.absolute_difference(estimate, reference, "rotation_chord")[1] == pytest.approx(2.0)
+    assert compare.relative_pose_error(estimate, reference, pairs, "translation") == pytest.approx([1.0])
+    assert compare.relative_pose_error(estimate, reference, pairs, "rotation_deg") == pytest.approx([90.0])
+    assert compare.relative_pose_error(estimate, reference, pairs, "distance_percent") == pytest.approx([100.0])
+    assert compare.absolute_pose_error(estimate, reference, "translation")[2] == pytest.approx(np.sqrt(5.0))
+    assert compare.absolute_pose_error(estimate, reference, "rotation_chord")[1] == pytest.approx(2.0)
     with pytest.raises(ValueError, match="not one of poses, but of motions"):
-        compare.absolute_difference(estimate, reference, "distance_percent")
+        compare.absolute_pose_error(estimate, reference, "distance_percent")
 
 
 def test_a_table_of_motions_says_where_each_begins_and_what_it_spans() -> None:
@@ -186,7 +186,7 @@ def test_every_difference_of_a_pose_is_what_it_says() -> None:
     expected = {"translation": 2.0, "rotation": np.pi / 2, "rotation_deg": 90.0, "rotation_chord": 2.0, "pose": 8**0.5}
     both, reference = np.concatenate([np.eye(4)[None], wrong]), np.tile(np.eye(4), (2, 1, 1))
     for what, value in expected.items():
-        assert compare.absolute_difference(wrong, np.eye(4)[None], what) == pytest.approx([value])
-        assert compare.motion_difference(both, reference, np.array([[0, 1]]), what) == pytest.approx([value])
-    assert compare.motion_difference(both, reference, np.array([[0, 1]]), "distance") == pytest.approx([2.0])
-    assert np.isnan(compare.motion_difference(both, reference, np.array([[0, 1]]), "distance_percent")).all()
+        assert compare.absolute_pose_error(wrong, np.eye(4)[None], what) == pytest.approx([value])
+        assert compare.relative_pose_error(both, reference, np.array([[0, 1]]), what) == pytest.approx([value])
+    assert compare.relative_pose_error(both, reference, np.array([[0, 1]]), "distance") == pytest.approx([2.0])
+    assert np.isnan(compare.relative_pose_error(both, reference, np.array([[0, 1]]), "distance_percent")).all()

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from fgbaseline import compare
-from fgbaseline.compare.shared_data import difference_covariance
+from fgbaseline.compare.consistency.reference_nees import difference_covariance
 from fgbaseline.data import Estimate
 from fgbaseline.ekf import joint_ekf
 from fgbaseline.geometry import FloatArray, se3
@@ -78,7 +78,7 @@ def test_their_nees_is_six_and_adding_the_covariances_would_hide_it() -> None:
     def estimate(name: str, states: FloatArray, covariance: FloatArray) -> Estimate:
         return Estimate(name, se3.exp(states), np.zeros(0, dtype=np.bool_), covariance=np.tile(covariance, (n, 1, 1)))
 
-    result = compare.difference_nees(estimate("f", filtered, P), estimate("s", smoothed, P_ref))
+    result = compare.reference_nees(estimate("f", filtered, P), estimate("s", smoothed, P_ref))
     assert result.comparable.all()
     assert not result.left_out.any()
     low, high = chi2.ppf([0.001, 0.999], 6 * n) / n
@@ -93,11 +93,11 @@ def test_frames_where_the_difference_is_no_covariance_are_counted_and_left_out()
     poses = np.tile(np.eye(4), (4, 1, 1))
     mine = Estimate("f", poses, np.zeros(0, dtype=np.bool_), covariance=np.stack([P, 0.5 * P_ref, P_ref, 0 * P]))
     its = replace(mine, covariance=np.tile(P_ref, (4, 1, 1)))
-    result = compare.difference_nees(mine, its)
+    result = compare.reference_nees(mine, its)
     assert result.comparable.tolist() == [True, True, True, False]
     assert result.left_out.tolist() == [False, True, True, False]
     assert np.isfinite(result.nees).tolist() == [True, False, False, False]
-    assert not compare.difference_nees(replace(mine, covariance=None), its).comparable.any()
+    assert not compare.reference_nees(replace(mine, covariance=None), its).comparable.any()
 
 
 def test_the_jacobian_is_that_of_the_logarithm() -> None:
@@ -114,7 +114,7 @@ def test_a_consistent_filter_is_consistent_with_the_smoother_of_the_same_problem
     values = []
     for seed in range(12):
         problem = plain_problem(Scene(seed=seed, frames=8, n_points=6).sequence())
-        result = compare.difference_nees(joint_ekf(problem), isam2(problem))
+        result = compare.reference_nees(joint_ekf(problem), isam2(problem))
         values += result.nees[2:5].tolist()
     known = np.asarray(values)[np.isfinite(values)]
     assert len(known) > 12

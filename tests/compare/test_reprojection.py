@@ -149,17 +149,17 @@ def test_a_landmark_at_the_camera_is_an_infinite_error_and_no_warning() -> None:
     assert np.isfinite(summary["median"])
 
 
-def test_commonly_used_is_what_all_that_use_any_have_used() -> None:
+def test_used_by_all_is_what_all_that_use_any_have_used() -> None:
     random = np.random.default_rng(3)
     n = len(EXACT.observations)
     a, b = random.random(n) < 0.7, random.random(n) < 0.7
     answer = true_answer(EXACT)
     none = replace(answer, used=np.zeros(n, dtype=np.bool_))
-    common = compare.commonly_used([replace(answer, used=a), none, replace(answer, used=b)])
+    common = compare.used_by_all([replace(answer, used=a), none, replace(answer, used=b)])
     assert common is not None
     np.testing.assert_array_equal(common, a & b)
-    assert compare.commonly_used([none, none]) is None
-    assert compare.commonly_used([]) is None
+    assert compare.used_by_all([none, none]) is None
+    assert compare.used_by_all([]) is None
 
 
 def test_a_point_in_the_camera_plane_counts_as_behind_and_three_pixels_as_far() -> None:
@@ -194,7 +194,7 @@ def test_who_failed_on_the_way_does_not_take_observations_from_the_others() -> N
     answer = true_answer(EXACT)
     half = np.arange(len(EXACT.observations)) % 2 == 0
     failed = replace(answer, used=half, status=Status.FAILED, reason="it failed")
-    common = compare.commonly_used([answer, failed])
+    common = compare.used_by_all([answer, failed])
     assert common is not None
     assert common.all()
-    assert compare.commonly_used([failed]) is None
+    assert compare.used_by_all([failed]) is None

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from fgbaseline import compare, data
-from fgbaseline.compare.residual_patterns import _p95
-from fgbaseline.compare.whitened import whitened_rows
+from fgbaseline.compare.residuals.patterns import _p95
+from fgbaseline.compare.residuals.whitening import whitened_rows
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, se3
@@ -58,7 +58,7 @@ def test_a_point_that_moves_is_found_with_its_speed_and_no_other_is() -> None:
     which, speed = 7, 1.5
     problem = plain_problem(moving(speed, which))
     estimate = true_answer(problem)
-    table = compare.moved_points(problem, estimate, compare.reprojection(problem.sequence, estimate))
+    table = compare.dynamic_landmarks(problem, estimate, compare.reprojection(problem.sequence, estimate))
     assert table.loc[table["moved"], "landmark"].tolist() == [which]
     assert table.loc[table["moved"], "speed"].item() == pytest.approx(speed, rel=0.1)
     assert len(table) == SCENE.n_points
@@ -67,7 +67,7 @@ def test_a_point_that_moves_is_found_with_its_speed_and_no_other_is() -> None:
 def test_points_that_stand_are_not_called_moving() -> None:
     problem = plain_problem(recording())
     estimate = true_answer(problem)
-    table = compare.moved_points(problem, estimate, compare.reprojection(problem.sequence, estimate))
+    table = compare.dynamic_landmarks(problem, estimate, compare.reprojection(problem.sequence, estimate))
     assert not table["moved"].any()
     # position and velocity beside position alone: three degrees of freedom
     assert table["gain"].mean() == pytest.approx(3.0, rel=0.3)
@@ -81,7 +81,7 @@ def test_a_jump_is_not_explained_by_a_motion() -> None:
     pixel[mine] += 8.0 * np.random.default_rng(2).normal(size=(int(mine.sum()), 4))
     problem = plain_problem(with_pixels(sequence, pixel))
     estimate = true_answer(problem)
-    table = compare.moved_points(problem, estimate, compare.reprojection(problem.sequence, estimate))
+    table = compare.dynamic_landmarks(problem, estimate, compare.reprojection(problem.sequence, estimate))
     assert not table["moved"].any()
 
 
@@ -312,10 +312,12 @@ def test_four_sights_can_tell_of_a_motion_and_three_cannot() -> None:
     estimate = true_answer(problem)
     table = compare.reprojection(problem.sequence, estimate)
     few = table[(table["landmark"] > 1) | (table["frame"] < 4 - table["landmark"])]  # 4 sights of 0 and 3 of 1
-    found = compare.moved_points(problem, estimate, few)
+    found = compare.dynamic_landmarks(problem, estimate, few)
     assert found.columns.tolist() == ["landmark", "n", "squared", "gain", "speed", "moved"]
     assert found["landmark"].tolist() == [0, *range(2, SCENE.n_points)]
     assert found["n"].tolist() == [4, *[SCENE.frames] * (SCENE.n_points - 2)]
-    behind = compare.moved_points(problem, estimate, table.assign(depth=np.where(table["landmark"] == 5, 0.0, 1.0)))
+    behind = compare.dynamic_landmarks(
+        problem, estimate, table.assign(depth=np.where(table["landmark"] == 5, 0.0, 1.0))
+    )
     assert 5 not in behind["landmark"].tolist()
     assert len(behind) == SCENE.n_points - 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.compare.segments import fitted_lengths
+from fgbaseline.compare.trajectory.segments import fitted_lengths
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
@@ -52,7 +52,7 @@ def assert_as_devkit(truth: FloatArray, result: FloatArray, found: compare.Segme
         assert row["n"] == len(of_length)
 
 
-def matched(t: FloatArray, truth: FloatArray, result: FloatArray) -> compare.Matched:
+def matched(t: FloatArray, truth: FloatArray, result: FloatArray) -> compare.MatchedTrajectories:
     return compare.associate(Trajectory(t, truth, "truth"), Trajectory(t, result, "result"))
 
 
@@ -84,7 +84,7 @@ def test_on_the_truth_of_other_drives(recordings: Callable[[str], Path], drive: 
     assert sequence.truth is not None
     pair = matched(sequence.t, sequence.truth.world_T_imu, dead_reckoned(sequence))
     found = compare.segment_errors(pair)
-    length = float(compare.growing_divergence(pair)["travelled"].iloc[-1])
+    length = float(compare.divergence_along_path(pair)["travelled"].iloc[-1])
     assert found.official == (length > 100.0)
     assert_as_devkit(pair.reference.world_T_body, pair.estimate.world_T_body, found)
 

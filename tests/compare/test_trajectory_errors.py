@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.travel import distance_travelled, travel_frame
+from fgbaseline.compare.trajectory.path import along_track_frame, distance_traveled
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3
 
@@ -57,8 +57,8 @@ def test_errors_of_random_paths_are_those_of_evo(seed: int, aligned: bool) -> No
     position = evo_statistics(estimate, truth, PoseRelation.translation_part, aligned=aligned)
     rotation = evo_statistics(estimate, truth, PoseRelation.rotation_angle_deg, aligned=aligned)
     for name in STATISTICS:
-        assert compare.summarised(table["position"])[name] == pytest.approx(position[name], abs=1e-9, rel=1e-9)
-        assert compare.summarised(table["rotation_deg"])[name] == pytest.approx(rotation[name], abs=1e-6)
+        assert compare.summarized(table["position"])[name] == pytest.approx(position[name], abs=1e-9, rel=1e-9)
+        assert compare.summarized(table["rotation_deg"])[name] == pytest.approx(rotation[name], abs=1e-6)
 
 
 @pytest.mark.parametrize("path", ["town", "loop", "handheld"])
@@ -72,7 +72,7 @@ def test_errors_of_simulated_drives_are_those_of_evo(path: str) -> None:
             estimate.world_T_imu, sequence.truth.world_T_imu, PoseRelation.translation_part, aligned=aligned
         )
         for name in STATISTICS:
-            assert compare.summarised(table["position"])[name] == pytest.approx(expected[name], abs=1e-9, rel=1e-9)
+            assert compare.summarized(table["position"])[name] == pytest.approx(expected[name], abs=1e-9, rel=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 40), spread=st.floats(1e-3, 1e3))
@@ -160,7 +160,7 @@ def test_no_comparison_changes_or_needs_to_write_its_arguments() -> None:
     compare.component_summary(table)
     compare.reprojection_by(table, "frame")
     assert table.equals(copy)
-    compare.commonly_used([estimate, other])
+    compare.used_by_all([estimate, other])
     compare.nees(estimate, sequence.truth)
     compare.trust(problem, estimate)
     for a, b in zip(arrays, before, strict=True):
@@ -261,7 +261,7 @@ def test_frames_without_truth_take_no_part_in_the_alignment() -> None:
     partly[20:] = np.nan
     table = compare.truth_errors(estimated(estimate), Truth(partly), aligned=True)
     expected = evo_statistics(estimate[:20], truth[:20], PoseRelation.translation_part, aligned=True)
-    assert compare.summarised(table["position"])["rmse"] == pytest.approx(expected["rmse"], rel=1e-12)
+    assert compare.summarized(table["position"])["rmse"] == pytest.approx(expected["rmse"], rel=1e-12)
     assert table["position"].notna().sum() == 20
 
 
@@ -289,7 +289,7 @@ def test_divergence_of_an_estimate_from_itself_is_nothing() -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=50))
 def test_the_summary_of_errors_is_what_numpy_says(errors: list[float]) -> None:
-    summary = compare.summarised([*errors, np.nan])
+    summary = compare.summarized([*errors, np.nan])
     assert summary["rmse"] == pytest.approx(np.sqrt(np.mean(np.square(errors))))
     assert summary["mean"] == pytest.approx(np.mean(errors))
     assert summary["median"] == pytest.approx(np.median(errors))
@@ -298,7 +298,7 @@ def test_the_summary_of_errors_is_what_numpy_says(errors: list[float]) -> None:
 
 
 def test_the_summary_of_no_errors_is_nan_throughout() -> None:
-    summary = compare.summarised([])
+    summary = compare.summarized([])
     assert summary.pop("missing") == 0
     assert all(np.isnan(value) for value in summary.values())
 
@@ -328,7 +328,7 @@ def test_the_summary_of_a_divergence_is_worked_out_by_hand() -> None:
 
 def test_steps_to_and_from_an_unknown_position_count_as_zero() -> None:
     positions = np.array([[0.0, 0, 0], [np.nan, 0, 0], [2.0, 0, 0], [2.0, 3.0, 4.0]])
-    assert distance_travelled(positions).tolist() == [0.0, 0.0, 0.0, 5.0]
+    assert distance_traveled(positions).tolist() == [0.0, 0.0, 0.0, 5.0]
 
 
 def test_a_step_below_a_tenth_of_the_brisk_ones_has_no_direction_of_its_own() -> None:
@@ -336,7 +336,7 @@ def test_a_step_below_a_tenth_of_the_brisk_ones_has_no_direction_of_its_own() ->
     x = [0.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0]
     for creep, forward in ((0.05, [1.0, 0.0, 0.0]), (0.2, [0.0, 1.0, 0.0])):
         y = [0.0, 0.0, 0.0, 0.0, 0.0, creep, 2 * creep, 3 * creep, 4 * creep, 4 * creep + 1.0]
-        directions, left, upward = travel_frame(np.column_stack([x, y, np.zeros(10)]), np.array([0.0, 0.0, 2.0]))
+        directions, left, upward = along_track_frame(np.column_stack([x, y, np.zeros(10)]), np.array([0.0, 0.0, 2.0]))
         np.testing.assert_allclose(directions[6], forward, atol=0.06)
         np.testing.assert_allclose(left[6], np.cross([0.0, 0.0, 1.0], directions[6]), atol=1e-12)
         np.testing.assert_allclose(upward, [0.0, 0.0, 1.0])

@@ -9,9 +9,9 @@ import pytest
 
 from fgbaseline import compare, data, diagnosis, ekf, smoother
 from fgbaseline.compare import Verdict
-from fgbaseline.compare.cost import cost
-from fgbaseline.compare.noise_scale import expected_square, motion_scale, pixel_scale
-from fgbaseline.compare.trust import TrustLimits, _above, _below, offered
+from fgbaseline.compare.residuals.cost import cost
+from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
+from fgbaseline.compare.trust import TrustLimits, _above, _below, expected_observations
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.triangulated import landmarks_along
@@ -146,10 +146,10 @@ def test_the_reasons_are_sorted_by_how_bad_they_are_and_the_first_one_decides() 
 def test_offered_are_the_wanted_observations_but_for_far_points_that_the_problem_excludes() -> None:
     problem = clean()
     d = disparity(problem.sequence.observations.pixel)
-    np.testing.assert_array_equal(offered(problem), problem.mask | (d > 1.0) | (d <= 0.0))
+    np.testing.assert_array_equal(expected_observations(problem), problem.mask | (d > 1.0) | (d <= 0.0))
     few = diagnosis.calibrated(problem.sequence, 10, settings=diagnosis.Calibration())
     wanted = few.excluded != data.Excluded.FEATURE_NOT_CHOSEN
-    np.testing.assert_array_equal(offered(few), few.mask | (((d > 1.0) | (d <= 0.0)) & wanted))
+    np.testing.assert_array_equal(expected_observations(few), few.mask | (((d > 1.0) | (d <= 0.0)) & wanted))
 
 
 @pytest.mark.parametrize("preset", [data.documented, diagnosis.calibrated])
@@ -159,7 +159,7 @@ def test_no_estimator_uses_more_than_was_offered(preset: Callable[[data.Sequence
     pixel[::3, 2:] = pixel[::3, :2] - [0.5, 0.0]  # a third of the points is far away
     problem = preset(with_pixels(far, pixel))
     for estimate in (smoother.isam2(problem), ekf.ekf(problem)):
-        assert not (estimate.used & ~offered(problem)).any()
+        assert not (estimate.used & ~expected_observations(problem)).any()
         share = next(r for r in compare.trust(problem, estimate).reasons if "far points aside" in r)
         assert float(share.split("%")[0].split()[-1]) <= 100.0
 
@@ -285,7 +285,7 @@ def test_intervals_that_nothing_ties_are_told() -> None:
 def test_what_was_found_is_said_in_figures() -> None:
     problem = clean()
     pixel, motion = pixel_scale(problem, reference()), motion_scale(problem, reference())
-    share = reference().used.sum() / offered(problem).sum()
+    share = reference().used.sum() / expected_observations(problem).sum()
     assert set(compare.trust(problem, reference()).reasons) == {
         f"normalized pixel residual RMS {pixel:.2g} (expected 1, robust)",
         f"normalized motion residual RMS {motion:.2g} (expected at most 1)",
@@ -315,4 +315,4 @@ def test_a_disparity_of_one_pixel_is_not_above_it() -> None:
     pixel[2], pixel[3] = [100.0, 50.0, 100.0, 50.0], [100.0, 50.0, 99.5, 50.0]
     problem = plain_problem(with_pixels(sequence, pixel))
     nothing = replace(problem, excluded=np.full_like(problem.excluded, data.Excluded.DISPARITY))
-    assert offered(nothing)[:4].tolist() == [False, True, True, False]
+    assert expected_observations(nothing)[:4].tolist() == [False, True, True, False]

@@ -38,7 +38,7 @@ def noisy(sequence: Sequence) -> Sequence:
 def ate(estimate: Estimate, sequence: Sequence) -> float:
     """RMSE of position after SE(3) alignment, m."""
     assert sequence.truth is not None
-    return compare.summarised(compare.truth_errors(estimate, sequence.truth, aligned=True)["position"])["rmse"]
+    return compare.summarized(compare.truth_errors(estimate, sequence.truth, aligned=True)["position"])["rmse"]
 
 
 def assert_covariances(covariances: FloatArray) -> None:

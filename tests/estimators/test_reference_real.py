@@ -17,7 +17,7 @@ Recordings = Callable[[str], Path]
 def ate(problem: Problem, estimate: Estimate) -> float:
     truth = problem.sequence.truth
     assert truth is not None
-    return compare.summarised(compare.truth_errors(estimate, truth, aligned=True)["position"])["rmse"]
+    return compare.summarized(compare.truth_errors(estimate, truth, aligned=True)["position"])["rmse"]
 
 
 def errors(problem: Problem) -> tuple[float, float]:

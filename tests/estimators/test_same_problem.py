@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fgbaseline.compare.cost import cost, pixel_squares
+from fgbaseline.compare.residuals.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
 from fgbaseline.diagnosis.windows.residuals import WindowData, joined, pixel_terms
 from fgbaseline.ekf.joint.gating import gate_observations

@@ -72,7 +72,7 @@ def test_fewer_than_30_poses_or_half_of_the_time_cannot_be_told(n: int, every: i
 
 def test_a_slow_truth_under_a_fast_estimate_is_enough() -> None:
     t = 0.005 * np.arange(200 * 60)
-    assert figures.covered(t[::200], t) == pytest.approx(1.0, abs=0.02)
+    assert figures.time_coverage(t[::200], t) == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_smallest_sample_and_coverage_are_settable_for_the_file_and_for_a_limit(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data, diagnosis, smoother
-from fgbaseline.compare.cost import cost
+from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.data import HuberKernel
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.simulate.settings import PathName

@@ -1,0 +1,73 @@
+"""Normalized estimation error squared (NEES) of poses (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4).
+
+The error is e = log(T^-1 T_true) (T, 6), the right perturbation [v, w] (m, rad) in the body frame of the estimated
+pose, to which the covariance belongs. No alignment precedes it: every estimate starts at the true first pose.
+"""
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data import Estimate, Truth
+from fgbaseline.geometry import FloatArray, se3
+
+from .covariance import CovarianceState, covariance_state
+
+PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
+
+
+def mahalanobis_squared(error: FloatArray, P: FloatArray) -> FloatArray:
+    """Squared Mahalanobis norm e^T P^-1 e (n,) of errors (n, d) with positive definite covariances (n, d, d)."""
+    scale = np.sqrt(np.einsum("nii->ni", P))
+    C = P / (scale[:, :, None] * scale[:, None, :])
+    scaled = error / scale
+    return np.asarray(np.einsum("ni,ni->n", scaled, np.linalg.solve(C, scaled[:, :, None])[:, :, 0]))
+
+
+def body_error(estimate: Estimate, truth: Truth) -> FloatArray:
+    """Error e = log(T^-1 T_true) (T, 6), [v, w] in m and rad, in the estimated body frame; NaN without a pose."""
+    error = np.full((len(estimate.world_T_imu), 6), np.nan)
+    k = np.flatnonzero(truth.known & np.isfinite(estimate.world_T_imu).all(axis=(1, 2)))
+    error[k] = se3.log(se3.inverse(estimate.world_T_imu[k]) @ truth.world_T_imu[k])
+    return error
+
+
+def nees(estimate: Estimate, truth: Truth) -> FloatArray:
+    """Normalized estimation error squared e^T P^-1 e (T,) of each pose, e = log(T^-1 T_true) in the body frame, [v, w].
+
+    Its mean is 6 for a consistent estimator. NaN without truth, pose or positive definite covariance (the first pose
+    is held). Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+    """
+    return nees_table(estimate, truth)["pose"].to_numpy()
+
+
+def nees_table(estimate: Estimate, truth: Truth) -> pd.DataFrame:
+    """NEES by frame of the `pose` (6 degrees of freedom), its `position` and its `rotation` (3 each)."""
+    table = pd.DataFrame(
+        np.nan, index=pd.RangeIndex(len(estimate.world_T_imu), name="frame"), columns=["pose", *PARTS], dtype=np.float64
+    )
+    k = np.flatnonzero((covariance_state(estimate) == CovarianceState.POSITIVE_DEFINITE) & truth.known)
+    if estimate.covariance is None or len(k) == 0:
+        return table
+    error, P = body_error(estimate, truth)[k], estimate.covariance[k]
+    table.loc[k, "pose"] = mahalanobis_squared(error, P)
+    for name, part in PARTS.items():
+        table.loc[k, name] = mahalanobis_squared(error[:, part], P[:, part, part])
+    return table
+
+
+def sigma_ratio(estimate: Estimate, reference: Estimate) -> pd.DataFrame:
+    """Ratio of an estimate's sigma to the reference's, one row per frame: `position` and `rotation`.
+
+    sqrt(tr P / tr P_ref) of the 3x3 blocks, each in its own body frame (the trace does not depend on it). At least 1
+    for a filter against a smoother; below 1 it is overconfident. NaN where either has no positive definite covariance.
+    """
+    table = pd.DataFrame(
+        np.nan, index=pd.RangeIndex(len(estimate.world_T_imu), name="frame"), columns=list(PARTS), dtype=np.float64
+    )
+    sound = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
+    k = np.flatnonzero(sound[0] & sound[1])
+    if estimate.covariance is not None and reference.covariance is not None:
+        for name, part in PARTS.items():
+            P, P_ref = (np.einsum("tii->t", c[k, part, part]) for c in (estimate.covariance, reference.covariance))
+            table.loc[k, name] = np.sqrt(P / P_ref)
+    return table

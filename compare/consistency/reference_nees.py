@@ -1,0 +1,67 @@
+"""NEES of the difference from a reference on the same data, whose covariance is P - P_ref."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data import Estimate
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import FloatArray, se3
+
+from .covariance import CovarianceState, covariance_state, is_positive_definite
+from .nees import mahalanobis_squared
+
+NEGLIGIBLE = 1e-6
+"""of the filter's own variance: below it the difference has no variance in a direction"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ReferenceNees:
+    """NEES of the difference of an estimate from the reference."""
+
+    nees: FloatArray
+    """d^T (P - P_ref)^-1 d (T,); NaN where it is undefined"""
+    comparable: BoolArray
+    """frames (T,) in which both have a pose and a positive definite covariance"""
+
+    @property
+    def left_out(self) -> BoolArray:
+        """Comparable frames (T,) in which P - P_ref is not positive definite."""
+        return np.asarray(self.comparable & np.isnan(self.nees), dtype=np.bool_)
+
+
+def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
+    """NEES of d = log(T^-1 T_ref), in the body frame of the estimate, with the covariance of the difference.
+
+    A filter and the smoother use the same data, so their errors are correlated. Under one linear Gaussian model the
+    smoother's error is uncorrelated with the difference d, and cov(d) = P - P_ref (Rauch, Tung and Striebel, 1965).
+    P_ref is transformed to the frame of the estimate's pose. Frames in which P - P_ref is not positive definite, where
+    the two do not share one model, are `left_out`. The mean is 6 for a filter that is consistent with the reference;
+    errors common to both do not show.
+    """
+    T = len(estimate.world_T_imu)
+    sound = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
+    result = ReferenceNees(np.full(T, np.nan), np.asarray(sound[0] & sound[1], dtype=np.bool_))
+    k = np.flatnonzero(result.comparable)
+    if estimate.covariance is None or reference.covariance is None or len(k) == 0:
+        return result
+    d = se3.log(se3.inverse(estimate.world_T_imu[k]) @ reference.world_T_imu[k])
+    P, J = estimate.covariance[k], se3.inverse_right_jacobian(d)
+    difference = difference_covariance(P, J @ reference.covariance[k] @ np.swapaxes(J, 1, 2))
+    positive = np.isfinite(difference).all(axis=(1, 2))
+    result.nees[k[positive]] = mahalanobis_squared(d[positive], difference[positive])
+    return result
+
+
+def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
+    """Difference P - P_ref (n, d, d) of positive definite covariances; NaN where it is not positive definite.
+
+    Judged by the eigenvalues of L^-1 (P - P_ref) L^-T with P = L L^T: the share of the filter's variance that the
+    reference removes in each direction. A share up to `NEGLIGIBLE` counts as zero.
+    """
+    P, P_ref = 0.5 * (P + np.swapaxes(P, 1, 2)), 0.5 * (P_ref + np.swapaxes(P_ref, 1, 2))
+    difference = P - P_ref
+    inverse = np.linalg.inv(np.linalg.cholesky(P))
+    share = np.linalg.eigvalsh(inverse @ difference @ np.swapaxes(inverse, 1, 2))[:, 0]
+    difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
+    return np.asarray(difference, dtype=np.float64)

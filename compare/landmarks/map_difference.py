@@ -1,0 +1,88 @@
+"""Difference of two landmark maps, matched by landmark index."""
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data import Estimate, Sequence
+from fgbaseline.data.observations import IntArray
+from fgbaseline.geometry import se3
+
+from ..consistency.covariance import is_positive_definite
+from ..consistency.nees import mahalanobis_squared
+from ..consistency.reference_nees import difference_covariance
+from ..residuals.patterns import DEPTHS, depth_classes
+
+
+def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
+    """Difference of each landmark that both maps have and a frame with both poses observes, one row per `landmark`:
+
+    `distance` in the world, m, drift of the paths included; `seen`, the distance of the two points in their own camera
+    frames at the observation nearest to the reference's camera, m, free of drift; `depth` of the reference's point
+    there, m; `sigmas`, the Mahalanobis norm sqrt(d^T (P - P_ref)^-1 d) of the world difference, as the two share their
+    data. `sigmas` is NaN without covariances, and `left_out` where P - P_ref is not positive definite. For a consistent
+    pair the square of `sigmas` is chi-square with 3 degrees of freedom.
+    """
+    index, mine, its = np.intersect1d(estimate.landmarks.index, reference.landmarks.index, return_indices=True)
+    frame = _nearest_observation(sequence, estimate, reference)[index]
+    known = (frame >= 0) & ~np.isnan(estimate.landmarks.position[mine]).any(axis=1)
+    index, mine, its, frame = index[known], mine[known], its[known], frame[known]
+    p, q = estimate.landmarks.position[mine], reference.landmarks.position[its]
+    with np.errstate(invalid="ignore"):  # a landmark at infinity
+        p_cam, q_cam = (
+            se3.transform(se3.inverse(e.world_T_imu[frame] @ sequence.imu_T_cam), x)
+            for e, x in ((estimate, p), (reference, q))
+        )
+    sigmas, left_out = np.full(len(index), np.nan), np.zeros(len(index), dtype=np.bool_)
+    if estimate.landmarks.covariance is not None and reference.landmarks.covariance is not None:
+        P, Q = estimate.landmarks.covariance[mine], reference.landmarks.covariance[its]
+        sound = np.flatnonzero(np.isfinite(P).all(axis=(1, 2)) & np.isfinite(Q).all(axis=(1, 2)))
+        sound = sound[is_positive_definite(P[sound]) & is_positive_definite(Q[sound])]
+        D = difference_covariance(P[sound], Q[sound])
+        positive = np.isfinite(D).all(axis=(1, 2))
+        left_out[sound[~positive]] = True
+        sigmas[sound[positive]] = np.sqrt(mahalanobis_squared((p - q)[sound[positive]], D[positive]))
+    return pd.DataFrame(
+        {
+            "landmark": index,
+            "distance": np.linalg.norm(p - q, axis=1),
+            "seen": np.where(np.isinf(p).any(axis=1), np.inf, np.linalg.norm(p_cam - q_cam, axis=1)),
+            "depth": q_cam[:, 2],
+            "sigmas": sigmas,
+            "left_out": left_out,
+        }
+    )
+
+
+def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
+    """Medians of a `map_difference` by depth class: `n`, `distance`, `seen`, `sigmas` and the number `with_sigmas`.
+
+    Rows are named by their edges in m; points behind the camera belong to none.
+    """
+    groups = table.groupby(pd.cut(table["depth"], DEPTHS, labels=depth_classes(), right=False), observed=False)
+    return pd.DataFrame(
+        {
+            "n": groups.size(),
+            **{column: groups[column].median() for column in ("distance", "seen", "sigmas")},
+            "with_sigmas": groups["sigmas"].count(),
+        }
+    )
+
+
+def _nearest_observation(sequence: Sequence, estimate: Estimate, reference: Estimate) -> IntArray:
+    """Frame (N,) that observes each landmark from nearest on the reference's path; -1 where none does.
+
+    Over frames in which both have a pose; landmarks that the reference lacks have none.
+    """
+    o = sequence.observations
+    position = np.full((sequence.n_landmarks, 3), np.nan)
+    position[reference.landmarks.index] = reference.landmarks.position
+    both = np.isfinite(estimate.world_T_imu[:, 0, 0]) & np.isfinite(reference.world_T_imu[:, 0, 0])
+    centre = (reference.world_T_imu @ sequence.imu_T_cam)[:, :3, 3]
+    with np.errstate(invalid="ignore"):
+        distance = np.linalg.norm(position[o.landmark] - centre[o.frame], axis=1)
+    distance[~both[o.frame]] = np.nan
+    seen = np.flatnonzero(np.isfinite(distance))
+    seen = seen[np.argsort(-distance[seen], kind="stable")]  # the last write wins: the nearest
+    frame = np.full(sequence.n_landmarks, -1, dtype=np.int64)
+    frame[o.landmark[seen]] = o.frame[seen]
+    return frame

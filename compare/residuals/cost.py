@@ -1,0 +1,53 @@
+"""Cost of a problem at an estimate: half the sum of squared whitened residuals, in numpy only."""
+
+import numpy as np
+
+from fgbaseline.data import Estimate, Problem
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import FloatArray, se3
+
+from .reprojection import ROWS, reprojection
+
+
+def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
+    """Half the sum of squared whitened residuals over the observations `taken` (n,) of the sequence's.
+
+    Pixels under the problem's kernel, plus motion increments and landmark priors; NaN where the estimate lacks a pose
+    or a landmark of `taken`. The prior of the first pose is left out, since that pose is held.
+    """
+    table = reprojection(problem.sequence, estimate)
+    table = table[taken[table["observation"].to_numpy()]]
+    if len(table) < taken.sum():
+        return float("nan")
+    squared = problem.measurement.loss(pixel_squares(problem, table[list(ROWS)].to_numpy()))
+    return 0.5 * float(
+        squared.sum() + motion_squares(problem, estimate).sum() + prior_squares(problem, estimate, taken)
+    )
+
+
+def pixel_squares(problem: Problem, residual: FloatArray) -> FloatArray:
+    """Squared whitened norms (n,) of residuals (n, 4) in px, over the three rows (uL, uR, (vL + vR) / 2)."""
+    return np.asarray(np.sum(problem.measurement.whitened(residual) ** 2, axis=1))
+
+
+def motion_squares(problem: Problem, estimate: Estimate) -> FloatArray:
+    """Squared whitened norms (T-1,) of `motion_residuals`."""
+    residual = motion_residuals(problem, estimate)
+    whitened = np.linalg.solve(problem.increment_covariance, residual[:, :, None])[:, :, 0]
+    return np.asarray(np.einsum("ti,ti->t", residual, whitened))
+
+
+def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:
+    """Motion residuals log(exp(increment)^-1 T_k^-1 T_(k+1)) (T-1, 6), [v, w] in m and rad."""
+    return se3.log(se3.inverse(se3.exp(problem.increment)) @ se3.relative(estimate.world_T_imu))
+
+
+def prior_squares(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
+    """Sum of squared whitened prior residuals of the landmarks in the observations `taken` (n,)."""
+    prior = problem.landmark_prior
+    if prior is None:
+        return 0.0
+    index = np.unique(problem.sequence.observations.landmark[taken])
+    position = estimate.landmarks.position[np.searchsorted(estimate.landmarks.index, index)]
+    apart = position - prior.mean[problem.feature_row(index)]
+    return float(np.einsum("mi,ij,mj->", apart, np.linalg.inv(prior.covariance), apart))

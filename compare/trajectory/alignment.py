@@ -1,0 +1,182 @@
+"""Alignment of an estimate to a reference in closed form: first pose, yaw, SE(3), Sim(3) (Umeyama, 1991)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fgbaseline.data.plural import plural
+from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
+
+from .wahba import solve_wahba, solve_wahba_about_axis
+
+
+class Align(StrEnum):
+    """Group of transformations by which an estimate is aligned."""
+
+    NONE = "none"
+    FIRST_POSE = "first-pose"
+    """the transformation that maps its first pose to the reference's"""
+    YAW = "yaw"
+    """rotation about up and translation, the unobservable directions of visual-inertial estimation"""
+    SE3 = "se3"
+    SIM3 = "sim3"
+    """scale as well, for a monocular camera"""
+
+
+_CAPTIONS = {
+    Align.NONE: "not aligned",
+    Align.FIRST_POSE: "the first pose put on the reference's",
+    Align.YAW: "yaw and position aligned",
+    Align.SE3: "SE(3)-aligned",
+    Align.SIM3: "Sim(3)-aligned",
+}
+EVERY_ROTATION = "every rotation"
+SCALE = "scale"
+YAW = "yaw"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Alignment:
+    """Transformation p -> scale * rotation @ p + translation, and the pairs that determine it."""
+
+    kind: Align = Align.NONE
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    """(3, 3) `reference_R_estimate`"""
+    translation: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """(3,) m"""
+    scale: float = 1.0
+    n: int = 0
+    """number of pose pairs used"""
+    of: int = 0
+    """number of pose pairs available"""
+    free: tuple[str, ...] = ()
+    """directions that the positions leave undetermined; the orientations determine them"""
+
+    @property
+    def matrix(self) -> FloatArray:
+        """(4, 4) `reference_T_estimate`; its upper left block is scale * rotation."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.scale * self.rotation, self.translation
+        return T
+
+    def apply(self, poses: FloatArray) -> FloatArray:
+        """Transformed copies of poses (n, 4, 4): positions scaled, rotated and translated, orientations rotated."""
+        if self.kind is Align.NONE:
+            return poses.copy()
+        moved = np.empty_like(poses)
+        moved[:, 3] = poses[:, 3]
+        moved[:, :3, :3] = self.rotation @ poses[:, :3, :3]
+        moved[:, :3, 3] = self.scale * (poses[:, :3, 3] @ self.rotation.T) + self.translation
+        return moved
+
+    @property
+    def caption(self) -> str:
+        """Alignment for a table's caption: 'SE(3)-aligned over all 120 poses'."""
+        said = _CAPTIONS[self.kind]
+        if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
+            said += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
+        if self.kind is Align.SIM3:
+            said += f" (scale {self.scale:.6g})"
+        if self.free:
+            said += f"; their positions leave {' and '.join(self.free)} open"
+        return said
+
+
+def align(
+    estimate: FloatArray,
+    reference: FloatArray,
+    kind: Align | str,
+    *,
+    first: int | None = None,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+) -> Alignment:
+    """Transformation of this kind that aligns paired positions of poses (n, 4, 4) to the reference's (n, 4, 4).
+
+    Least squares in closed form (Umeyama, 1991; for yaw Zhang and Scaramuzza, 2018), never a reflection, over the
+    `first` pairs or all. Where the positions leave directions open (a straight line, standing still, a mirror image),
+    the equally good transformation that brings the orientations nearest to the reference's is taken, which is
+    independent of the frame. `up` (3,) is up in the reference's world, for yaw. Raises InputError for a kind that does
+    not exist, no pairs, or a `first` that is not between 1 and n.
+    """
+    try:
+        kind = Align(kind)
+    except ValueError as error:
+        known = ", ".join(Align)
+        raise InputError(f"alignment: {str(kind)!r} is none; choose one of {known}") from error
+    if len(estimate) == 0 or estimate.shape != reference.shape:
+        raise FgbaselineError(f"alignment needs paired poses, got {estimate.shape} and {reference.shape}")
+    n = len(estimate)
+    if first is not None and not 1 <= first <= n:
+        raise InputError(f"alignment: there are {n} pairs of poses, the first {first} cannot be taken")
+    if kind is Align.NONE:
+        return Alignment(n=0, of=n)
+    used = 1 if kind is Align.FIRST_POSE else (first or n)
+    there, here = estimate[:used], reference[:used]
+
+    def orientation_moment() -> FloatArray:
+        return _side_by_side(here) @ _side_by_side(there).T
+
+    if kind is Align.FIRST_POSE:
+        R = orientation_moment()
+        return Alignment(kind, R, here[0, :3, 3] - R @ there[0, :3, 3], 1.0, 1, n)
+    return _fitted(there[:, :3, 3], here[:, :3, 3], orientation_moment, kind, np.asarray(up, dtype=np.float64), n)
+
+
+def _side_by_side(poses: FloatArray) -> FloatArray:
+    """Rotations of poses (n, 4, 4) side by side (3, 3n): for two of these, A @ B.T is the sum of R_a R_b^T."""
+    return poses[:, :3, :3].transpose(1, 0, 2).reshape(3, -1)
+
+
+def _fitted(
+    there: FloatArray,
+    here: FloatArray,
+    orientation_moment: Callable[[], FloatArray],
+    kind: Align,
+    up: FloatArray,
+    n: int,
+) -> Alignment:
+    there, here = np.ascontiguousarray(there), np.ascontiguousarray(here)
+    centre, goal = there.mean(axis=0), here.mean(axis=0)
+    x, y = there - centre, here - goal
+    M = y.T @ x
+    # Rounding of a square that should be zero: positions far from the origin keep fewer digits.
+    rounding = 8 * np.finfo(np.float64).eps * (np.abs(there).max() + np.abs(here).max()) * len(x)
+    floor = rounding * max(float(np.abs(x).max()), float(np.abs(y).max())) + np.finfo(np.float64).tiny
+    free: tuple[str, ...]
+    if kind is Align.YAW:
+        R, yaw_is_free = solve_wahba_about_axis(up / np.linalg.norm(up), M, orientation_moment, floor)
+        free = (YAW,) if yaw_is_free else ()
+    else:
+        R, axis = solve_wahba(M, orientation_moment, floor)
+        free = _free_rotation(axis)
+    scale, along, spread = 1.0, float(np.sum(R * M)), float(np.sum(x**2))
+    if kind is Align.SIM3 and min(along, spread) > floor:
+        scale = along / spread
+    elif kind is Align.SIM3:
+        free = (*free, SCALE)
+    return Alignment(kind, R, goal - scale * R @ centre, scale, len(x), n, free)
+
+
+def _free_rotation(axis: FloatArray | None) -> tuple[str, ...]:
+    if axis is None:
+        return ()
+    if not axis.any():
+        return (EVERY_ROTATION,)
+    return (f"the rotation about ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f})",)
+
+
+def align_se3(positions: FloatArray, reference: FloatArray) -> FloatArray:
+    """SE(3) alignment `reference_T_estimate` (4, 4) of paired positions (n, 3), m, in the least-squares sense.
+
+    As `align`, but without orientations: undetermined directions take the smallest of the equally good rotations.
+    Raises FgbaselineError for no pairs or NaN.
+    """
+    if len(positions) == 0 or positions.shape != reference.shape:
+        raise FgbaselineError(f"alignment needs paired positions, got {positions.shape} and {reference.shape}")
+    if not (np.isfinite(positions).all() and np.isfinite(reference).all()):
+        raise FgbaselineError("alignment needs finite positions")
+    up = np.array([0.0, 0.0, 1.0])
+    return _fitted(positions, reference, lambda: np.eye(3), Align.SE3, up, len(positions)).matrix

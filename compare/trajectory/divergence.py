@@ -1,0 +1,145 @@
+"""Error of each pose against a reference, along and across the track, and its growth along the path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from fgbaseline.data import Estimate, Truth
+from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, so3
+
+from ..statistics.descriptive import summarized
+from .alignment import align_se3
+from .association import MatchedTrajectories
+from .path import along_track_frame, distance_traveled
+
+
+def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
+    """Error of each pose of an estimate against the reference, without alignment (both start at the same pose).
+
+    `up` (3,) is the unit vector that points up in the world (`Sequence.up`). For the columns see `pose_errors`.
+    """
+    return pose_errors(estimate.world_T_imu, reference.world_T_imu, up)
+
+
+def truth_errors(
+    estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool = False
+) -> pd.DataFrame:
+    """Error of each pose against ground truth, without alignment or after SE(3) alignment of all positions.
+
+    NaN in frames without truth and in frames that the estimator did not reach. For the columns see `pose_errors`.
+    """
+    poses = estimate.world_T_imu
+    if aligned:
+        both = truth.known & np.isfinite(poses).all(axis=(1, 2))
+        if both.any():
+            poses = align_se3(poses[both, :3, 3], truth.world_T_imu[both, :3, 3]) @ poses
+    return pose_errors(poses, truth.world_T_imu, up)
+
+
+def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.DataFrame:
+    """Errors of poses (T, 4, 4) against reference poses (T, 4, 4), one row per `frame`, with the columns
+
+    `position` |p - p_ref|, m; its components `along` track, `across` track (left positive) and `up`, m, of the
+    reference's horizontal direction of travel; `rotation_deg` the angle of R_ref^T R and `heading_deg` its part about
+    `up` (left positive); `travelled` the length of the reference's path so far, m. NaN where either pose is.
+    """
+    if poses.shape != reference.shape:
+        raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
+    difference = poses[:, :3, 3] - reference[:, :3, 3]
+    forward, left, upward = along_track_frame(reference[:, :3, 3], np.asarray(up, dtype=np.float64))
+    finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(reference).all(axis=(1, 2))
+    angle, heading = np.full((2, len(poses)), np.nan)
+    turned = poses[finite, :3, :3] @ np.swapaxes(reference[finite, :3, :3], 1, 2)
+    angle[finite] = np.rad2deg(so3.rotation_angle(turned))
+    heading[finite] = np.rad2deg(so3.turn_about(upward, turned))
+    return pd.DataFrame(
+        {
+            "position": np.linalg.norm(difference, axis=1),
+            "along": np.einsum("ti,ti->t", difference, forward),
+            "across": np.einsum("ti,ti->t", difference, left),
+            "up": difference @ upward,
+            "rotation_deg": angle,
+            "heading_deg": heading,
+            "travelled": distance_traveled(reference[:, :3, 3]),
+        },
+        index=pd.RangeIndex(len(poses), name="frame"),
+    )
+
+
+def divergence_summary(table: pd.DataFrame) -> dict[str, float]:
+    """RMSE, mean, median, p95, maximum and final position error (m); RMSE and final rotation error (deg)."""
+    return {
+        **summarized(table["position"]),
+        "final": float(table["position"].iloc[-1]),
+        "rotation_rmse_deg": summarized(table["rotation_deg"])["rmse"],
+        "rotation_final_deg": float(table["rotation_deg"].iloc[-1]),
+    }
+
+
+PARTS = 10
+
+
+def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
+    """Table of `pose_errors` of matched poses, with `t` (s) and `percent_of_path`
+
+    = position error over distance traveled, %; NaN before the reference moves. The alignment is that of `matched`;
+    for growth from a common start use `none` or `first-pose`.
+    """
+    table = pose_errors(matched.estimate.world_T_body, matched.reference.world_T_body, up)
+    moved = table["travelled"].where(table["travelled"] > 0)
+    return table.assign(t=matched.reference.t, percent_of_path=100.0 * table["position"] / moved)
+
+
+def divergence_growth(table: pd.DataFrame, parts: int = PARTS) -> pd.DataFrame:
+    """Growth of the error over `parts` pieces of the path of equal length, from a `divergence_along_path` table.
+
+    One row per piece: `from_m`, `to_m`, `frames`, `rmse` of the position error (m), its growth `per_metre` (m/m) and
+    `per_frame` (m) from the piece's first pose to the next one's, `heading_deg` at its end. NaN for a piece without
+    a pose. Raises InputError where the reference does not move.
+    """
+    travelled = table["travelled"].to_numpy()
+    if parts < 1 or not travelled[-1] > 0:
+        raise InputError("growth: a path that stands still cannot be split by length, nor one into fewer than 1 part")
+    edges = np.linspace(0.0, travelled[-1], parts + 1)
+    first = np.searchsorted(travelled, edges[:-1], side="left")
+    last = np.append(first[1:], len(travelled) - 1)
+    position = table["position"].to_numpy()
+    frames = last - first
+    frames[-1] += 1
+    end = np.append(first[1:], len(travelled))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = position[last] - position[first]
+        return pd.DataFrame(
+            {
+                "from_m": edges[:-1],
+                "to_m": edges[1:],
+                "frames": frames,
+                "rmse": [summarized(position[a:b])["rmse"] for a, b in zip(first, end, strict=True)],
+                "per_metre": grown / (travelled[last] - travelled[first]),
+                "per_frame": grown / (last - first),
+                "heading_deg": table["heading_deg"].to_numpy()[last],
+            }
+        ).rename_axis("part")
+
+
+@dataclass(frozen=True, slots=True)
+class Exceedance:
+    """First pose at which an error exceeds a bound."""
+
+    frame: int
+    t: float
+    """s"""
+    travelled: float
+    """m"""
+    value: float
+
+
+def first_exceedance(table: pd.DataFrame, bound: float, column: str = "position") -> Exceedance | None:
+    """First row of a `divergence_along_path` table whose |column| exceeds a bound; None where there is none."""
+    beyond = np.flatnonzero(np.abs(table[column].to_numpy()) > bound)
+    if len(beyond) == 0:
+        return None
+    row = table.iloc[beyond[0]]
+    return Exceedance(int(table.index[beyond[0]]), float(row["t"]), float(row["travelled"]), float(row[column]))

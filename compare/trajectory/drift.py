@@ -1,0 +1,85 @@
+"""Drift rates: error of the motion per meter of path and per second."""
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data.observations import IntArray
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..statistics.block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
+from .association import MatchedTrajectories
+from .ate_rpe import PoseRelation, relative_pose_error, require_stamps
+from .delta_pairs import nearest_delta_pairs
+from .path import distance_traveled
+
+SHARE = 0.1
+"""of the path and of its duration: the default interval of drift, or one step where that is longer"""
+TOLERANCE = 0.5
+"""of the requested interval: largest deviation of a stretch, since rates divide by the stretch's own length"""
+
+
+def drift(
+    matched: MatchedTrajectories,
+    metres: float | None = None,
+    seconds: float | None = None,
+    *,
+    confidence: float = CONFIDENCE,
+    repetitions: int = REPETITIONS,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Mean error of the motion over `metres` of the reference's path, per meter, and over `seconds`, per second.
+
+    One row per rate, indexed by `quantity`: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over`
+    and the number `n` of overlapping stretches, each from a pose to the later one nearest to that interval.
+    Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
+    stamps), each divided by the stretch's own length; `end translation` (%) and `end rotation` (deg/m): the
+    error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
+    does not move or no stretch has the requested length.
+    """
+    reference = matched.reference
+    travelled = distance_traveled(reference.position)
+    path = float(travelled[-1])
+    if len(reference) < 2 or path == 0.0:
+        raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per metre")
+    metres = _default(travelled) if metres is None else metres
+    pairs = _stretches(travelled, metres, "m")
+    over = travelled[pairs[:, 1]] - travelled[pairs[:, 0]]
+    rates = [
+        ("translation", "%", 100.0, PoseRelation.TRANSLATION, pairs, over, f"{metres:.4g} m"),
+        ("rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{metres:.4g} m"),
+    ]
+    if seconds is not None:
+        require_stamps(matched)
+    if reference.stamped and matched.estimate.stamped:
+        t = reference.t - reference.t[0]
+        seconds = _default(t) if seconds is None else seconds
+        pairs = _stretches(t, seconds, "s")
+        over = t[pairs[:, 1]] - t[pairs[:, 0]]
+        rates += [
+            ("translation per second", "m/s", 1.0, PoseRelation.TRANSLATION, pairs, over, f"{seconds:.4g} s"),
+            ("rotation per second", "deg/s", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{seconds:.4g} s"),
+        ]
+    whole, path_length = np.array([[0, len(reference) - 1]]), np.array([path])
+    rates += [
+        ("end translation", "%", 100.0, PoseRelation.TRANSLATION, whole, path_length, f"{path:.4g} m"),
+        ("end rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, whole, path_length, f"{path:.4g} m"),
+    ]
+    poses, truth = matched.estimate.world_T_body, reference.world_T_body
+    rows = []
+    for quantity, unit, factor, what, stretch, length, said in rates:
+        errors = factor * relative_pose_error(poses, truth, stretch, what) / length
+        mean = error_statistics(errors, confidence=confidence, repetitions=repetitions, seed=seed).loc["mean"]
+        rows.append((quantity, *mean, unit, said, len(stretch)))
+    columns = ["quantity", "value", "low", "high", "unit", "over", "n"]
+    return pd.DataFrame(rows, columns=columns).set_index("quantity")
+
+
+def _default(along: FloatArray) -> float:
+    return max(SHARE * float(along[-1]), float(np.diff(along).max()))
+
+
+def _stretches(along: FloatArray, wanted: float, unit: str) -> IntArray:
+    pairs = nearest_delta_pairs(along, wanted, TOLERANCE) if wanted > 0 else np.empty((0, 2), np.int64)
+    if len(pairs) == 0:
+        raise InputError(f"drift: no two poses are {wanted:g} {unit} apart, of {along[-1]:.4g} {unit} in all")
+    return pairs

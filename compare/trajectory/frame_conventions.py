@@ -1,0 +1,145 @@
+"""Frame conventions of orientations: quaternion order, JPL or Hamilton, body frame, inverse poses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, se3, so3
+
+from ..statistics.descriptive import rms_norm
+from .alignment import Align, align
+from .association import MatchedTrajectories
+
+STEP = 20
+"""poses over which relative rotations are taken"""
+CLEARLY = 3.0
+"""factor by which a convention must fit better than the assumed one to be detected"""
+NEGLIGIBLE = 0.5
+"""deg; misfit up to which the assumed convention is kept"""
+LEAST_ROTATION = 5.0
+"""deg; smaller rotations between bodies are ignored"""
+ITERATIONS = 20
+MIN_PAIRS = 10
+"""pairs of poses, below which no convention is detected"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BodyRotation:
+    """The constant rotation from the reference's body to the estimate's."""
+
+    rotation: FloatArray
+    """(3, 3) `estimate_R_reference`"""
+    residual_deg: float
+    """median angle of the remaining orientation differences, deg"""
+
+    @property
+    def angle_deg(self) -> float:
+        """Angle of the rotation, deg."""
+        return float(np.rad2deg(so3.rotation_angle(self.rotation)))
+
+    @property
+    def axis(self) -> FloatArray:
+        """Unit axis (3,) of the rotation, equal in both bodies."""
+        w = so3.log_so3(self.rotation)
+        return np.asarray(w / max(float(np.linalg.norm(w)), np.finfo(np.float64).tiny))
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the rotation exceeds LEAST_ROTATION and is CLEARLY above its residual."""
+        return self.angle_deg > LEAST_ROTATION and CLEARLY * self.residual_deg <= self.angle_deg
+
+
+def world_rotation_from_positions(matched: MatchedTrajectories) -> FloatArray | None:
+    """Rotation of the worlds `reference_R_estimate` (3, 3) from paired positions; None where it is undetermined.
+
+    It is for a nearly straight path, whose second extent is below CLEARLY times the RMSE of the aligned positions.
+    """
+    if len(matched) < MIN_PAIRS:
+        return None
+    estimate, reference = matched.estimate.world_T_body, matched.reference.world_T_body
+    motion = align(estimate, reference, Align.SIM3)
+    rmse = rms_norm(motion.apply(estimate)[:, :3, 3] - reference[:, :3, 3])
+    spread = np.linalg.svd(reference[:, :3, 3] - reference[:, :3, 3].mean(axis=0), compute_uv=False)
+    return None if motion.free or spread[1] / np.sqrt(len(matched)) < CLEARLY * rmse else motion.rotation
+
+
+def world_rotation_from_orientations(reference: FloatArray, estimate: FloatArray) -> FloatArray:
+    """Rotation of the worlds `reference_R_estimate` (3, 3) from the relative rotations of (n, 3, 3) over STEP poses."""
+    k = min(STEP, len(reference) - 1)
+    turned = [so3.log_so3(R[k:] @ np.swapaxes(R[:-k], 1, 2)) for R in (reference, estimate)]
+    return _nearest(turned[0].T @ turned[1])
+
+
+def rotation_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> float:
+    """Median angle, deg, between the relative rotations of (n, 3, 3) over STEP poses, expressed in the world.
+
+    `world` (3, 3) is `reference_R_estimate`. Invariant to a constant rotation between the bodies.
+    """
+    k = min(STEP, len(reference) - 1)
+    turned = [R[k:] @ np.swapaxes(R[:-k], 1, 2) for R in (reference, world @ estimate)]
+    return float(np.rad2deg(np.median(so3.rotation_angle(np.swapaxes(turned[0], 1, 2) @ turned[1]))))
+
+
+def travel_direction_misfit(position: FloatArray, rotation: FloatArray) -> float:
+    """Median angle, deg, of the direction of travel in the body to its median; of positions and rotations (n, 3, 3)."""
+    steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
+    length = np.linalg.norm(steps, axis=1)
+    moving = length > 0.1 * np.percentile(length, 90)
+    if moving.sum() < MIN_PAIRS:
+        return float("nan")
+    direction = steps[moving] / length[moving, None]
+    usual = np.median(direction, axis=0)
+    usual = usual / max(float(np.linalg.norm(usual)), np.finfo(np.float64).tiny)
+    return float(np.rad2deg(np.median(np.arccos(np.clip(direction @ usual, -1.0, 1.0)))))
+
+
+def fits_clearly_better(other: float, assumed: float, least: float = NEGLIGIBLE) -> bool:
+    """Whether the misfit of another convention is CLEARLY below the assumed one's, if that exceeds `least`."""
+    return assumed > least and CLEARLY * other <= assumed
+
+
+def body_rotation(matched: MatchedTrajectories) -> BodyRotation | None:
+    """Constant rotation between the bodies, by hand-eye calibration over the paired orientations.
+
+    Minimizes the sum of |W R_est B - R_ref|^2 over rotations W of the world, initialized from the positions, and B of
+    the body, alternately in closed form. None where the positions leave W undetermined.
+    """
+    world = world_rotation_from_positions(matched)
+    if world is None:
+        return None
+    return _hand_eye(matched.reference.rotation, matched.estimate.rotation, world)
+
+
+def has_conjugated_orientations(matched: MatchedTrajectories) -> bool:
+    """Whether the transposed orientations of the estimate fit clearly better: JPL's quaternions read as Hamilton's."""
+    world = world_rotation_from_positions(matched)
+    if world is None:
+        return False
+    R_ref, R = matched.reference.rotation, matched.estimate.rotation
+    return fits_clearly_better(rotation_misfit(R_ref, np.swapaxes(R, 1, 2), world), rotation_misfit(R_ref, R, world))
+
+
+def rmse_of_inverse_poses(matched: MatchedTrajectories) -> tuple[float, float]:
+    """RMSE of positions after SE(3) alignment, m, of the estimate and of its inverted poses."""
+    reference = matched.reference.world_T_body
+
+    def rmse(poses: FloatArray) -> float:
+        return rms_norm(align(poses, reference, Align.SE3).apply(poses)[:, :3, 3] - reference[:, :3, 3])
+
+    poses = matched.estimate.world_T_body
+    return rmse(poses), rmse(se3.inverse(poses))
+
+
+def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> BodyRotation:
+    W, B = world, np.eye(3)
+    for _ in range(ITERATIONS):
+        B = _nearest(np.einsum("tji,jk,tkl->il", estimate, W.T, reference))
+        W = _nearest(np.einsum("tij,jk,tlk->il", reference, B.T, estimate))
+    left = np.swapaxes(reference, 1, 2) @ (W @ estimate @ B)
+    return BodyRotation(B, float(np.rad2deg(np.median(so3.rotation_angle(left)))))
+
+
+def _nearest(matrix: FloatArray) -> FloatArray:
+    """Rotation (3, 3) nearest to a matrix (3, 3) in the Frobenius norm."""
+    U, _, Vt = np.linalg.svd(matrix)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
