@@ -27,7 +27,7 @@ def test_a_wrong_bias_turns_the_motion_as_the_transition_says() -> None:
     prior, dt, step = GyroBiasPrior(deviation=0.03, walk=0.02), 0.25, 1e-6
     twist = np.array([0.8, -0.2, 0.1, 0.3, -0.5, 0.4])
     transition, noise = np.diag(np.arange(1.0, 7.0)), np.diag(np.arange(2.0, 8.0))
-    F, Q = prior.along(twist, dt, transition, noise)
+    F, Q = prior.augment(twist, dt, transition, noise)
     for i, d in enumerate(step * np.eye(3)):
         wrong = se3.exp(twist - dt * np.concatenate([np.zeros(3), d]))
         np.testing.assert_allclose(F[:6, 6 + i], se3.log(se3.inverse(se3.exp(twist)) @ wrong) / step, atol=1e-5)
