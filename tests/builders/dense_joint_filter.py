@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
-from fgbaseline.data.problem import HuberKernel, Problem
+from fgbaseline.data.problem import Problem
 from fgbaseline.ekf import GyroBiasPrior, LandmarkRepresentation, Linearization
-from fgbaseline.geometry import FloatArray, StereoCamera
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera
 
 from .dense_filter import hat3, odot, u_curly_hat, u_hat
 
