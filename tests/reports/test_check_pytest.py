@@ -11,11 +11,11 @@ import pytest
 from evo.core import metrics
 from evo.core.trajectory import PoseTrajectory3D
 
+from fgbaseline.compare import time_coverage
 from fgbaseline.data import Estimate, Status, Trajectory, Truth, write_tum
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.checking import assert_accuracy
-from fgbaseline.reports.checking.accuracy import covered
 
 from ..builders.commands import environment
 
@@ -109,14 +109,14 @@ def test_an_estimator_that_failed_does_not_pass() -> None:
 
 def test_coverage_asks_for_no_more_than_the_reference_has() -> None:
     t = np.arange(100.0)
-    assert covered(t, t) == 1.0
-    assert covered(t[::5], t) == pytest.approx(95 / 99)
-    assert covered(t[10:], t) == pytest.approx(89 / 99)
+    assert time_coverage(t, t) == 1.0
+    assert time_coverage(t[::5], t) == pytest.approx(95 / 99)
+    assert time_coverage(t[10:], t) == pytest.approx(89 / 99)
     gap = np.concatenate([t[:40], t[60:]])
-    assert covered(gap, gap) == 1.0
-    assert covered(gap, t) == pytest.approx(78 / 99)
-    assert covered(t[:1], t) == 0.0
-    assert covered(t[:1], t[:1]) == 1.0
+    assert time_coverage(gap, gap) == 1.0
+    assert time_coverage(gap, t) == pytest.approx(78 / 99)
+    assert time_coverage(t[:1], t) == 0.0
+    assert time_coverage(t[:1], t[:1]) == 1.0
 
 
 def test_what_cannot_be_asked_is_told() -> None:
