@@ -1,18 +1,18 @@
-"""The page of a comparison: one file that opens offline."""
+"""Page of a comparison, which opens offline."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
-from itertools import groupby
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ..figures.palette import colours_of
-from ..html.environment import environment, picture
-from .comparison import Comparison
-from .summary import summarise
-from .tables import text_table
+from ..phrases.comparison import verdict
+from ..results.comparison import Summary
+from ..tables import Row
+from ..tables.comparison import comparison_table
+from ..trajectories.comparison import Comparison
+from .environment import environment, picture
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as said above, seen along the direction that points up.",
@@ -28,27 +28,39 @@ CAPTIONS: Mapping[str, str] = {
     "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
     "with it.",
 }
+"""captions by the beginning of a figure's name"""
+
+
+def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
+    """`report.html`. All text that comes from files is escaped."""
+    reference, estimates = summary.reference, summary.estimates
+    table = comparison_table(comparison, summary, mark_reference=True)
+    colors = colours_of([reference.name, *estimates], reference.name)
+    titles = {name: f"{name} (reference)" if name == reference.name else name for name in colors}
+    notes = {f"What {name} has no figure for": estimate.notes for name, estimate in estimates.items()}
+    sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
+    return (
+        environment()
+        .get_template("comparison.html")
+        .render(
+            summary=summary,
+            verdict=verdict(comparison),
+            table=replace(
+                table,
+                caption=f"{table.caption} Best of a line in bold.",
+                rows=tuple(_with_intervals_below(row) for row in table.rows),
+            ),
+            swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in colors.items()},
+            pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
+            trees={**notes, "Files": sources, "Settings": summary.settings, "Versions": summary.versions},
+        )
+    )
 
 
 def _caption(name: str) -> str:
     return next((text for beginning, text in CAPTIONS.items() if name.startswith(beginning)), "")
 
 
-def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
-    """`report.html`. All text that comes from files is escaped."""
-    names, lines = text_table(comparison)
-    trust = comparison.reference.trust
-    return (
-        environment()
-        .get_template("compare.html")
-        .render(
-            css=Markup(files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")),
-            comparison=comparison,
-            summary=summarise(comparison).model_dump(mode="json", by_alias=True),
-            trust=None if trust is None else trust.verdict.name.lower(),
-            names=names,
-            groups=[(group, list(same)) for group, same in groupby(lines, key=lambda line: line.group)],
-            colours=colours_of([comparison.reference.name, *comparison.results], comparison.reference.name),
-            pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
-        )
-    )
+def _with_intervals_below(row: Row) -> Row:
+    """The row with each interval on a line below its figure."""
+    return replace(row, cells=tuple(cell._replace(text=cell.text.replace(" [", "\n[")) for cell in row.cells))

@@ -1,17 +1,16 @@
-"""What the numbers of a comparison mean, in words: the trust in the reference first, and none that flatters."""
+"""Sentences on a comparison: the caption of its tables, and its verdict, the trust in the reference first."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from fgbaseline.compare import SMALLEST_COVERAGE, SMALLEST_SAMPLE, RmseDifference, Verdict, too_small
 from fgbaseline.compare.travel import distance_travelled
 
-from ..formatting import counted, listed, number, per_cent
-from .beyond_wording import claimed_said, held_out_said, maps_said, pixels_said, unmatched_said
-from .comparison import Comparison, Result
-from .recognized import recognized, up_of
-from .samples import coverage, samples
+from ..formatting import MINUS, interval, listed, number, per_cent
+from ..trajectories.comparison import Comparison, Result
+from ..trajectories.samples import coverage, samples
+from . import comparison_evidence as evidence
 
 MEANING = {
     Verdict.DOUBTFUL: "a small distance from it says more than a large one",
@@ -20,42 +19,44 @@ MEANING = {
 
 
 def caption(comparison: Comparison) -> str:
-    """What was paired, how it was aligned and what the intervals are: under every table."""
-    said: dict[str, list[str]] = {}
+    """Association, alignment, up and the kind of interval: stands under every table."""
+    names: dict[str, list[str]] = {}
     for result in comparison.results.values():
-        said.setdefault(result.matched.caption, []).append(result.name)
-    parts = [text if len(said) == 1 else f"{listed(names)}: {text}" for text, names in said.items()]
+        names.setdefault(result.matched.caption, []).append(result.name)
+    parts = [text if len(names) == 1 else f"{listed(those)}: {text}" for text, those in names.items()]
+    up = ", ".join(f"{x:.3g}" for x in (np.round(comparison.up, 6) + 0.0))
+    name = comparison.reference.name
     return (
-        f"Compared with {comparison.reference.name}: {'. '.join(parts)}. {up_of(comparison)} "
+        f"Compared with {name}: {'. '.join(parts)}. Up is ({up}) in the world of {name} ({comparison.up_from}). "
         "In brackets 95 % confidence intervals of a block bootstrap."
     )
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Sentences on a comparison, what everything else leans on first."""
-    parts: tuple[Callable[[Comparison], list[str]], ...] = (
+    """All sentences, in the order in which later ones rest on earlier ones."""
+    parts = (
         _too_little,
         _reference,
-        recognized,
+        evidence.remarks,
         _nearest,
         _passing,
         _shares,
         _lengths,
-        _offsets,
-        _left_out,
-        _open,
-        _unsure,
-        claimed_said,
-        unmatched_said,
-        pixels_said,
-        maps_said,
-        held_out_said,
+        evidence.offsets,
+        evidence.left_out,
+        evidence.undetermined,
+        evidence.rough_intervals,
+        evidence.reported_covariances,
+        evidence.unmatched,
+        evidence.reprojection,
+        evidence.maps,
+        evidence.held_out,
     )
     return [sentence for part in parts for sentence in part(comparison)]
 
 
 def _too_little(comparison: Comparison) -> list[str]:
-    """Which estimates have so few pairs that no figure of theirs says much."""
+    """Estimates with so few pairs that their figures judge nothing."""
     sentences = []
     for name, result in comparison.results.items():
         sample = samples(comparison, result)["translation"]
@@ -70,11 +71,6 @@ def _too_little(comparison: Comparison) -> list[str]:
     return sentences
 
 
-def _interval(result: Result) -> tuple[float, float]:
-    table = result.statistics["translation"]
-    return float(table["low"]["rmse"]), float(table["high"]["rmse"])
-
-
 def _reference(comparison: Comparison) -> list[str]:
     name, trust = comparison.reference.name, comparison.reference.trust
     if trust is None:
@@ -86,28 +82,34 @@ def _reference(comparison: Comparison) -> list[str]:
 
 
 def _nearest(comparison: Comparison) -> list[str]:
-    """The order over the moments that all have; where these are not all moments, beside what each one covers."""
-    ranking, name = comparison.ranking, comparison.reference.name
-    sentences = [
-        f"{result.name} is the same run, each pose as known when its frame came: {_with_interval(result)} away."
+    """Order over the common moments; where these are not all moments, with the coverage of each estimate."""
+    name = comparison.reference.name
+    others = [result for result in comparison.ranked if not result.entry.by_product]
+    by_products = [
+        f"{result.name} is the same run, each pose as known when its frame came: {_rmse(result)} away."
         for result in comparison.ranked
         if result.entry.by_product
     ]
-    others = [result for result in comparison.ranked if not result.entry.by_product]
     if not others:
-        return sentences
-    if ranking.same:
+        return by_products
+    if comparison.ranking.same:
         first, *rest = others
-        text = f"{first.name} is {_with_interval(first)} from {name} (RMSE of the positions){_of_path(first)}"
+        path = float(first.departure["travelled"].iloc[-1])
+        share = f", {per_cent(first.rmse / path)} of its path of {number(path)} m" if path > 0 else ""
+        text = f"{first.name} is {_rmse(first)} from {name} (RMSE of the positions){share}"
         if rest:
-            text = f"Nearest: {text}; then " + listed(f"{r.name} with {_with_interval(r)}" for r in rest)
-        return [f"{text}.", *_order(comparison), *sentences]
-    each = listed(f"{r.name} {_with_interval(r)} over {_covers(comparison, r)}" for r in others)
-    return [*_over_common(comparison), f"Each over all of its own moments: {each}.", *sentences]
+            text = f"Nearest: {text}; then " + listed(f"{r.name} with {_rmse(r)}" for r in rest)
+        return [f"{text}.", *_order(comparison), *by_products]
+    each = listed(
+        f"{r.name} {_rmse(r)} over {number(len(r.matched))} moments ({per_cent(coverage(comparison, r))} of {name}'s "
+        "time)"
+        for r in others
+    )
+    return [*_over_common(comparison), f"Each over all of its own moments: {each}.", *by_products]
 
 
 def _over_common(comparison: Comparison) -> list[str]:
-    """The ranking of estimates that do not have the same moments, and what is left out of it."""
+    """Ranking of estimates that do not have the same moments, and the estimates left out of it."""
     ranking, name = comparison.ranking, comparison.reference.name
     apart = [r.name for r in comparison.ranked if not r.entry.by_product and ranking.rank(r.name) is None]
     if len(ranking.rivals) < 2:
@@ -121,48 +123,35 @@ def _over_common(comparison: Comparison) -> list[str]:
     return [text, *_order(comparison), *missing]
 
 
-def _covers(comparison: Comparison, result: Result) -> str:
-    pairs = number(len(result.matched))
-    return f"{pairs} moments ({per_cent(coverage(comparison, result))} of {comparison.reference.name}'s time)"
-
-
-def _of_path(result: Result) -> str:
-    path = float(result.departure["travelled"].iloc[-1])
-    return f", {per_cent(result.rmse / path)} of its path of {number(path)} m" if path > 0 else ""
-
-
 def _order(comparison: Comparison) -> list[str]:
-    """Whether the recording settles who is nearest: by blocks of moments drawn for both."""
     return order_in_words(comparison.ranking.rivals[0], comparison.behind) if comparison.behind else []
 
 
 def order_in_words(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
-    """What the differences of others from the `first`, which is the nearest, say of the order."""
-    unsettled: list[str] = []
-    settled: list[str] = []
+    """Whether paired differences from the nearest, `first`, settle the order."""
+    settled: dict[bool, list[str]] = {True: [], False: []}
     for name, d in behind.items():
-        said = f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])"
-        (settled if d.settled else unsettled).append(said)
+        settled[d.settled].append(f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
     sentences = []
-    if settled:
-        sentences.append(f"Farther than {first}, by paired bootstrap of their RMSE: {listed(settled)}.")
-    if unsettled:
+    if settled[True]:
+        sentences.append(f"Farther than {first}, by paired bootstrap of their RMSE: {listed(settled[True])}.")
+    if settled[False]:
         sentences.append(
-            f"This recording does not settle whether {first} is nearer than {listed(unsettled)}: the paired "
+            f"This recording does not settle whether {first} is nearer than {listed(settled[False])}: the paired "
             "interval of the difference is not above zero."
         )
     return sentences
 
 
-def _signed(metres: float) -> str:
-    return number(metres) if not metres < 0 else f"\N{MINUS SIGN}{number(-metres)}"
+def _signed(meters: float) -> str:
+    return number(meters) if not meters < 0 else f"{MINUS}{number(-meters)}"
 
 
-def _with_interval(result: Result) -> str:
-    low, high = _interval(result)
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return f"{number(result.rmse)} m"
-    return f"{number(result.rmse)} m [{number(low)}, {number(high)}]"
+def _rmse(result: Result) -> str:
+    """RMSE of the positions with its interval: `0.52 m [0.41, 0.66]`."""
+    low, high = (float(result.statistics["translation"][bound]["rmse"]) for bound in ("low", "high"))
+    value, mark, bounds = interval(result.rmse, low, high).partition(" [")
+    return f"{value} m{mark}{bounds}"
 
 
 def _passing(comparison: Comparison) -> list[str]:
@@ -185,31 +174,13 @@ def _passing(comparison: Comparison) -> list[str]:
 def _shares(comparison: Comparison) -> list[str]:
     sentences = []
     for result in comparison.ranked:
-        s = result.shares
-        if not np.isfinite(s.noise):
-            continue
-        heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
-        sentences.append(
-            f"Of {result.name}'s squared distance {heading} is heading, {scale} scale (least-squares scale "
-            f"{1.0 + 0.01 * s.scale_percent:.4f} of its positions on the reference's) and {rest} the rest."
-        )
-    return sentences
-
-
-def _lengths(comparison: Comparison) -> list[str]:
-    """By how much the path of each estimate is longer or shorter, over the paired poses, as it came."""
-    sentences = []
-    for result in comparison.results.values():
-        matched = result.matched
-        own = float(distance_travelled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
-        path = float(distance_travelled(matched.reference.position)[-1])
-        if not path > 0.0 or number(own) == number(path):
-            continue
-        than = "longer" if own > path else "shorter"
-        sentences.append(
-            f"The path of {result.name} over the paired poses is {number(own)} m long, "
-            f"{number(100.0 * abs(own / path - 1.0))} % {than} than the reference's."
-        )
+        if np.isfinite(result.shares.noise):
+            heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
+            sentences.append(
+                f"Of {result.name}'s squared distance {heading} is heading, {scale} scale (least-squares scale "
+                f"{1.0 + 0.01 * result.shares.scale_percent:.4f} of its positions on the reference's) and {rest} the "
+                "rest."
+            )
     return sentences
 
 
@@ -220,48 +191,17 @@ def _share(result: Result, name: str) -> str:
     return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
 
 
-def _offsets(comparison: Comparison) -> list[str]:
+def _lengths(comparison: Comparison) -> list[str]:
+    """Length of each path over the paired poses, before alignment, against the reference's."""
     sentences = []
     for result in comparison.results.values():
-        found = result.offset
-        if found is None:
-            continue
-        where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
-        text = (
-            f"The stamps of {result.name} fit best {'as they are' if found.seconds == 0 else where} "
-            f"(shifts of {1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
-        )
-        sentences.append(text + ("." if found.determined else "; the path does not determine it."))
+        matched = result.matched
+        own = float(distance_travelled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
+        path = float(distance_travelled(matched.reference.position)[-1])
+        if path > 0.0 and number(own) != number(path):
+            sentences.append(
+                f"The path of {result.name} over the paired poses is {number(own)} m long, "
+                f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'} than the "
+                "reference's."
+            )
     return sentences
-
-
-def _left_out(comparison: Comparison) -> list[str]:
-    same: dict[tuple[int, int], list[str]] = {}
-    for result in comparison.results.values():
-        counts = (result.matched.left_out_estimate, result.matched.left_out_reference)
-        same.setdefault(counts, []).append(result.name)
-    return [
-        f"Without a partner, and left out: {counted(here, 'pose')} of {listed(names)}, "
-        f"{number(there)} of {comparison.reference.name}."
-        for (here, there), names in same.items()
-        if here or there
-    ]
-
-
-def _open(comparison: Comparison) -> list[str]:
-    return [
-        f"The positions of {result.name} leave {listed(result.matched.alignment.free)} of the alignment open; there "
-        "the orientations decided."
-        for result in comparison.results.values()
-        if result.matched.alignment.free
-    ]
-
-
-def _unsure(comparison: Comparison) -> list[str]:
-    names = [r.name for r in comparison.results.values() if not r.statistics["translation"].attrs["reliable"]]
-    if not names:
-        return []
-    return [
-        f"The errors of {listed(names)} change so slowly that fewer than ten independent stretches fit into the path: "
-        "their intervals are rough."
-    ]

@@ -1,7 +1,8 @@
-"""All figures of a comparison, as `comparison.json` and `metrics.csv` hold them."""
+"""Figures of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
 import math
 import platform
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
@@ -12,23 +13,24 @@ from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors
 from fgbaseline.compare.travel import distance_travelled
 
-from ..results.tree import INFINITE, finite, nulls
-from .claimed import Claimed
-from .comparison import Comparison, Result
-from .pixels import Pixels
-from .samples import coverage, samples
-from .schema import Summary
+from ..trajectories.comparison import Comparison, Result
+from ..trajectories.reported_covariance import ReportedCovariance
+from ..trajectories.reprojection import Pixels
+from ..trajectories.samples import coverage, samples
+from .comparison import Summary
+from .tree import INFINITE, finite, nulls
 
 LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
+INTERVAL = ["value", "low", "high"]
 WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 
 
-def summarise(comparison: Comparison) -> Summary:
-    """The summary; what is not a number is None, and where a part is missing `notes` says why."""
+def summarize(comparison: Comparison, caption: str) -> Summary:
+    """The summary; figures that are not finite are None, and `notes` has the reasons for missing parts."""
     return Summary.model_validate(
         finite(
             {
-                "caption": comparison.caption,
+                "caption": caption,
                 "reference": _reference(comparison),
                 "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
                 "sequence": comparison.sequence,
@@ -87,7 +89,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         },
         "segments": None if result.segments is None else _segments(result.segments, comparison.settings.seed),
         "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
-        "nees": None if result.claimed is None else _nees(result.claimed),
+        "nees": None if result.reported_covariance is None else _nees(result.reported_covariance),
         "shares": {
             name: getattr(result.shares, name)
             for name in ("scale", "heading", "noise", "scale_percent", "heading_deg", "heading_deg_per_s")
@@ -117,7 +119,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
 def _statistics(table: pd.DataFrame) -> dict[str, Any]:
     values = table["value"]
     return {
-        **{name: table.loc[name, ["value", "low", "high"]].to_dict() for name in WITH_INTERVAL},
+        **{name: table.loc[name, INTERVAL].to_dict() for name in WITH_INTERVAL},
         **{name: float(values[name]) for name in ("min", "max", "sse")},
         "n": int(values["n"]),
         "missing": int(table.attrs["missing"]),
@@ -140,15 +142,12 @@ def _common(comparison: Comparison, name: str) -> dict[str, Any] | None:
     statistics = comparison.ranking.common.get(name)
     if statistics is None:
         return None
-    rmse = statistics.loc["rmse", ["value", "low", "high"]].to_dict()
-    return {"moments": comparison.ranking.moments, "rmse": rmse}
+    return {"moments": comparison.ranking.moments, "rmse": statistics.loc["rmse", INTERVAL].to_dict()}
 
 
 def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:
-    d = comparison.behind.get(name)
-    if d is None:
-        return None
-    return {"value": d.value, "low": d.low, "high": d.high, "block": d.block, "reliable": d.reliable}
+    difference = comparison.behind.get(name)
+    return None if difference is None else asdict(difference)
 
 
 def _map(table: pd.DataFrame) -> dict[str, Any]:
@@ -162,14 +161,14 @@ def _map(table: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _nees(claimed: Claimed) -> dict[str, float | int]:
-    known = claimed.nees[~np.isnan(claimed.nees)]
+def _nees(reported: ReportedCovariance) -> dict[str, float | int]:
+    known = reported.nees[~np.isnan(reported.nees)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
     return {
         "mean": mean,
         "median": median,
         "frames": len(known),
-        "not_positive_definite": claimed.not_positive_definite,
+        "not_positive_definite": reported.not_positive_definite,
     }
 
 
@@ -186,9 +185,6 @@ def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:
 
 
 def _pixels(pixels: Pixels | None) -> dict[str, Any]:
-    tables = {} if pixels is None else {"": pixels.own, "_common": pixels.common, "_along": pixels.along}
-    return {f"reprojection{kind}": _reprojection(tables.get(kind)) for kind in ("", "_common", "_along")}
-
-
-def _reprojection(table: pd.DataFrame | None) -> dict[str, Any] | None:
-    return None if table is None else compare.reprojection_summary(table)
+    if pixels is None:
+        return dict.fromkeys(("reprojection", "reprojection_common", "reprojection_along"))
+    return {key: None if t is None else compare.reprojection_summary(t) for key, t in pixels.tables.items()}

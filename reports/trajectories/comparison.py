@@ -1,30 +1,28 @@
-"""Estimates against a reference: every table that the page, the figures and the files draw on."""
+"""Estimates against a reference as plain data: what tables, sentences, figures and files are made of."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from fgbaseline.compare import DifferenceShares, Matched, Passing, RmseDifference, SegmentErrors, TimeOffset
 from fgbaseline.geometry import FloatArray
 
-from .claimed import Claimed
 from .entry import Entry
-from .pixels import Pixels
 from .ranking import Ranking
+from .reported_covariance import ReportedCovariance
+from .reprojection import Pixels
 from .settings import Settings
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Result:
-    """One estimate, compared."""
+    """Figures of one estimate."""
 
     entry: Entry
     matched: Matched
-    """aligned"""
+    """the pairs of poses, the estimate's aligned"""
     offset: TimeOffset | None
-    """where it was searched for"""
+    """the estimated time offset, where it was searched for"""
     absolute: pd.DataFrame
     """see `compare.absolute_errors`"""
     departure: pd.DataFrame
@@ -45,93 +43,60 @@ class Result:
     """of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
     relative_statistics: dict[str, dict[str, pd.DataFrame]]
     """by delta, then `translation` and `rotation_deg`"""
-    claimed: Claimed | None
+    reported_covariance: ReportedCovariance | None
     """its covariances beside its errors against the truth"""
     pixels: Pixels | None
     map: pd.DataFrame | None
     """see `compare.map_difference`; the landmarks are aligned as the path is"""
     notes: dict[str, str]
-    """why something is missing"""
+    """why figures are missing, by key"""
 
     @property
     def name(self) -> str:
-        """What tables and figures call it."""
+        """Name in tables and figures."""
         return self.entry.name
 
     @property
     def rmse(self) -> float:
-        """Of the positions over all of its own moments, m."""
+        """RMSE of the positions over all paired poses, m."""
         return float(self.statistics["translation"]["value"]["rmse"])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Comparison:
-    """All there is to report: pandas tables, matplotlib figures, and a folder of everything."""
+    """A reference, and the figures of every estimate against it."""
 
     reference: Entry
     reference_pixels: Pixels | None
     results: dict[str, Result]
-    """by name, in the order given"""
+    """by name, in the order of the input"""
     up: FloatArray
     """(3,) in the reference's world"""
     up_from: str
-    """from where that is known"""
+    """the source of `up`"""
     deltas: tuple[str, ...]
     settings: Settings
     ranking: Ranking
     held_out: pd.DataFrame | None
     """see `compare.held_out_ranking`: the reference among them"""
     sequence: str | None
-    """the recording that the reprojection is of"""
+    """the recording whose observations are reprojected"""
 
     @property
     def behind(self) -> dict[str, RmseDifference]:
-        """By how much each estimate is farther from the reference than the nearest rival; that one is missing."""
+        """RMSE of each estimate above that of the nearest rival, which is missing."""
         return self.ranking.behind
 
     @property
     def ranked(self) -> list[Result]:
-        """Nearest to the reference first; what could not be ranked last, in the order given."""
+        """Results by rank; those without a rank last, in the order of the input."""
         order = list(self.ranking.at)
         last = len(order)
         return sorted(self.results.values(), key=lambda r: order.index(r.name) if r.name in order else last)
 
     @property
-    def table(self) -> pd.DataFrame:
-        """One row per estimate, one column per main figure; see `caption`."""
-        from .tables import main_table
-
-        return main_table(self)
-
-    @property
-    def metrics(self) -> pd.DataFrame:
-        """Every figure: estimate, metric, value, and low and high of its confidence interval."""
-        from .tables import metrics_table
-
-        return metrics_table(self)
-
-    @property
-    def caption(self) -> str:
-        """What was paired and how it was aligned: a table without it says nothing."""
-        from .wording import caption
-
-        return caption(self)
-
-    @property
-    def verdict(self) -> list[str]:
-        """What the numbers say, in sentences, the trust in the reference first."""
-        from .wording import verdict
-
-        return verdict(self)
-
-    def figures(self) -> dict[str, Figure]:
-        """The figures by name."""
-        from .figures import draw
-
-        return draw(self)
-
-    def write(self, folder: str | Path, *, force: bool = False) -> Path:
-        """Tables, figures and report.html in a folder, all or nothing; gives the path of the report."""
-        from .folder import write
-
-        return write(self, Path(folder), force=force)
+    def pixels(self) -> dict[str, Pixels]:
+        """Reprojection of every trajectory that has one, the reference first."""
+        every = {self.reference.name: self.reference_pixels}
+        every |= {name: result.pixels for name, result in self.results.items()}
+        return {name: pixels for name, pixels in every.items() if pixels is not None}
