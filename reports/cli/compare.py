@@ -135,7 +135,7 @@ def command(
 ) -> None:
     """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
 
-    REFERENCE may also be the folder of a run: its reference is taken, the trust in it said first, and its other
+    REFERENCE may also be the folder of a run: its reference is taken, the trust in it is printed first, and its other
     estimators are compared beside yours.
 
     Exits 0, or 2 on bad input.

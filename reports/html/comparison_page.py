@@ -47,6 +47,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             verdict=verdict(comparison),
             table=replace(
                 table,
+                name="figure",
                 caption=f"{table.caption} Best of a line in bold.",
                 rows=tuple(_with_intervals_below(row) for row in table.rows),
             ),

@@ -57,7 +57,8 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
 
 
 def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
-    matched, motion = result.matched, result.matched.alignment
+    matched, motion, reported = result.matched, result.matched.alignment, result.reported_covariance
+    common, behind = comparison.ranking.common.get(result.name), comparison.behind.get(result.name)
     values = {
         "source": result.entry.trajectory.source,
         "poses": len(result.entry.trajectory),
@@ -89,17 +90,16 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         },
         "segments": None if result.segments is None else _segments(result.segments, comparison.settings.seed),
         "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
-        "nees": None if result.reported_covariance is None else _nees(result.reported_covariance),
+        "nees": None if reported is None else _nees(reported),
         "shares": {
-            name: getattr(result.shares, name)
-            for name in ("scale", "heading", "noise", "scale_percent", "heading_deg", "heading_deg_per_s")
-        }
-        | {
+            **{name: share for name, share in asdict(result.shares).items() if name != "rms"},
             "intervals": result.share_intervals.to_dict(orient="index"),
             "reliable": bool(result.share_intervals.attrs["reliable"]),
         },
-        "common": _common(comparison, result.name),
-        "behind": _behind(comparison, result.name),
+        "common": None
+        if common is None
+        else {"moments": comparison.ranking.moments, "rmse": common.loc["rmse", INTERVAL].to_dict()},
+        "behind": None if behind is None else asdict(behind),
         "final_m": float(result.departure["position"].iloc[-1]),
         "passing": {
             "bound_m": result.bound,
@@ -117,14 +117,10 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
 
 
 def _statistics(table: pd.DataFrame) -> dict[str, Any]:
-    values = table["value"]
     return {
         **{name: table.loc[name, INTERVAL].to_dict() for name in WITH_INTERVAL},
-        **{name: float(values[name]) for name in ("min", "max", "sse")},
-        "n": int(values["n"]),
-        "missing": int(table.attrs["missing"]),
-        "block": int(table.attrs["block"]),
-        "reliable": bool(table.attrs["reliable"]),
+        **{name: float(table["value"][name]) for name in ("min", "max", "sse", "n")},
+        **{key: table.attrs[key] for key in ("missing", "block", "reliable")},
     }
 
 
@@ -136,18 +132,6 @@ def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
         "official": segments.official,
         "by_length": segments.by_length.reset_index().to_dict(orient="records"),
     }
-
-
-def _common(comparison: Comparison, name: str) -> dict[str, Any] | None:
-    statistics = comparison.ranking.common.get(name)
-    if statistics is None:
-        return None
-    return {"moments": comparison.ranking.moments, "rmse": statistics.loc["rmse", INTERVAL].to_dict()}
-
-
-def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:
-    difference = comparison.behind.get(name)
-    return None if difference is None else asdict(difference)
 
 
 def _map(table: pd.DataFrame) -> dict[str, Any]:

@@ -26,9 +26,9 @@ class Result:
     absolute: pd.DataFrame
     """see `compare.absolute_errors`"""
     departure: pd.DataFrame
-    """see `compare.growing_divergence`: along, across, up, heading, per metre travelled"""
+    """see `compare.growing_divergence`: along, across, up and heading over the distance travelled"""
     relative: dict[str, pd.DataFrame]
-    """by delta, such as `10 m`: see `compare.relative_errors`; those that the path is too short for are missing"""
+    """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
     segments: SegmentErrors | None
     drift: pd.DataFrame | None
     """see `compare.drift`"""
@@ -38,11 +38,11 @@ class Result:
     bound: float
     """m: 1 % of the path, at most 5 m"""
     passing: Passing | None
-    """where the position is first farther off than `bound`"""
+    """first pose whose position is farther off than `bound`"""
     statistics: dict[str, pd.DataFrame]
-    """of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
+    """statistics of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
     relative_statistics: dict[str, dict[str, pd.DataFrame]]
-    """by delta, then `translation` and `rotation_deg`"""
+    """statistics by delta, then `translation` and `rotation_deg`"""
     reported_covariance: ReportedCovariance | None
     """its covariances beside its errors against the truth"""
     pixels: Pixels | None

@@ -9,7 +9,6 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Matched, Passing, TimeOffset
-from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
 from .comparison import Comparison, Result
@@ -32,27 +31,25 @@ FEWEST = 2
 def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
     up, up_from = _up(entries, settings)
-    kind = settings.align or (Align.NONE if entries.one_world else Align.SE3)
     everything = [entries.reference, *entries.estimates]
-    if kind == Align.YAW:
+    settings = replace(
+        settings,
+        align=str(settings.align or (Align.NONE if entries.one_world else Align.SE3)),
+        deltas=tuple(settings.deltas or _usual(everything)),
+    )
+    if settings.align == Align.YAW:
         _require_one_up(entries, up)
     paths = paths_of(entries.problem, everything, settings.offset)
     pixels = pixels_of(entries.problem, everything, paths)
-    deltas = settings.deltas or _usual(everything)
-    results = {
-        entry.name: _compared(
-            entries.reference, entry, kind, up, deltas, settings, entries.problem, paths, pixels.get(entry.name)
-        )
-        for entry in entries.estimates
-    }
+    results = {e.name: _compared(entries, e, up, settings, paths, pixels.get(e.name)) for e in entries.estimates}
     return Comparison(
         reference=entries.reference,
         reference_pixels=pixels.get(entries.reference.name),
         results=results,
         up=up,
         up_from=up_from,
-        deltas=tuple(delta.text for delta in deltas),
-        settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
+        deltas=tuple(delta.text for delta in settings.deltas),
+        settings=settings,
         ranking=ranking_of(
             errors={name: r.absolute["translation"] for name, r in results.items()},
             stamps={name: r.matched.reference.t for name, r in results.items()},
@@ -103,18 +100,16 @@ def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
 
 
 def _compared(
-    reference: Entry,
+    entries: Entries,
     entry: Entry,
-    kind: Align | str,
     up: FloatArray,
-    deltas: tuple[Delta, ...],
     settings: Settings,
-    problem: Problem | None,
     paths: Mapping[str, FloatArray],
     pixels: Pixels | None,
 ) -> Result:
+    reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
-    matched, offset = _matched(reference, entry, kind, up, settings)
+    matched, offset = _matched(reference, entry, up, settings)
     absolute = compare.absolute_errors(matched)
     departure = compare.growing_divergence(matched, up)
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
@@ -123,9 +118,8 @@ def _compared(
         departure[["rotation_deg", "heading_deg"]] = np.nan
         notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
     bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
-    relative = {d.text: _relative(matched, d, settings, notes) for d in deltas}
+    relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
-    seed = settings.seed
     return Result(
         entry=entry,
         matched=matched,
@@ -146,7 +140,7 @@ def _compared(
             for delta, table in tables.items()
         },
         pixels=pixels,
-        map=_or_note("map", notes, lambda: map_of(problem, paths, reference, entry, matched)),
+        map=_or_note("map", notes, lambda: map_of(entries.problem, paths, reference, entry, matched)),
         notes=notes,
     )
 
@@ -184,10 +178,9 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
         return None
 
 
-def _matched(
-    reference: Entry, entry: Entry, kind: Align | str, up: FloatArray, settings: Settings
-) -> tuple[Matched, TimeOffset | None]:
-    there, here = reference.trajectory, entry.trajectory
+def _matched(reference: Entry, entry: Entry, up: FloatArray, settings: Settings) -> tuple[Matched, TimeOffset | None]:
+    """Pairs of poses, aligned, and the time offset where it is searched for."""
+    there, here, kind = reference.trajectory, entry.trajectory, settings.align or Align.NONE
     if there.stamped != here.stamped:
         bare = there if here.stamped else here
         raise InputError(

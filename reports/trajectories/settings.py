@@ -53,30 +53,30 @@ class Settings:
     align: str | None = None
     """none, first-pose, yaw, se3 or sim3; None for `none` from a run's reference (the worlds are one), else `se3`"""
     align_first: int | None = None
-    """over so many pairs of poses; None for all"""
+    """number of pairs of poses to align over; None for all"""
     up: tuple[float, float, float] | None = None
-    """what points up in the reference's world; None for what the run or `sequence` says, else +z"""
+    """up in the reference's world; None for that of the run or `sequence`, else +z"""
     association: str = "nearest"
     tolerance: float | None = None
-    """s; None for the association's own"""
+    """largest time difference of a pair, s; None for that of the association"""
     offset: float = 0.0
-    """s, added to the stamps of the estimates"""
+    """time offset added to the stamps of the estimates, s"""
     search_offset: float | None = None
-    """s; within it the offset of each estimate is searched for, on top of `offset`"""
+    """half width of the search for the time offset of each estimate around `offset`, s; None for no search"""
     deltas: tuple[Delta, ...] = ()
-    """of relative errors; empty for 1 s (where there are stamps; else 1 frame) and 10 m"""
+    """lengths of relative motions; empty for 1 s (1 frame without stamps) and 10 m"""
     all_pairs: bool = False
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None
     times: tuple[Path, ...] = ()
     """stamps for KITTI files: each takes those with one for each of its poses"""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """of stamps whose unit neither a header nor their size shows"""
+    """unit of stamps, where neither a header nor their size shows it"""
     quaternion: Literal["xyzw", "wxyz"] | None = None
-    """the order of quaternions that no header names"""
+    """order of quaternions that no header names"""
     lever_arm: tuple[float, float, float] | None = None
-    """m, in the body of the estimates: the point whose positions the reference has"""
+    """point that the reference follows, m, in the body of the estimates"""
     align_body: bool = False
-    """whether a constant rotation between the bodies is removed"""
+    """removes a constant rotation between the bodies"""
     sequence: Path | None = None
     """a recording, or the folder of an exported problem"""
     held_out: float = 0.0
@@ -86,9 +86,9 @@ class Settings:
     reference_body: Body = "imu"
     estimate_body: Body = "imu"
     beside: str = "all"
-    """which estimators of a run that is the reference are compared too: names with commas, `all` or `none`"""
+    """estimators of the reference's run to compare too: names with commas, `all` or `none`"""
     seed: int = 0
-    """of the bootstrap, and of what is held out"""
+    """seed of the bootstrap and of the held-out tracks"""
 
     @property
     def unit(self) -> "TimeUnit | None":
