@@ -104,7 +104,7 @@ $(VENV)/tools.stamp: pyproject.toml
 
 schema: install
 	$(BIN)/python -m fgbaseline.reports.schema > docs/summary.schema.json
-	$(BIN)/python -m fgbaseline.reports.comparing.schema > docs/comparison.schema.json
+	$(BIN)/python -m fgbaseline.reports.results.comparison > docs/comparison.schema.json
 
 wheel: install
 	$(BIN)/python -m build

@@ -1,7 +1,7 @@
 """`fgbaseline compare`: trajectories from anywhere against a reference."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
@@ -64,7 +64,7 @@ class Direction(click.ParamType[tuple[float, ...]]):
     "--format",
     "form",
     type=click.Choice(["tum", "kitti", "euroc", "npz"]),
-    help="Insist on a format of the files.  [default: told from their content]",
+    help="Insist on a format of the files.  [default: detected from the content]",
 )
 @click.option(
     "--times",
@@ -127,64 +127,48 @@ class Direction(click.ParamType[tuple[float, ...]]):
 def command(
     reference: str,
     estimates: tuple[str, ...],
+    landmarks: tuple[str, ...],
+    deltas: tuple[str, ...],
     out: Path | None,
     force: bool,
-    align: str | None,
-    align_first: int | None,
-    up: tuple[float, float, float] | None,
-    association: str,
-    tolerance: float | None,
-    offset: float,
-    search_offset: float | None,
-    deltas: tuple[str, ...],
-    all_pairs: bool,
-    form: Literal["tum", "kitti", "euroc", "npz"] | None,
-    times: tuple[Path, ...],
-    time_unit: Literal["s", "ms", "us", "ns"] | None,
-    quaternion: Literal["xyzw", "wxyz"] | None,
-    lever_arm: tuple[float, float, float] | None,
-    align_body: bool,
-    sequence: Path | None,
-    landmarks: tuple[str, ...],
-    held_out: float,
-    reference_body: Literal["imu", "camera"],
-    estimate_body: Literal["imu", "camera"],
-    extrinsic: Path | None,
-    beside: str,
-    seed: int,
-) -> int:
+    **options: Any,
+) -> None:
     """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
 
-    REFERENCE may also be the folder of a run: its reference is taken, the trust in it said first, and its other
+    REFERENCE may also be the folder of a run: its reference is taken, the trust in it is printed first, and its other
     estimators are compared beside yours.
 
     Exits 0, or 2 on bad input.
     """
-    from ..comparing.settings import Delta, Settings
-    from ..comparing.telling import tell
+    import numpy as np
 
-    settings = Settings(
-        align=align,
-        align_first=align_first,
-        up=up,
-        association=association,
-        tolerance=tolerance,
-        offset=offset,
-        search_offset=search_offset,
-        deltas=tuple(Delta.parse(text) for text in deltas),
-        all_pairs=all_pairs,
-        form=form,
-        times=times,
-        time_unit=time_unit,
-        quaternion=quaternion,
-        lever_arm=lever_arm,
-        align_body=align_body,
-        sequence=sequence,
-        held_out=held_out,
-        extrinsic=extrinsic,
-        reference_body=reference_body,
-        estimate_body=estimate_body,
-        beside=beside,
-        seed=seed,
-    )
-    return tell(reference, estimates, landmarks, settings, out, force=force)
+    from fgbaseline.geometry import InputError
+
+    from ..comparing.inputs import read_entries
+    from ..phrases.comparison import caption, verdict
+    from ..results.comparison import MARK
+    from ..results.comparison_summary import summarize
+    from ..tables import print_table
+    from ..tables.comparison import comparison_table
+    from ..trajectories.metrics import compare_entries
+    from ..trajectories.settings import Delta, Settings
+    from ..whole_folder import require_free
+
+    settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
+    if out is not None:
+        require_free(out, force=force, mark=MARK)
+    elif force:
+        raise InputError("force: there is no folder to replace; add --out DIR")
+    with np.errstate(all="ignore"):
+        comparison = compare_entries(read_entries(reference, estimates, landmarks, settings), settings)
+    summary = summarize(comparison, caption(comparison))
+    if out is not None:
+        from ..comparing.folder import write
+
+        write(comparison, summary, out, force=force)
+    first, *others = verdict(comparison)
+    click.echo(f"{first}\n")
+    print_table(comparison_table(comparison, summary), wrap_names=False)
+    click.echo("\n".join([f"{summary.caption}\n", *others]))
+    if out is not None:
+        click.echo(f"\nThe report is in {out / 'report.html'}")

@@ -19,7 +19,7 @@ from ..figures.lettering import plain
 from ..figures.style import WIDTH, head, in_style, sheet, swatch
 from ..figures.view import TopView
 from ..figures.window import Window, common_window
-from .comparison import Comparison, Result
+from ..trajectories.comparison import Comparison, Result
 from .lines import colours, line
 from .motion_figures import relative, segments
 from .pixel_figure import reprojection
@@ -132,7 +132,7 @@ def _maps(comparison: Comparison) -> Figure | None:
 
 
 def _three_sigma(comparison: Comparison, result: Result) -> Figure | None:
-    claimed = result.claimed
+    claimed = result.reported_covariance
     if claimed is None or not np.isfinite(claimed.nees).any():
         return None
     t, style = _seconds(comparison, result), line(comparison, result.name)

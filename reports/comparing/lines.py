@@ -4,7 +4,7 @@ from typing import Any
 
 from ..figures.lettering import plain
 from ..figures.palette import colours_of
-from .comparison import Comparison
+from ..trajectories.comparison import Comparison
 
 
 def colours(comparison: Comparison) -> dict[str, str]:

@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 
 from ..figures.lettering import plain
 from ..figures.style import WIDTH, head
-from .comparison import Comparison
+from ..trajectories.comparison import Comparison
 from .lines import colours, line
 
 

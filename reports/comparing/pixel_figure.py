@@ -9,9 +9,9 @@ from matplotlib.lines import Line2D
 
 from ..figures.reprojections import GRID, share_within
 from ..figures.style import head, sheet
-from .comparison import Comparison
+from ..trajectories.comparison import Comparison
+from ..trajectories.reprojection import Pixels
 from .lines import line
-from .pixels import Pixels
 
 THIN: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
 

@@ -1,4 +1,4 @@
-"""What `fgbaseline run` left behind, read back: its reference with the trust in it, its paths and landmarks."""
+"""Folder of `fgbaseline run`, read back: its reference with the trust in it, its paths and landmarks."""
 
 import json
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from ..job import MARK
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
-    """A run's summary, and where its files are."""
+    """Summary of a run, and its files."""
 
     folder: Path
     reference: str
@@ -29,16 +29,16 @@ class RunFolder:
     """up in the world of its trajectories; None in the summaries of older runs"""
 
     def trajectory(self, name: str) -> Trajectory:
-        """The path of an estimator; raises InputError."""
+        """Path of an estimator; raises InputError."""
         return read_trajectory(self.folder / "trajectories" / f"{name}.tum", "tum", name=name)
 
     def landmarks(self, name: str) -> Landmarks:
-        """The landmarks of an estimator; raises InputError."""
+        """Landmarks of an estimator; raises InputError."""
         return read_landmarks(self.folder / "landmarks" / f"{name}.csv")
 
 
 def read_run_folder(folder: Path) -> RunFolder:
-    """Raises InputError, naming the file, where the folder is not that of a run that has a reference."""
+    """Reads the summary. Raises InputError, naming the file, where the folder is not that of a run with a reference."""
     path = folder / MARK
     if not path.is_file():
         raise InputError(

@@ -10,7 +10,12 @@ UNWRAPPED = 160
 
 
 def print_table(
-    table: Table, *, width: int = UNWRAPPED, styles: Mapping[str, str] | None = None, spaced: bool = False
+    table: Table,
+    *,
+    width: int = UNWRAPPED,
+    styles: Mapping[str, str] | None = None,
+    spaced: bool = False,
+    wrap_names: bool = True,
 ) -> None:
     """Prints the table; `styles` has rich's style for the rows of a status, `spaced` leaves a line between rows."""
     from rich.console import Console
@@ -18,7 +23,7 @@ def print_table(
     from rich.text import Text
 
     shown = RichTable(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0) if spaced else (0, 1))
-    shown.add_column(table.name, overflow="fold")
+    shown.add_column(table.name, overflow="fold", no_wrap=not wrap_names)
     for column in table.columns:
         shown.add_column(Text(column.heading), justify="left" if column.words else "right", overflow="fold")
     for row in table.rows:

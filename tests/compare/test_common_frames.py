@@ -17,12 +17,11 @@ from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.bench.results import METRICS
 from fgbaseline.reports.bench.wording import _winner
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.paper import latex, markdown
-from fgbaseline.reports.comparing.ranking import ranking_of
-from fgbaseline.reports.comparing.summary import summarise
-from fgbaseline.reports.comparing.wording import order_in_words
 from fgbaseline.reports.html.table import main_table
 from fgbaseline.reports.html.verdict import verdict
+from fgbaseline.reports.phrases.comparison import order_in_words
+from fgbaseline.reports.tables import latex, markdown
+from fgbaseline.reports.trajectories.ranking import ranking_of
 
 from ..builders.reported import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
@@ -112,7 +111,7 @@ def test_an_estimate_that_lost_track_half_way_is_ranked_over_what_both_have(lost
     assert "Over the 100 moments that all have, whole with" in said
     assert "Farther than whole, by paired bootstrap of their RMSE: lost (" in said
     assert "100 moments (49.7 % of gt's time)" in said
-    estimates = summarise(result).estimates
+    estimates = result.summary.estimates
     assert (estimates["whole"].rank, estimates["lost"].rank) == (1, 2)
     assert (estimates["whole"].coverage, estimates["lost"].coverage) == pytest.approx((1.0, 99 / 199))
 
@@ -120,11 +119,11 @@ def test_an_estimate_that_lost_track_half_way_is_ranked_over_what_both_have(lost
 def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", align="none")
     result.write(lost / "out")
-    for text in (markdown(result), latex(result), (lost / "out" / "report.html").read_text()):
+    for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
         assert "share of the reference's time" in text.replace("&#39;", "'")
         assert "0.497" in text
         assert "RMSE over common moments, m" in text
-    bold = [line for line in latex(result).splitlines() if r"\textbf" in line]
+    bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
     assert len(bold) == 1  # what each has alone says nothing of who is best
     assert "common moments" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
@@ -139,7 +138,7 @@ def test_estimates_without_a_moment_in_common_are_not_ranked(lost: Path) -> None
     result = compare(lost / "gt.tum", lost / "lost.tum", late, align="none")
     assert any("Not ranked, since they do not have enough moments in common" in s for s in result.verdict)
     assert not any(s.startswith(("Nearest", "Farther", "This recording does not settle")) for s in result.verdict)
-    assert {e.rank for e in summarise(result).estimates.values()} == {None}
+    assert {e.rank for e in result.summary.estimates.values()} == {None}
 
 
 def test_one_with_next_to_no_moments_takes_none_from_the_others(lost: Path) -> None:

@@ -11,7 +11,6 @@ from fgbaseline import compare as figures
 from fgbaseline import data
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.summary import summarise
 
 from ..conftest import RECORDINGS
 
@@ -38,7 +37,7 @@ def nees(folder: Path, truth: FloatArray, poses: FloatArray, covariance: FloatAr
     t = 0.1 * np.arange(len(truth))
     data.write_tum(folder / "truth.tum", t, truth)
     data.write_trajectory_npz(folder / "mine.npz", t, poses, covariance)
-    found = summarise(compare(folder / "truth.tum", folder / "mine.npz", **options)).estimates["mine"].nees
+    found = compare(folder / "truth.tum", folder / "mine.npz", **options).summary.estimates["mine"].nees
     assert found is not None
     assert found.mean is not None
     return found.mean
@@ -116,7 +115,7 @@ def test_case_30_covariances_under_an_alignment(kind: str | None) -> None:
     if not folder.is_dir():
         pytest.skip(f"cases/30-nees is not in {RECORDINGS} (set FGBASELINE_RECORDINGS)")
     result = compare(folder / "truth.npz", folder / "right_order.npz", align=kind)
-    found = summarise(result).estimates["right_order"].nees
+    found = result.summary.estimates["right_order"].nees
     assert found is not None
     assert found.mean == pytest.approx(5.44, abs=0.01)
     assert any("mean NEES 5.44 over 399 poses" in sentence for sentence in result.verdict)

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from fgbaseline.data.formats import write_kitti, write_trajectory_npz
 from fgbaseline.geometry import InputError, se3
-from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.comparison import Comparison
+from fgbaseline.reports.comparing import ComparisonReport, compare
 
 from ..builders.trajectory_writers import VARIANTS, Path3D, frames, kitti, rows, tum
 
@@ -38,7 +37,7 @@ def astray(path: Path3D, seed: int) -> Path3D:
     return Path3D(path.ns, se3.exp(random.normal(size=6)) @ path.poses @ se3.exp(drift))
 
 
-def figures(comparison: Comparison, *, oriented: bool = True) -> dict[str, float]:
+def figures(comparison: ComparisonReport, *, oriented: bool = True) -> dict[str, float]:
     """The metrics, those of positions only where the file has no more."""
     table = comparison.metrics.set_index("metric")["value"]
     kept = ("translation.rmse", "translation.max", "pairing.pairs", "shares.heading")
@@ -50,7 +49,7 @@ def figures(comparison: Comparison, *, oriented: bool = True) -> dict[str, float
     return chosen
 
 
-def compared(*files: Path | str, **options: Any) -> Comparison | str:
+def compared(*files: Path | str, **options: Any) -> ComparisonReport | str:
     """The comparison, or why there is none."""
     try:
         return compare(*files, **options)

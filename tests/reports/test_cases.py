@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.comparison import Comparison
+from fgbaseline.reports.comparing import ComparisonReport, compare
 
 from ..builders.commands import fgbaseline
 from ..conftest import RECORDINGS
@@ -75,7 +74,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
 Recordings = Callable[[str], Path]
 
 
-def compared(recordings: Recordings, folder: str, files: tuple[str, ...], options: dict[str, Any]) -> Comparison:
+def compared(recordings: Recordings, folder: str, files: tuple[str, ...], options: dict[str, Any]) -> ComparisonReport:
     places = {name: recordings(f"{folder}/{name}") for name in files}
     chosen = {
         key: recordings(f"{folder}/{value}") if key in ("times", "extrinsic") else value
@@ -84,7 +83,7 @@ def compared(recordings: Recordings, folder: str, files: tuple[str, ...], option
     return compare(*places.values(), **chosen)
 
 
-def value_of(comparison: Comparison, metric: str, row: int = 0) -> float:
+def value_of(comparison: ComparisonReport, metric: str, row: int = 0) -> float:
     return float(comparison.metrics.set_index("metric")["value"].loc[[metric]].iloc[row])
 
 

@@ -18,7 +18,6 @@ from fgbaseline.reports.checking.evaluation import evaluate
 from fgbaseline.reports.checking.limits_file import read_limits
 from fgbaseline.reports.checking.measured import metrics_of, read_folder, sample_of
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.summary import summarise
 from fgbaseline.reports.html.verdict import verdict
 
 from ..builders.commands import fgbaseline
@@ -50,7 +49,7 @@ def compared(n: int, *, estimate: FloatArray | None = None, every: int = 1) -> d
     truth = Trajectory(t[k], poses[k], "truth")
     here = off(poses, 0.01, 1) if estimate is None else estimate
     result = compare(truth, Trajectory(t[: len(here)], here, "mine"))
-    return summarise(result).model_dump(mode="json", by_alias=True)
+    return result.summary.model_dump(mode="json", by_alias=True)
 
 
 def test_every_number_of_a_run_and_of_a_comparison_has_its_sample_or_is_none() -> None:
@@ -88,7 +87,7 @@ def test_the_smallest_sample_and_coverage_are_settable_for_the_file_and_for_a_li
 def test_one_stretch_of_many_metres_is_too_little_of_a_path(tmp_path: Path) -> None:
     t, poses = 0.1 * np.arange(200), path()
     result = compare(Trajectory(t, poses, "truth"), Trajectory(t, off(poses, 0.01, 1), "mine"), deltas=["90m", "50m"])
-    document = summarise(result).model_dump(mode="json", by_alias=True)
+    document = result.summary.model_dump(mode="json", by_alias=True)
     assert judged(document, tmp_path, LIMIT.format("relative.90 m.translation.rmse.value")) == 2
     assert judged(document, tmp_path, LIMIT.format("relative.90 m.rotation_deg.max") + "smallest_sample = 1\n") == 0
     assert judged(document, tmp_path, LIMIT.format("relative.50 m.translation.rmse.value")) == 0

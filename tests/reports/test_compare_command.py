@@ -12,7 +12,6 @@ from fgbaseline import data
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.summary import summarise
 
 from ..builders.commands import everything_in, fgbaseline
 from ..builders.synthetic import drive
@@ -81,7 +80,7 @@ def test_the_problem_of_a_run_is_posed_again_from_its_recording(made: Path) -> N
         for sequence in ("problem", "drive.npz")
     )
     assert list(one.results) == ["mine"]
-    assert summarise(one).estimates == summarise(other).estimates
+    assert one.summary.estimates == other.summary.estimates
 
 
 def test_against_a_file_the_table_and_its_caption_are_told(made: Path) -> None:

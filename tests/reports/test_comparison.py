@@ -18,9 +18,8 @@ from fgbaseline.data import Trajectory
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.comparing.paper import latex, markdown
-from fgbaseline.reports.comparing.schema import json_schema
-from fgbaseline.reports.comparing.summary import summarise
+from fgbaseline.reports.results.comparison import json_schema
+from fgbaseline.reports.tables import latex, markdown
 
 from ..builders.synthetic import drive, matched
 
@@ -114,8 +113,8 @@ def test_every_alignment_is_said(files: Path, kind: str) -> None:
     result = compare(files / "truth.tum", files / "near.csv", align=kind)
     said = {"none": "not aligned", "first-pose": "first pose", "yaw": "yaw", "se3": "SE(3)", "sim3": "Sim(3)"}[kind]
     assert said in result.caption
-    assert summarise(result).estimates["near"].alignment.kind == kind
-    assert said.lower() in markdown(result).lower()
+    assert result.summary.estimates["near"].alignment.kind == kind
+    assert said.lower() in markdown(result.text_table).lower()
 
 
 def test_an_offset_is_found_and_told(files: Path) -> None:
@@ -174,7 +173,7 @@ def test_held_out_tracks_rank_the_paths(files: Path) -> None:
     result = compare(files / "truth.tum", files / "near.csv", files / "shaken.tum", **given)
     assert result.held_out is not None
     assert list(result.held_out.index) == ["truth", "near", "shaken"]
-    figures = summarise(result).estimates["shaken"].held_out
+    figures = result.summary.estimates["shaken"].held_out
     assert figures is not None
     assert figures.behind.low is not None
     assert figures.behind.low > 0.0
@@ -214,7 +213,7 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     assert row["reprojection, median px: its landmarks"] == pytest.approx(0.916, abs=0.03)
     assert row["reprojection, median px: triangulated"] < row["reprojection, median px: its landmarks"]
     assert far["reprojection, median px: triangulated"] > 2.0 * row["reprojection, median px: triangulated"]
-    assert summarise(result).estimates["far"].notes["reprojection"] == "no landmarks came with it"
+    assert result.summary.estimates["far"].notes["reprojection"] == "no landmarks came with it"
     assert "reprojection" in result.figures()
 
 
@@ -232,7 +231,7 @@ def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
     said = " ".join(result.verdict)
     assert "Farther than one, by paired bootstrap of their RMSE: two (" in said
     assert "does not settle whether one is nearer than three" in said
-    summary = summarise(result).estimates
+    summary = result.summary.estimates
     assert summary["one"].behind is None
     assert summary["two"].behind is not None
     rmse = {name: summary[name].translation.rmse.value or 0.0 for name in ("one", "two")}
@@ -255,7 +254,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     covariance = np.tile(np.diag(deviation**2), (len(t), 1, 1))
     data.write_trajectory_npz(files / "mine.npz", t, poses @ se3.exp(error), covariance)
     result = compare(files / "truth.tum", files / "mine.npz", align="none")
-    nees = summarise(result).estimates["mine"].nees
+    nees = result.summary.estimates["mine"].nees
     assert nees is not None
     assert nees.mean == pytest.approx(6.0, abs=1.0)
     assert (nees.frames, nees.not_positive_definite) == (len(t), 0)
@@ -266,7 +265,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     data.write_trajectory_npz(files / "bad.npz", t, poses @ se3.exp(error), covariance)
     bad = compare(files / "truth.tum", files / "bad.npz", align="none")
     assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
-    aligned = summarise(compare(files / "truth.tum", files / "mine.npz")).estimates["mine"]
+    aligned = compare(files / "truth.tum", files / "mine.npz").summary.estimates["mine"]
     assert aligned.nees is not None
     assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
     between = compare(files / "truth.tum", files / "mine.npz", association="interpolated")
@@ -288,7 +287,7 @@ def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
     assert "&lt;b&gt;&amp;|%_$" in page
     assert "default-src 'none'" in page
     assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org", "")
-    assert r"\textless{}b\textgreater{}\&\textbar{}\%\_\$" in latex(result)
+    assert r"\textless{}b\textgreater{}\&\textbar{}\%\_\$" in latex(result.text_table)
     aligned = data.read_trajectory(files / "out" / "trajectories" / "near.tum")
     assert np.linalg.norm(aligned.position - truth()[1][:, :3, 3], axis=1).mean() < 0.2
     series = pd.read_csv(files / "out" / "series" / "near.csv")
@@ -316,7 +315,7 @@ def test_short_and_standing_paths_say_what_they_lack(tmp_path: Path) -> None:
     data.write_tum(tmp_path / "off.tum", np.arange(5.0), off)
     result = compare(tmp_path / "standing.tum", tmp_path / "off.tum", align="none")
     assert result.table["absolute error: RMSE, m"]["off"] == pytest.approx(0.1)
-    notes = summarise(result).estimates["off"].notes
+    notes = result.summary.estimates["off"].notes
     assert set(notes) >= {"segments", "drift", "relative.10 m"}
     assert all(notes.values())
     result.write(tmp_path / "out")

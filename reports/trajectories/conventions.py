@@ -1,4 +1,4 @@
-"""What trajectory files leave open, settled by the files that they are compared with: units, orders, orientations."""
+"""Conventions that trajectory files leave open, decided by the files beside them: time units, quaternion orders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,23 +17,23 @@ from .settings import Settings
 
 Source = TrajectoryFile | Trajectory
 Times = Sequence[FloatArray]
-"""stamps of frames, for files without: each takes those that have one for each of its poses"""
+"""stamps of frames, s, for files without: each takes those that have one for each of its poses"""
 FEWEST = 10
-"""pairs of poses, below which orders of quaternions are not judged"""
+"""least number of pairs of poses to judge quaternion orders by"""
 VARIED, TURNED = np.deg2rad(1.0), np.deg2rad(10.0)
-"""by which orientations differ that are not constant, and those of a body that cannot have gone straight"""
+"""rad: least angle between orientations that vary, and between those of a body on a curve"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Resolved:
-    """A trajectory file, or a trajectory at hand, with what is decided about it so far."""
+    """A trajectory file, or a trajectory in memory, with the conventions decided so far."""
 
     source: Source
     unit: TimeUnit = TimeUnit.S
     order: Order = "xyzw"
     oriented: bool = True
     remarks: tuple[str, ...] = ()
-    """what was recognized: each completes a sentence that begins with the trajectory's name"""
+    """findings: each completes a sentence that begins with the trajectory's name"""
 
     def trajectory(self, times: Times, order: Order | None = None) -> Trajectory:
         """The trajectory, with its quaternions in another order if one is given."""
@@ -57,14 +57,14 @@ class Resolved:
         return self.source.orders if isinstance(self.source, TrajectoryFile) else ("xyzw",)
 
     def remarked(self, remark: str) -> "Resolved":
-        """The same with one more remark."""
+        """The input with one more remark."""
         return replace(self, remarks=(*self.remarks, remark))
 
 
 def resolve(sources: Sequence[Source], times: Times, settings: Settings) -> list[Resolved]:
-    """The reference, which is the first of the sources, and the estimates, each settled as far as the others show.
+    """Reference, which is the first source, and estimates, with their conventions decided by each other.
 
-    Raises InputError for what nothing settles.
+    Raises InputError for units that nothing decides.
     """
     _require_same_frames(sources, times)
     reference, *estimates = _with_units(sources, settings)
@@ -109,7 +109,7 @@ def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
 
 
 def _only(source: Source, spans: Spans) -> TimeUnit:
-    """The unit, where there is one. Raises InputError where there are several, or none although there are stamps."""
+    """The only possible unit. Raises InputError where there are several, or none although there are stamps."""
     if isinstance(source, Trajectory) or source.stamps is None or len(spans) == 1:
         return next(iter(spans), TimeUnit.S)
     raise InputError(in_doubt(source, list(spans)))
@@ -126,7 +126,7 @@ def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
 def _with_orders(
     reference: Resolved, estimates: Sequence[Resolved], times: Times, settings: Settings
 ) -> list[Resolved]:
-    """Quaternions in the order that a header or the user names, else in that which fits clearly better, or is usual."""
+    """Quaternion orders: as a header or the user names them, else as fits clearly better, else as usual."""
     reference, *estimates = [_asked_for(each, settings.quaternion) for each in (reference, *estimates)]
     if settings.quaternion is not None:
         return [reference, *estimates]
@@ -146,17 +146,17 @@ def _with_orders(
 
 
 def _asked_for(each: Resolved, order: Order | None) -> Resolved:
-    """With the order that the user names, where the file names none."""
+    """The input with the user's order, where the file names none."""
     if order is None or len(each.orders) == 1:
         return replace(each, order=each.orders[0])
     return replace(each, order=order)
 
 
 def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Settings) -> FloatArray | None:
-    """Angles, deg, by which the rotations differ: a row for each order of the reference, a column for the estimate's.
+    """Misfits of the rotations, deg: a row for each order of the reference, a column for each of the estimate.
 
-    The positions show how the worlds are turned, or else the rotations themselves. None where there are no
-    orientations or hardly a pair.
+    The rotation between the worlds is that of the positions, else of the rotations themselves. None without
+    orientations, and with too few pairs.
     """
     if len(reference.orders) == len(estimate.orders) == 1:
         return None
@@ -179,7 +179,7 @@ def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Se
 
 
 def _travel_misfits(each: Resolved, times: Times) -> tuple[float, ...]:
-    """By how much a path changes the direction in which it travels in its body, deg, by order."""
+    """Change of the direction of travel in the body frame along a path, deg, by quaternion order."""
     if len(each.orders) == 1:
         return ()
     paths = [each.trajectory(times, order) for order in each.orders]
@@ -187,19 +187,19 @@ def _travel_misfits(each: Resolved, times: Times) -> tuple[float, ...]:
 
 
 def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[Resolved, int]:
-    """With the other order if that fits clearly better, and whether it does."""
+    """The input with the order that fits clearly better, and 1 where that is not the usual one."""
     if len(each.orders) == 1 or not compare.fits_clearly_better(other, assumed):
         return each, 0
     order = each.orders[1]
-    said = (
+    remark = (
         f"its quaternions are read as {' '.join(order)}: so its rotations fit to {other:.2g}° in the median, and to "
         f"{assumed:.2g}° as {' '.join(each.orders[0])}"
     )
-    return replace(each, order=order, remarks=(*each.remarks, said)), 1
+    return replace(each, order=order).remarked(remark), 1
 
 
 def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> MatchedTrajectories | None:
-    """The pairs of poses, not aligned; None where there are none (which is reported later) or no orientations."""
+    """Pairs of poses, not aligned; None without any (which is reported later) and without orientations."""
     if reference.stamped != estimate.stamped or not (reference.oriented and estimate.oriented):
         return None
     try:
@@ -211,15 +211,16 @@ def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> M
 
 
 def _without_constant_orientations(every: list[Resolved], times: Times) -> list[Resolved]:
-    """Positions only, where a file has one orientation throughout while its path bends or another file turns."""
+    """Inputs without the orientations of files that have a single one while their path bends or another file turns."""
     paths = [each.trajectory(times) for each in every]
     turning = [path.oriented and _vary(path, TURNED) for path in paths]
     result = []
     for each, path, turns in zip(every, paths, turning, strict=True):
         constant = path.oriented and len(path) > 1 and bool(np.abs(path.rotation - path.rotation[0]).max() < 1e-12)
         if constant and not turns and (any(turning) or bends(path.position)):
-            said = "all its orientations are the same: it has positions and no orientations"
-            each = replace(each, oriented=False, remarks=(*each.remarks, said))
+            each = replace(each, oriented=False).remarked(
+                "all its orientations are the same: it has positions and no orientations"
+            )
         result.append(each)
     return result
 

@@ -1,4 +1,4 @@
-"""Whether the covariances that came with an estimate tell the truth about its errors."""
+"""Consistency of the covariances that an estimate reports: its errors against the truth, and their NEES."""
 
 from dataclasses import dataclass
 
@@ -16,31 +16,30 @@ ALIGNED = "the alignment takes out a part of the errors"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Claimed:
-    """The errors of n poses beside the covariances that came with them."""
+class ReportedCovariance:
+    """Errors of n poses and the covariances that the estimate reports for them."""
 
     error: FloatArray
     """(n, 6) see `compare.body_error`"""
     covariance: FloatArray
     """(n, 6, 6)"""
     nees: FloatArray
-    """(n,) see `compare.nees`; NaN where the covariance is held at zero, or is none"""
+    """(n,) see `compare.nees`; NaN where the covariance is held at zero, or is not positive definite"""
     not_positive_definite: int
-    """how many of them are no covariances"""
+    """number of covariances that are not"""
     remark: str = ""
-    """what an alignment means for errors and covariances"""
+    """how the alignment changed errors and covariances"""
 
 
-def claimed_by(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> Claimed:
-    """What each pair says against a reference that is taken for the truth.
+def reported_covariance(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> ReportedCovariance:
+    """Errors and NEES of each pair, the reference being taken for the truth.
 
-    Without an alignment both are as they came. With one, errors and covariances are those of the motion since the
-    first pose, where the covariances are of that kind (see `compare.covariance_since_first`): then it does not matter
-    which alignment it is. Other covariances are taken as they are beside the aligned errors. An alignment with a scale
-    scales the covariances.
+    Without an alignment errors and covariances are used unchanged. With one, they are those of the motion since the
+    first pose, where the covariances are of that kind (see `compare.covariance_since_first`): then the result does not
+    depend on the alignment. Other covariances are used unchanged with the aligned errors. A scale applies to the
+    covariances too.
 
-    Raises InputError, saying why, where it would not mean anything: without covariances, between interpolated poses,
-    and against a run's reference, which shares its data.
+    Raises InputError without covariances, for interpolated poses, and for a run's reference, which shares its data.
     """
     if entry.covariance is None:
         raise InputError("no covariances came with it")
@@ -61,7 +60,7 @@ def claimed_by(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> 
     estimate = Estimate(entry.name, poses, used=np.empty(0, dtype=np.bool_), covariance=covariance)
     true_path = Truth(truth, source=reference.trajectory.source)
     state = compare.covariance_state(estimate)
-    return Claimed(
+    return ReportedCovariance(
         error=compare.body_error(estimate, true_path),
         covariance=covariance,
         nees=compare.nees(estimate, true_path),

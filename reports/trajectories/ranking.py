@@ -1,4 +1,4 @@
-"""Which estimate is nearest to the reference, over the moments that all have, and whether that is settled."""
+"""Ranking of estimates by the RMSE over their common moments, with paired bootstrap intervals of the differences."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,36 +10,44 @@ from fgbaseline import compare
 from fgbaseline.compare import RmseDifference
 from fgbaseline.data.observations import IntArray
 
-from .spreading import spread
+AT_MOST = 100_000_000
+"""errors that a bootstrap draws"""
+REPETITIONS = 1000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ranking:
-    """The errors of positions over the moments that all estimates have which take part: see `compare.rankable`."""
+    """Position errors over the moments that all ranked estimates have: see `compare.rankable`."""
 
     at: dict[str, IntArray]
-    """by name, nearest first: which of its own pairs of poses are of these moments"""
+    """by name, nearest first: indices of the pairs of poses at these moments"""
     common: dict[str, pd.DataFrame]
-    """the statistics over them, in the same order: see `compare.error_statistics`"""
+    """statistics over them, in this order: see `compare.error_statistics`"""
     behind: dict[str, RmseDifference]
-    """by how much each rival is farther from the reference than the nearest; that one is missing"""
+    """RMSE of each rival above that of the nearest, which is missing"""
     rivals: tuple[str, ...]
-    """nearest first: those that the reference's own run did not give along"""
+    """nearest first: all but by-products of the reference"""
     same: bool
-    """whether these are all the moments of every estimate"""
+    """whether they are all the moments of every estimate"""
 
     @property
     def moments(self) -> int:
-        """How many moments there are; 0 where no two estimates can be ranked."""
+        """Number of common moments; 0 where no two estimates can be ranked."""
         return len(next(iter(self.at.values()), ()))
 
     def rmse(self, name: str) -> float:
-        """Of the positions over the common moments, m."""
+        """RMSE of the positions over the common moments, m."""
         return float(self.common[name]["value"]["rmse"])
 
     def rank(self, name: str) -> int | None:
-        """From 1; None for what takes no part, and for by-products of the reference."""
+        """Rank from 1; None for estimates that are not ranked, and for by-products of the reference."""
         return self.rivals.index(name) + 1 if name in self.rivals else None
+
+
+def spread(errors: "pd.Series[float]", seed: int) -> pd.DataFrame:
+    """`compare.error_statistics` of errors (n,), with fewer repetitions for very long paths, at least 100."""
+    repetitions = int(np.clip(AT_MOST // max(len(errors), 1), 100, REPETITIONS))
+    return compare.error_statistics(errors, repetitions=repetitions, seed=seed)
 
 
 def ranking_of(
@@ -49,9 +57,9 @@ def ranking_of(
     by_products: frozenset[str],
     seed: int,
 ) -> Ranking:
-    """All estimates by the RMSE of their `errors` (n,) at rising `stamps` (n,) of the reference.
+    """Ranking by the RMSE of `errors` (n,) at increasing `stamps` (n,), s, of the reference.
 
-    Stamps within `tolerance` (s) are one moment where the estimates do not have the same ones.
+    Stamps within `tolerance`, s, are one moment where the estimates do not have the same ones.
     """
     chosen = compare.rankable({name: len(t) for name, t in stamps.items()})
     at = compare.common_stamps({name: stamps[name] for name in chosen}, tolerance)

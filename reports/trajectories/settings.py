@@ -1,24 +1,22 @@
-"""What a user asks of a comparison. Nothing heavy is imported: bad options are told at once."""
+"""Settings of a comparison. Nothing heavy is imported: bad options are reported at once."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from fgbaseline.geometry import InputError
 
 if TYPE_CHECKING:
     from fgbaseline.data import TimeUnit
 
-MARK = "comparison.json"
-"""the file by which a comparison's folder is known"""
-
 Body = Literal["imu", "camera"]
 
 
 @dataclass(frozen=True, slots=True)
 class Delta:
-    """How far apart two poses are whose relative motion is compared."""
+    """Distance between two poses whose relative motion is compared."""
 
     length: float
     unit: str
@@ -26,7 +24,7 @@ class Delta:
 
     @staticmethod
     def parse(text: str) -> "Delta":
-        """Of a text such as `1s`, `10m`, `30deg` or `5frames`; raises InputError."""
+        """Parses a text such as `1s`, `10m`, `30deg` or `5frames`; raises InputError."""
         found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|m|deg|frames)\s*", text)
         try:
             length = float(found[1]) if found else 0.0
@@ -44,41 +42,41 @@ class Delta:
 
     @property
     def text(self) -> str:
-        """As a table's heading has it."""
+        """Text in headings and keys, such as `10 m`."""
         return f"{self.length:g} {self.unit}"
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything but the trajectories."""
+    """Options of a comparison."""
 
     align: str | None = None
     """none, first-pose, yaw, se3 or sim3; None for `none` from a run's reference (the worlds are one), else `se3`"""
     align_first: int | None = None
-    """over so many pairs of poses; None for all"""
+    """number of pairs of poses to align over; None for all"""
     up: tuple[float, float, float] | None = None
-    """what points up in the reference's world; None for what the run or `sequence` says, else +z"""
+    """up in the reference's world; None for that of the run or `sequence`, else +z"""
     association: str = "nearest"
     tolerance: float | None = None
-    """s; None for the association's own"""
+    """largest time difference of a pair, s; None for that of the association"""
     offset: float = 0.0
-    """s, added to the stamps of the estimates"""
+    """time offset added to the stamps of the estimates, s"""
     search_offset: float | None = None
-    """s; within it the offset of each estimate is searched for, on top of `offset`"""
+    """half width of the search for the time offset of each estimate around `offset`, s; None for no search"""
     deltas: tuple[Delta, ...] = ()
-    """of relative errors; empty for 1 s (where there are stamps; else 1 frame) and 10 m"""
+    """lengths of relative motions; empty for 1 s (1 frame without stamps) and 10 m"""
     all_pairs: bool = False
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None
     times: tuple[Path, ...] = ()
     """stamps for KITTI files: each takes those with one for each of its poses"""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """of stamps whose unit neither a header nor their size shows"""
+    """unit of stamps, where neither a header nor their size shows it"""
     quaternion: Literal["xyzw", "wxyz"] | None = None
-    """the order of quaternions that no header names"""
+    """order of quaternions that no header names"""
     lever_arm: tuple[float, float, float] | None = None
-    """m, in the body of the estimates: the point whose positions the reference has"""
+    """point that the reference follows, m, in the body of the estimates"""
     align_body: bool = False
-    """whether a constant rotation between the bodies is removed"""
+    """removes a constant rotation between the bodies"""
     sequence: Path | None = None
     """a recording, or the folder of an exported problem"""
     held_out: float = 0.0
@@ -88,9 +86,9 @@ class Settings:
     reference_body: Body = "imu"
     estimate_body: Body = "imu"
     beside: str = "all"
-    """which estimators of a run that is the reference are compared too: names with commas, `all` or `none`"""
+    """estimators of the reference's run to compare too: names with commas, `all` or `none`"""
     seed: int = 0
-    """of the bootstrap, and of what is held out"""
+    """seed of the bootstrap and of the held-out tracks"""
 
     @property
     def unit(self) -> "TimeUnit | None":
@@ -101,31 +99,14 @@ class Settings:
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `comparison.json` has them."""
-        return {
-            "align": self.align,
-            "align_first": self.align_first,
-            "up": None if self.up is None else ",".join(f"{x:g}" for x in self.up),
-            "association": self.association,
-            "tolerance": self.tolerance,
-            "offset": self.offset,
-            "search_offset": self.search_offset,
-            "deltas": ",".join(f"{delta.length:g}{delta.unit}" for delta in self.deltas),
-            "all_pairs": self.all_pairs,
-            "format": self.form,
-            "times": ",".join(map(str, self.times)) or None,
-            "time_unit": self.time_unit,
-            "quaternion": self.quaternion,
-            "lever_arm": None if self.lever_arm is None else ",".join(f"{x:g}" for x in self.lever_arm),
-            "align_body": self.align_body,
-            "sequence": _text(self.sequence),
-            "held_out": self.held_out,
-            "extrinsic": _text(self.extrinsic),
-            "reference_body": self.reference_body,
-            "estimate_body": self.estimate_body,
-            "beside": self.beside,
-            "seed": self.seed,
-        }
+        plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        return {"format" if name == "form" else name: value for name, value in plain.items()}
 
 
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)
+def _plain(value: Any) -> Any:
+    """A value as JSON has it: sequences as text with commas between, an empty one as None."""
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return ",".join(f"{x:g}" if isinstance(x, int | float) else str(_plain(x)) for x in value) or None
+    if isinstance(value, Delta):
+        return f"{value.length:g}{value.unit}"
+    return str(value) if isinstance(value, Path) else value

@@ -1,4 +1,4 @@
-"""What estimates from anywhere say the pixels of a problem should have been."""
+"""Trajectories judged by the observations of a recording: reprojection, held-out tracks, landmarks, up."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,36 +7,42 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
+from fgbaseline.compare import Alignment, MatchedTrajectories
 from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulated import landmarks_along
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, InputError, se3
 
 from .entry import Entry
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Pixels:
-    """Reprojection of one trajectory. For the columns see `compare.reprojection`; `used` is: is in the problem."""
+    """Reprojection errors of one trajectory: tables of `compare.reprojection`, `used` being the problem's mask."""
 
     own: pd.DataFrame | None
-    """with the landmarks that came with it; None without"""
+    """with its own landmarks; None without"""
     common: pd.DataFrame | None
-    """the same over the observations that all have which came with landmarks"""
+    """those over the observations that all trajectories with own landmarks have"""
     along: pd.DataFrame | None
-    """with landmarks triangulated along the trajectory, the same way for all; None where no frame has a pose"""
+    """with landmarks triangulated along the trajectory; None where no frame has a pose"""
     frames: int
-    """of the recording that have a pose"""
+    """number of the recording's frames that have a pose"""
     notes: dict[str, str]
-    """why something is missing"""
+    """why a table is missing, by key"""
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame | None]:
+        """Tables by their keys in the results."""
+        return {"reprojection": self.own, "reprojection_common": self.common, "reprojection_along": self.along}
 
 
 def paths_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -> dict[str, FloatArray]:
-    """By name the poses (T, 4, 4) of the problem's frames; nothing without a problem.
+    """Poses (T, 4, 4) of the problem's frames by name; empty without a problem.
 
-    Poses belong to the frames by their stamps, nearest in time within half an interval; `offset` (s) is added to those
-    of all but the first entry, the reference.
+    A frame has the pose nearest in time within half an interval. `offset`, s, is added to the stamps of all entries
+    but the first, the reference.
     """
     if problem is None:
         return {}
@@ -45,7 +51,7 @@ def paths_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -
 
 
 def pixels_of(problem: Problem | None, entries: Sequence[Entry], paths: Mapping[str, FloatArray]) -> dict[str, Pixels]:
-    """By name; nothing without a problem. Each trajectory in its own world: no alignment comes into it."""
+    """Reprojection by name, each trajectory in its own world, without alignment; empty without a problem."""
     if problem is None:
         return {}
     estimates = {e.name: _estimate(problem, e.name, paths[e.name], e.landmarks) for e in entries}
@@ -55,9 +61,9 @@ def pixels_of(problem: Problem | None, entries: Sequence[Entry], paths: Mapping[
 
 
 def held_out_of(problem: Problem | None, held: HeldOut | None, paths: Mapping[str, FloatArray]) -> pd.DataFrame | None:
-    """The paths ranked by held-out tracks: see `compare.held_out_ranking`; None without any.
+    """Paths ranked by held-out tracks: see `compare.held_out_ranking`; None without any.
 
-    Paths that no frame has a pose of are left out: there would be nothing in common.
+    Paths without a pose at any frame are left out: no observation would be common to all.
     """
     known = {name: path for name, path in paths.items() if np.isfinite(path[:, 0, 0]).any()}
     if problem is None or held is None or not known:
@@ -65,8 +71,36 @@ def held_out_of(problem: Problem | None, held: HeldOut | None, paths: Mapping[st
     return compare.held_out_ranking(compare.held_out_errors(problem.sequence, held, known, problem.pixel_variance))
 
 
+def map_of(
+    problem: Problem | None,
+    paths: Mapping[str, FloatArray],
+    reference: Entry,
+    entry: Entry,
+    matched: MatchedTrajectories,
+) -> pd.DataFrame:
+    """`compare.map_difference` of an entry's landmarks, aligned as its path is, from those of the reference.
+
+    Raises InputError, saying why, where nothing can be compared.
+    """
+    if problem is None or reference.landmarks is None or entry.landmarks is None:
+        lacking = [e.name for e in (reference, entry) if e.landmarks is None]
+        raise InputError(f"no landmarks came with {' and '.join(lacking)}" if lacking else "there is no recording")
+    motion = matched.alignment
+    aligned = Estimate(
+        name=entry.name,
+        world_T_imu=motion.apply(paths[entry.name]),
+        used=problem.mask,
+        landmarks=_aligned(entry.landmarks, motion),
+    )
+    there = Estimate(reference.name, paths[reference.name], problem.mask, landmarks=reference.landmarks)
+    table = compare.map_difference(problem.sequence, aligned, there)
+    if table.empty:
+        raise InputError(f"no landmark that {reference.name} has too is seen from a frame that both have a pose of")
+    return table
+
+
 def poses_of_frames(problem: Problem, trajectory: Trajectory) -> FloatArray:
-    """(T, 4, 4) the pose of each frame of the problem's sequence, NaN where the trajectory has none."""
+    """Pose of each frame of the problem's sequence, (T, 4, 4), NaN where the trajectory has none."""
     poses = np.full((problem.n_frames, 4, 4), np.nan)
     frames, chosen = match_stamps(problem.sequence.t, trajectory.t)
     poses[frames] = trajectory.world_T_body[chosen]
@@ -74,10 +108,9 @@ def poses_of_frames(problem: Problem, trajectory: Trajectory) -> FloatArray:
 
 
 def up_of_problem(problem: Problem, trajectory: Trajectory) -> FloatArray | None:
-    """(3,) the problem's up in the world of a trajectory, which may be any: by its first pose that belongs to a frame.
+    """The problem's up, (3,), in the world of a trajectory, by its first pose at a frame; None where there is none.
 
-    The problem knows up in the IMU's frame at frame 0; from there to that frame its increments lead. None where no
-    pose belongs to a frame.
+    The problem has up in the IMU's frame at frame 0; its increments lead from there to that frame.
     """
     rotations = poses_of_frames(problem, trajectory)[:, :3, :3]
     known = np.flatnonzero(np.isfinite(rotations[:, 0, 0]))
@@ -93,7 +126,7 @@ def _estimate(problem: Problem, name: str, poses: FloatArray, landmarks: Landmar
 
 
 def _common(problem: Problem, own: dict[str, pd.DataFrame]) -> BoolArray:
-    """(n,) the problem's observations that every one of the tables has."""
+    """Mask (n,) of the problem's observations that every table has."""
     common = problem.mask
     for table in own.values():
         has = np.zeros(len(common), dtype=np.bool_)
@@ -121,3 +154,8 @@ def _pixels(problem: Problem, estimate: Estimate, own: pd.DataFrame | None, comm
         frames=int(known.sum()),
         notes=notes,
     )
+
+
+def _aligned(landmarks: Landmarks, motion: Alignment) -> Landmarks:
+    position = motion.scale * landmarks.position @ motion.rotation.T + motion.translation
+    return replace(landmarks, position=position, covariance=None)

@@ -1,19 +1,21 @@
-"""The shape of `comparison.json`. `make schema` writes it, with these descriptions, to docs/comparison.schema.json."""
+"""Model of `comparison.json`. `make schema` writes it, with these descriptions, to docs/comparison.schema.json."""
 
 import json
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from ..schema import Reprojection
+from ..schema import Nees, Reprojection
 from ..schema_base import Number, Part
 
+MARK = "comparison.json"
+"""the file by which a comparison's folder is known"""
 SCHEMA: Final = "fgbaseline/comparison/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
 
 
 class Statistic(Part):
-    """A figure with its 95 % confidence interval, of a block bootstrap that respects correlation in time."""
+    """A figure with its 95 % confidence interval by a block bootstrap, which respects correlation in time."""
 
     value: Number
     low: Number
@@ -21,7 +23,7 @@ class Statistic(Part):
 
 
 class Statistics(Part):
-    """Of errors that follow each other in time."""
+    """Statistics of errors in order of time."""
 
     rmse: Statistic
     mean: Statistic
@@ -32,22 +34,22 @@ class Statistics(Part):
     max: Number
     sse: Annotated[Number, Field(description="sum of squares")]
     n: int
-    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
-    block: Annotated[int, Field(description="errors in a row that the bootstrap keeps together")]
-    reliable: Annotated[bool, Field(description="whether so many blocks fit that the intervals mean something")]
+    missing: Annotated[int, Field(description="errors that are NaN and left out")]
+    block: Annotated[int, Field(description="block length of the bootstrap, errors")]
+    reliable: Annotated[bool, Field(description="whether at least ten blocks fit into the path")]
 
 
 class Pairing(Part):
-    """Which poses were compared."""
+    """Association of the poses."""
 
     pairs: int
     association: Literal["nearest", "interpolated"]
     tolerance_s: float
     offset_s: Annotated[float, Field(description="added to the estimate's stamps")]
     offset_range_s: Annotated[
-        tuple[float, float] | None, Field(description="where it was searched for: offsets that fit nearly as well")
+        tuple[float, float] | None, Field(description="offsets that fit nearly as well; null without a search")
     ]
-    offset_determined: Annotated[bool | None, Field(description="null where it was not searched for")]
+    offset_determined: Annotated[bool | None, Field(description="null without a search")]
     left_out_reference: int
     left_out_estimate: int
 
@@ -59,12 +61,12 @@ class AlignmentSummary(Part):
     rotation: list[list[float]]
     translation: list[float]
     scale: float
-    poses: Annotated[int, Field(description="pairs that decided it")]
-    free: Annotated[list[str], Field(description="what the positions of the paths left open")]
+    poses: Annotated[int, Field(description="pairs that it is estimated from")]
+    free: Annotated[list[str], Field(description="degrees of freedom that positions do not determine")]
 
 
 class Relative(Part):
-    """Errors of the motions between poses a delta apart."""
+    """Errors of relative motions over a delta."""
 
     translation: Annotated[Statistics, Field(description="m")]
     rotation_deg: Statistics
@@ -86,45 +88,39 @@ class Segments(Part):
     rotation_deg_per_m: Number
     official: Annotated[bool, Field(description="KITTI's own lengths and step: comparable with published figures")]
     by_length: list[SegmentsOfLength]
-    intervals: Annotated[dict[str, Statistic], Field(description="of both means, by their names")]
+    intervals: Annotated[dict[str, Statistic], Field(description="of both means, by name")]
 
 
-class Rate(Part):
+class Rate(Statistic):
     """A drift."""
 
-    value: Number
-    low: Number
-    high: Number
     unit: str
     over: str
     n: int
 
 
-class Consistency(Part):
-    """Normalised estimation error squared of the poses; 6 is expected."""
+class Consistency(Nees):
+    """Normalized estimation error squared of the poses by the reported covariances."""
 
-    mean: Number
-    median: Number
-    frames: int
-    not_positive_definite: Annotated[int, Field(description="covariances that are none; left out")]
+    not_positive_definite: Annotated[int, Field(description="covariances that are not, which are left out")]
 
 
 class Common(Part):
-    """The positions over the moments that all estimates have which are ranked."""
+    """Position error over the moments that all ranked estimates have."""
 
     moments: int
-    rmse: Annotated[Statistic, Field(description="m; what the ranks are by")]
+    rmse: Annotated[Statistic, Field(description="m; the ranks are by this")]
 
 
 class Behind(Statistic):
-    """The RMSE of the positions less that of the estimate nearest to the reference, of a paired block bootstrap."""
+    """RMSE of the positions above that of the nearest estimate, with a paired block bootstrap."""
 
     block: int
     reliable: bool
 
 
 class MapOfDepth(Part):
-    """Medians of one class of depth, m."""
+    """Medians of one depth class, m."""
 
     depth: str
     n: int
@@ -133,7 +129,7 @@ class MapOfDepth(Part):
 
 
 class MapDifference(Part):
-    """Landmarks matched by number with the reference's, aligned as the path is."""
+    """Differences of landmarks of equal index from the reference's, aligned as the path is."""
 
     n: int
     median: Annotated[Number, Field(description="m, in the world")]
@@ -143,16 +139,16 @@ class MapDifference(Part):
 
 
 class HeldOutFigures(Part):
-    """Errors on tracks that were in no problem, px, over the same observations for all."""
+    """Errors on held-out tracks, px, over the same observations for all."""
 
     median: Statistic
-    behind: Annotated[Statistic, Field(description="by how much the median is above the best one")]
+    behind: Annotated[Statistic, Field(description="median above the best one")]
     p95: Number
     under_3px: Number
 
 
 class Shares(Part):
-    """What the position difference is made of: shares of its sum of squares, which add to one."""
+    """Shares of the sum of squared position differences, which add to one."""
 
     scale: Number
     heading: Number
@@ -165,7 +161,7 @@ class Shares(Part):
 
 
 class Passing(Part):
-    """When the position difference is first beyond a bound."""
+    """First pose whose position difference is beyond a bound."""
 
     bound_m: float
     t: Number
@@ -173,7 +169,7 @@ class Passing(Part):
 
 
 class EstimateSummary(Part):
-    """One estimate."""
+    """Figures of one estimate."""
 
     source: str
     poses: int
@@ -182,7 +178,7 @@ class EstimateSummary(Part):
         int | None,
         Field(description="1 for the nearest over the common moments; null for by-products and for too few moments"),
     ]
-    caption: Annotated[str, Field(description="what was paired and how it was aligned, in words")]
+    caption: Annotated[str, Field(description="association and alignment, in words")]
     pairing: Pairing
     alignment: AlignmentSummary
     translation: Annotated[Statistics, Field(description="m; its RMSE is the absolute trajectory error")]
@@ -199,24 +195,22 @@ class EstimateSummary(Part):
     behind: Annotated[Behind | None, Field(description="null for the nearest, and for by-products of the reference")]
     final_m: Number
     passing: Passing
-    reprojection: Annotated[Reprojection | None, Field(description="over all observations of the landmarks it gave")]
+    reprojection: Annotated[Reprojection | None, Field(description="over all observations of its own landmarks")]
     reprojection_common: Annotated[
-        Reprojection | None, Field(description="the same over those of the problem that all gave a landmark for")
+        Reprojection | None, Field(description="over those of the problem that all have landmarks for")
     ]
-    reprojection_along: Annotated[
-        Reprojection | None, Field(description="with landmarks triangulated along its path, the same way for all")
-    ]
+    reprojection_along: Annotated[Reprojection | None, Field(description="with landmarks triangulated along its path")]
     map: MapDifference | None
     held_out: HeldOutFigures | None
     samples: Annotated[
         dict[str, dict[str, float]],
-        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of its own time"),
+        Field(description="by the beginning of a metric's path: sample size n, coverage of the estimate's time"),
     ]
-    notes: Annotated[dict[str, str], Field(description="why something is null or missing, by key")]
+    notes: Annotated[dict[str, str], Field(description="why a value is null or missing, by key")]
 
 
 class ReferenceSummary(Part):
-    """What everything is compared with."""
+    """The reference."""
 
     name: str
     source: str
@@ -244,9 +238,15 @@ class Summary(Part):
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
 
+    @property
+    def by_name(self) -> dict[str, dict[str, Any]]:
+        """Figures of the reference and of every estimate, as JSON has them."""
+        parts = {self.reference.name: self.reference, **self.estimates}
+        return {name: part.model_dump(mode="json") for name, part in parts.items()}
+
 
 def json_schema() -> str:
-    """The JSON schema of `comparison.json`, as text."""
+    """JSON schema of `comparison.json`, as text."""
     schema = Summary.model_json_schema(by_alias=True, mode="serialization")
     return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
 

@@ -1,60 +1,42 @@
-"""Everything that is compared, read and brought to one body: reference, estimates and the problem behind them."""
+"""Inputs of a comparison, read and brought to one body frame: reference, estimates and the problem behind them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
+from fgbaseline.data import Landmarks, Problem, Trajectory
 from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from .bodies import moved_body, with_body_recognized, with_lever_arm
-from .entry import Entry
-from .posing import posed
-from .resolving import Resolved, Source, resolve
+from ..trajectories.bodies import moved_body, with_body_recognized, with_lever_arm
+from ..trajectories.conventions import Resolved, Source, resolve
+from ..trajectories.entry import Entries, Entry
+from ..trajectories.settings import Body, Settings
+from .problem_loader import load_problem
 from .run_folder import RunFolder, read_run_folder
-from .settings import Body, Settings
 
 Given = str | Path | Trajectory
-"""[NAME=]FILE, or a trajectory that is at hand"""
-
+"""[NAME=]FILE, or a trajectory in memory"""
 
 CUT_OFF = 0.01
-"""of a recording's frames: so many may be missing at the end of a file of poses, one for each frame"""
+"""largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
 ONLINE = "-online"
-"""what is added to the name of a smoother for its poses as known when their frames came"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Entries:
-    """What is compared."""
-
-    reference: Entry
-    estimates: tuple[Entry, ...]
-    problem: Problem | None
-    """whose observations the reprojection is of"""
-    held: HeldOut | None
-    """the tracks that are in no problem, to judge all paths by"""
-    up: FloatArray | None
-    """(3,) up in the reference's world, where a run says it"""
-    one_world: bool
-    """whether reference and estimates are taken to be in the same world: that of a run"""
+"""suffix of the name of a smoother's by-product: each pose as estimated when its frame arrived"""
 
 
 def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
-    """Reads all of it. Raises InputError, naming the file, for whatever is wrong."""
+    """Reads all inputs. Raises InputError, naming the file, for whatever is wrong."""
     run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
-    problem, held = posed(settings, run)
+    problem, held = load_problem(settings, run)
     own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
     sources = own if run is None else [run.trajectory(run.reference), *own]
-    settled, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
-    if run is None:
-        first, beside = settled, []
-    else:
-        first = replace(settled, landmarks=run.landmarks(run.reference), trust=run.trust)
+    first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
+    beside = []
+    if run is not None:
+        first = replace(first, landmarks=run.landmarks(run.reference), trust=run.trust)
         beside = [
             Entry(run.trajectory(name), run.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
             for name in _beside(run, settings.beside)
@@ -81,7 +63,7 @@ def _opened(given: Given, settings: Settings) -> Source:
 def _in_one_body(
     every: list[Resolved], settings: Settings, problem: Problem | None, run: RunFolder | None
 ) -> list[Entry]:
-    """Entries whose poses are those of one body: the IMU, or the point that a reference of positions follows."""
+    """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
         Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
@@ -111,7 +93,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
 
 
 def _split(given: str) -> tuple[str | None, str]:
-    """Name and file of `NAME=FILE`; a file of that very name comes first."""
+    """Name and file of `NAME=FILE`; an existing file `NAME=FILE` comes first."""
     name, mark, file = given.partition("=")
     if not mark or Path(given).exists() or "/" in name:
         return None, given
@@ -121,7 +103,7 @@ def _split(given: str) -> tuple[str | None, str]:
 
 
 def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
-    """Stamps for files without: those given, else those of the recording, of which the last few may be missing."""
+    """Stamps, s, for files without: those of --times, else of the recording, of which the last few may be missing."""
     if settings.times:
         return [read_times(file, settings.unit) for file in settings.times]
     if problem is None:
@@ -151,7 +133,7 @@ def _beside(run: RunFolder, wanted: str) -> list[str]:
 
 
 def _named_apart(entries: list[Entry]) -> list[Entry]:
-    """The same with names that differ: of files of one name, their folder's before it; then a number behind it."""
+    """Entries with unique names: files of one name get that of their folder before it, then a number behind it."""
     given = [entry.name for entry in entries]
     names = list(given)
     for i, entry in enumerate(entries):
@@ -167,7 +149,7 @@ def _named_apart(entries: list[Entry]) -> list[Entry]:
 
 
 def _file_name(name: str) -> str:
-    """The name, if a file can have it. Raises InputError."""
+    """The name; raises InputError where no file can have it."""
     if "/" in name or "\\" in name or name.startswith(".") or not name:
         raise InputError(f"{name!r} can be no file's name; name the trajectory otherwise: NAME=FILE")
     return name

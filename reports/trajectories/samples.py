@@ -1,4 +1,4 @@
-"""How much data the figures of an estimate rest on: what a gate needs to know before it says that a limit holds."""
+"""Sample sizes and coverage of the figures of an estimate, which a quality gate needs before it judges them."""
 
 import numpy as np
 
@@ -8,19 +8,19 @@ from fgbaseline.geometry import FloatArray
 from .comparison import Comparison, Result
 
 OF_POSES = ("translation", "rotation_deg", "pose", "drift", "shares", "final_m", "passing", "alignment")
-"""figures of all paired poses"""
+"""figures over all paired poses"""
 
 
 def coverage(comparison: Comparison, result: Result) -> float:
-    """The share of the reference's time in which there are paired poses: see `compare.time_coverage`."""
+    """Share of the reference's time in which there are paired poses: see `compare.time_coverage`."""
     return compare.time_coverage(result.matched.reference.t, comparison.reference.trajectory.t)
 
 
 def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float]]:
-    """By the beginning of a metric's path: `n` of what it is taken over, and the `coverage` of the estimate's time.
+    """Sample size `n` and `coverage` of the estimate's time, by the beginning of a metric's path.
 
-    n are pairs of poses, of the reprojection observations, of the map landmarks; what is not spread over time has no
-    coverage. Errors of motions have the number of `stretches` that they are of, too.
+    n counts pairs of poses; for the reprojection observations, for the map landmarks. Figures that are not spread over
+    time have no coverage. Errors of relative motions also have the number of their `stretches`.
     """
     matched, whole = result.matched, result.entry.trajectory.t
     t = matched.estimate.t - matched.offset
@@ -35,17 +35,17 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
     for key, table in stretches.items():
         start, end = (t[table[column].to_numpy()] for column in ("start", "end"))
         found[key] = {"n": len(t), "coverage": compare.interval_coverage(start, end, whole), "stretches": len(table)}
-    if result.claimed is not None:
-        found["nees"] = of(t[np.isfinite(result.claimed.nees)])
+    if result.reported_covariance is not None:
+        found["nees"] = of(t[np.isfinite(result.reported_covariance.nees)])
     if result.name in comparison.ranking.at:
         found |= dict.fromkeys(("common", "behind"), of(t[comparison.ranking.at[result.name]]))
     return {**found, **_without_time(comparison, result)}
 
 
 def _without_time(comparison: Comparison, result: Result) -> dict[str, dict[str, float]]:
-    pixels, ranking = result.pixels, comparison.held_out
-    tables = {} if pixels is None else {"": pixels.own, "_common": pixels.common, "_along": pixels.along}
-    counts = {f"reprojection{kind}": len(table) for kind, table in tables.items() if table is not None}
+    ranking = comparison.held_out
+    tables = {} if result.pixels is None else result.pixels.tables
+    counts = {key: len(table) for key, table in tables.items() if table is not None}
     if result.map is not None:
         counts["map"] = len(result.map)
     if ranking is not None and result.name in ranking.index:

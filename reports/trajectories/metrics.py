@@ -1,4 +1,4 @@
-"""From what was read to everything that is compared."""
+"""All figures of a comparison: association, alignment, errors, drift, consistency, reprojection and ranking."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,54 +9,47 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
-from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..formatting import listed
-from .claimed import claimed_by
 from .comparison import Comparison, Result
-from .entries import Entries
-from .entry import Entry
-from .mapping import map_of
-from .pixels import Pixels, held_out_of, paths_of, pixels_of, up_of_problem
-from .ranking import ranking_of
+from .entry import Entries, Entry
+from .ranking import ranking_of, spread
+from .reported_covariance import reported_covariance
+from .reprojection import Pixels, held_out_of, map_of, paths_of, pixels_of, up_of_problem
 from .settings import Delta, Settings
-from .spreading import spread
 
 Computed = TypeVar("Computed")
 
 FAR, FAR_SHARE = 5.0, 0.01
-"""m, and share of the path: the smaller of both is the bound that says when an estimate has left the reference"""
+"""m, and share of the path: an estimate farther off than the smaller of both has left the reference"""
 TILT = 10.0
-"""deg: worlds whose ups are farther apart are not both level"""
+"""largest angle between the ups of two level worlds, deg"""
 FEWEST = 2
-"""pairs of poses, below which there is nothing to compare"""
+"""least number of pairs of poses"""
 
 
 def compare_entries(entries: Entries, settings: Settings) -> Comparison:
-    """All comparisons. Raises InputError where an estimate has too little in common with the reference."""
+    """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
     up, up_from = _up(entries, settings)
-    kind = settings.align or (Align.NONE if entries.one_world else Align.SE3)
     everything = [entries.reference, *entries.estimates]
-    if kind == Align.YAW:
+    settings = replace(
+        settings,
+        align=str(settings.align or (Align.NONE if entries.one_world else Align.SE3)),
+        deltas=tuple(settings.deltas or _usual(everything)),
+    )
+    if settings.align == Align.YAW:
         _require_one_up(entries, up)
     paths = paths_of(entries.problem, everything, settings.offset)
     pixels = pixels_of(entries.problem, everything, paths)
-    deltas = settings.deltas or _usual(everything)
-    results = {
-        entry.name: _compared(
-            entries.reference, entry, kind, up, deltas, settings, entries.problem, paths, pixels.get(entry.name)
-        )
-        for entry in entries.estimates
-    }
+    results = {e.name: _compared(entries, e, up, settings, paths, pixels.get(e.name)) for e in entries.estimates}
     return Comparison(
         reference=entries.reference,
         reference_pixels=pixels.get(entries.reference.name),
         results=results,
         up=up,
         up_from=up_from,
-        deltas=tuple(delta.text for delta in deltas),
-        settings=replace(settings, align=str(kind), deltas=tuple(deltas)),
+        deltas=tuple(delta.text for delta in settings.deltas),
+        settings=settings,
         ranking=ranking_of(
             errors={name: r.absolute["translation"] for name, r in results.items()},
             stamps={name: r.matched.reference.t for name, r in results.items()},
@@ -70,9 +63,9 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
 
 
 def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
-    """(3,) what points up in the reference's world, and from where that is known.
+    """Direction (3,) of up in the reference's world, and its source.
 
-    As asked for, as the format of the reference defines it, as the run or the recording says, else +z.
+    Sources in order: the option, the format of the reference, the run, the recording, +z.
     """
     if settings.up is not None:
         up = np.asarray(settings.up, dtype=np.float64)
@@ -88,7 +81,7 @@ def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
 
 
 def _require_one_up(entries: Entries, up: FloatArray) -> None:
-    """Raises InputError where the recording says that up is another direction in the world of an estimate."""
+    """Raises InputError where up of the recording is another direction in the world of an estimate."""
     if entries.problem is None:
         return
     for entry in entries.estimates:
@@ -107,29 +100,26 @@ def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
 
 
 def _compared(
-    reference: Entry,
+    entries: Entries,
     entry: Entry,
-    kind: Align | str,
     up: FloatArray,
-    deltas: tuple[Delta, ...],
     settings: Settings,
-    problem: Problem | None,
     paths: Mapping[str, FloatArray],
     pixels: Pixels | None,
 ) -> Result:
+    reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
-    matched, offset = _matched(reference, entry, kind, up, settings)
+    matched, offset = _matched(reference, entry, up, settings)
     absolute = compare.absolute_errors(matched)
     departure = compare.divergence_along_path(matched, up)
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:
         absolute[["rotation_deg", "rotation_chord", "pose"]] = np.nan
         departure[["rotation_deg", "heading_deg"]] = np.nan
-        notes["rotation_deg"] = f"{listed(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
+        notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
     bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
-    relative = {d.text: _relative(matched, d, settings, notes) for d in deltas}
+    relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
-    seed = settings.seed
     return Result(
         entry=entry,
         matched=matched,
@@ -138,7 +128,7 @@ def _compared(
         departure=departure,
         relative=tables,
         segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
-        claimed=_or_note("nees", notes, lambda: claimed_by(reference, entry, _oriented(matched))),
+        reported_covariance=_or_note("nees", notes, lambda: reported_covariance(reference, entry, _oriented(matched))),
         drift=_or_note("drift", notes, lambda: compare.drift(_oriented(matched), seed=seed)),
         shares=compare.error_decomposition(matched, up),
         share_intervals=compare.decomposition_intervals(matched, up, seed=seed),
@@ -150,13 +140,13 @@ def _compared(
             for delta, table in tables.items()
         },
         pixels=pixels,
-        map=_or_note("map", notes, lambda: map_of(problem, paths, reference, entry, matched)),
+        map=_or_note("map", notes, lambda: map_of(entries.problem, paths, reference, entry, matched)),
         notes=notes,
     )
 
 
 def _oriented(matched: MatchedTrajectories) -> MatchedTrajectories:
-    """The same. Raises InputError where reference or estimate has positions only."""
+    """The pairs; raises InputError where reference or estimate has positions only."""
     for path in (matched.reference, matched.estimate):
         if not path.oriented:
             raise InputError(f"{path.name} has no orientations, so no motion of a body can be compared")
@@ -166,7 +156,7 @@ def _oriented(matched: MatchedTrajectories) -> MatchedTrajectories:
 def _passing(
     matched: MatchedTrajectories, departure: pd.DataFrame, bound: float, notes: dict[str, str]
 ) -> Exceedance | None:
-    """Where the estimate leaves the reference; only of paths that start together."""
+    """First pose beyond the bound; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
         return compare.first_exceedance(departure, bound)
     notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
@@ -184,7 +174,7 @@ def _relative(
 
 
 def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -> Computed | None:
-    """What is computed, or None with a note where the path does not allow it (too short, standing, without stamps)."""
+    """Result, or None with a note where the path does not allow it (too short, standing, without stamps)."""
     try:
         return compute()
     except InputError as error:
@@ -193,9 +183,10 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
 
 
 def _matched(
-    reference: Entry, entry: Entry, kind: Align | str, up: FloatArray, settings: Settings
+    reference: Entry, entry: Entry, up: FloatArray, settings: Settings
 ) -> tuple[MatchedTrajectories, TimeOffset | None]:
-    there, here = reference.trajectory, entry.trajectory
+    """Pairs of poses, aligned, and the time offset where it is searched for."""
+    there, here, kind = reference.trajectory, entry.trajectory, settings.align or Align.NONE
     if there.stamped != here.stamped:
         bare = there if here.stamped else here
         raise InputError(

@@ -1,4 +1,4 @@
-"""The problem behind a comparison: exported, as a run posed it, or as `fgbaseline export` poses it by default."""
+"""Problem behind a comparison: exported, as a run posed it, or as `fgbaseline export` poses it by default."""
 
 from pathlib import Path
 
@@ -6,14 +6,14 @@ from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
 from fgbaseline.geometry import InputError
 
 from .. import job
+from ..trajectories.settings import Settings
 from .run_folder import RunFolder
-from .settings import Settings
 
 
-def posed(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, HeldOut | None]:
-    """The exported problem in a folder, or the one that a recording poses: as the run posed it, else calibrated.
+def load_problem(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, HeldOut | None]:
+    """Problem and held-out tracks: an exported folder's, or a recording's, posed as the run did, else calibrated.
 
-    With it the tracks that were held out of it. Raises InputError.
+    Raises InputError.
     """
     sequence = settings.sequence
     if settings.held_out and (sequence is None or sequence.is_dir()):
@@ -38,7 +38,7 @@ def posed(settings: Settings, run: RunFolder | None) -> tuple[Problem | None, He
 
 
 def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
-    """What decides the problem of a run, from its summary. Raises InputError where that is not the one of ours."""
+    """Settings that pose the problem of a run, from its summary. Raises InputError where it lacks one."""
     known = run.settings
     try:
         return job.RunSettings(

@@ -1,7 +1,8 @@
-"""All figures of a comparison, as `comparison.json` and `metrics.csv` hold them."""
+"""Figures of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
 import math
 import platform
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
@@ -11,23 +12,24 @@ import pandas as pd
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors, distance_traveled
 
-from ..results.tree import INFINITE, finite, nulls
-from .claimed import Claimed
-from .comparison import Comparison, Result
-from .pixels import Pixels
-from .samples import coverage, samples
-from .schema import Summary
+from ..trajectories.comparison import Comparison, Result
+from ..trajectories.reported_covariance import ReportedCovariance
+from ..trajectories.reprojection import Pixels
+from ..trajectories.samples import coverage, samples
+from .comparison import Summary
+from .tree import INFINITE, finite, nulls
 
 LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
+INTERVAL = ["value", "low", "high"]
 WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 
 
-def summarise(comparison: Comparison) -> Summary:
-    """The summary; what is not a number is None, and where a part is missing `notes` says why."""
+def summarize(comparison: Comparison, caption: str) -> Summary:
+    """The summary; figures that are not finite are None, and `notes` has the reasons for missing parts."""
     return Summary.model_validate(
         finite(
             {
-                "caption": comparison.caption,
+                "caption": caption,
                 "reference": _reference(comparison),
                 "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
                 "sequence": comparison.sequence,
@@ -54,7 +56,8 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
 
 
 def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
-    matched, motion = result.matched, result.matched.alignment
+    matched, motion, reported = result.matched, result.matched.alignment, result.reported_covariance
+    common, behind = comparison.ranking.common.get(result.name), comparison.behind.get(result.name)
     values = {
         "source": result.entry.trajectory.source,
         "poses": len(result.entry.trajectory),
@@ -86,17 +89,16 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         },
         "segments": None if result.segments is None else _segments(result.segments, comparison.settings.seed),
         "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
-        "nees": None if result.claimed is None else _nees(result.claimed),
+        "nees": None if reported is None else _nees(reported),
         "shares": {
-            name: getattr(result.shares, name)
-            for name in ("scale", "heading", "noise", "scale_percent", "heading_deg", "heading_deg_per_s")
-        }
-        | {
+            **{name: share for name, share in asdict(result.shares).items() if name != "rms"},
             "intervals": result.share_intervals.to_dict(orient="index"),
             "reliable": bool(result.share_intervals.attrs["reliable"]),
         },
-        "common": _common(comparison, result.name),
-        "behind": _behind(comparison, result.name),
+        "common": None
+        if common is None
+        else {"moments": comparison.ranking.moments, "rmse": common.loc["rmse", INTERVAL].to_dict()},
+        "behind": None if behind is None else asdict(behind),
         "final_m": float(result.departure["position"].iloc[-1]),
         "passing": {
             "bound_m": result.bound,
@@ -114,14 +116,10 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
 
 
 def _statistics(table: pd.DataFrame) -> dict[str, Any]:
-    values = table["value"]
     return {
-        **{name: table.loc[name, ["value", "low", "high"]].to_dict() for name in WITH_INTERVAL},
-        **{name: float(values[name]) for name in ("min", "max", "sse")},
-        "n": int(values["n"]),
-        "missing": int(table.attrs["missing"]),
-        "block": int(table.attrs["block"]),
-        "reliable": bool(table.attrs["reliable"]),
+        **{name: table.loc[name, INTERVAL].to_dict() for name in WITH_INTERVAL},
+        **{name: float(table["value"][name]) for name in ("min", "max", "sse", "n")},
+        **{key: table.attrs[key] for key in ("missing", "block", "reliable")},
     }
 
 
@@ -135,21 +133,6 @@ def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
     }
 
 
-def _common(comparison: Comparison, name: str) -> dict[str, Any] | None:
-    statistics = comparison.ranking.common.get(name)
-    if statistics is None:
-        return None
-    rmse = statistics.loc["rmse", ["value", "low", "high"]].to_dict()
-    return {"moments": comparison.ranking.moments, "rmse": rmse}
-
-
-def _behind(comparison: Comparison, name: str) -> dict[str, Any] | None:
-    d = comparison.behind.get(name)
-    if d is None:
-        return None
-    return {"value": d.value, "low": d.low, "high": d.high, "block": d.block, "reliable": d.reliable}
-
-
 def _map(table: pd.DataFrame) -> dict[str, Any]:
     by_depth = compare.map_by_depth(table)[["n", "distance", "seen"]]
     return {
@@ -161,14 +144,14 @@ def _map(table: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _nees(claimed: Claimed) -> dict[str, float | int]:
-    known = claimed.nees[~np.isnan(claimed.nees)]
+def _nees(reported: ReportedCovariance) -> dict[str, float | int]:
+    known = reported.nees[~np.isnan(reported.nees)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
     return {
         "mean": mean,
         "median": median,
         "frames": len(known),
-        "not_positive_definite": claimed.not_positive_definite,
+        "not_positive_definite": reported.not_positive_definite,
     }
 
 
@@ -185,9 +168,6 @@ def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:
 
 
 def _pixels(pixels: Pixels | None) -> dict[str, Any]:
-    tables = {} if pixels is None else {"": pixels.own, "_common": pixels.common, "_along": pixels.along}
-    return {f"reprojection{kind}": _reprojection(tables.get(kind)) for kind in ("", "_common", "_along")}
-
-
-def _reprojection(table: pd.DataFrame | None) -> dict[str, Any] | None:
-    return None if table is None else compare.reprojection_summary(table)
+    if pixels is None:
+        return dict.fromkeys(("reprojection", "reprojection_common", "reprojection_along"))
+    return {key: None if t is None else compare.reprojection_summary(t) for key, t in pixels.tables.items()}

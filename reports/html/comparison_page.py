@@ -1,0 +1,67 @@
+"""Page of a comparison, which opens offline."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from ..figures.palette import colours_of
+from ..phrases.comparison import verdict
+from ..results.comparison import Summary
+from ..tables import Row
+from ..tables.comparison import comparison_table
+from ..trajectories.comparison import Comparison
+from .environment import environment, picture
+
+CAPTIONS: Mapping[str, str] = {
+    "paths": "Aligned as said above, seen along the direction that points up.",
+    "errors": "Of each pair of poses, along the reference's direction of travel, to its left and up.",
+    "growth": "The same over the length of the path, with the heading: seen from above, to the left positive.",
+    "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. No alignment and no early "
+    "mistake can hide in these.",
+    "segments": "Mean over all segments of a length, per metre.",
+    "map": "Landmarks of the same number. In the world the drift of the paths is in it; as the "
+    "cameras see them it is not.",
+    "three_sigma": "The error of each pose in its own body frame and the band that its covariances claim; both since "
+    "the first pose where an alignment was asked for and the covariances grow from there.",
+    "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
+    "with it.",
+}
+"""captions by the beginning of a figure's name"""
+
+
+def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
+    """`report.html`. All text that comes from files is escaped."""
+    reference, estimates = summary.reference, summary.estimates
+    table = comparison_table(comparison, summary, mark_reference=True)
+    colors = colours_of([reference.name, *estimates], reference.name)
+    titles = {name: f"{name} (reference)" if name == reference.name else name for name in colors}
+    notes = {f"What {name} has no figure for": estimate.notes for name, estimate in estimates.items()}
+    sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
+    return (
+        environment()
+        .get_template("comparison.html")
+        .render(
+            summary=summary,
+            verdict=verdict(comparison),
+            table=replace(
+                table,
+                name="figure",
+                caption=f"{table.caption} Best of a line in bold.",
+                rows=tuple(_with_intervals_below(row) for row in table.rows),
+            ),
+            swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in colors.items()},
+            pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
+            trees={**notes, "Files": sources, "Settings": summary.settings, "Versions": summary.versions},
+        )
+    )
+
+
+def _caption(name: str) -> str:
+    return next((text for beginning, text in CAPTIONS.items() if name.startswith(beginning)), "")
+
+
+def _with_intervals_below(row: Row) -> Row:
+    """The row with each interval on a line below its figure."""
+    return replace(row, cells=tuple(cell._replace(text=cell.text.replace(" [", "\n[")) for cell in row.cells))

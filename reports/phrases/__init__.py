@@ -1,0 +1,1 @@
+"""Sentences on results, a module for each kind of result."""

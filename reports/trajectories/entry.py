@@ -1,0 +1,51 @@
+"""Inputs of a comparison: trajectories with what came with them, and the recording behind them."""
+
+from dataclasses import dataclass, replace
+
+from fgbaseline.compare import Trust
+from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
+from fgbaseline.geometry import FloatArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entry:
+    """A trajectory with its landmarks, covariances and trust."""
+
+    trajectory: Trajectory
+    landmarks: Landmarks | None = None
+    """in the trajectory's own world"""
+    covariance: FloatArray | None = None
+    """(n, 6, 6) of the right perturbation of each pose"""
+    up: FloatArray | None = None
+    """(3,) what points up in its world, where the format of its file defines it"""
+    remarks: tuple[str, ...] = ()
+    """findings on its file: each completes a sentence that begins with its name"""
+    trust: Trust | None = None
+    """of a run's reference; None for files"""
+    by_product: bool = False
+    """whether it is a by-product of the reference (isam2-online), near to it by construction"""
+
+    @property
+    def name(self) -> str:
+        """Name in tables and figures."""
+        return self.trajectory.name
+
+    def remarked(self, remark: str) -> "Entry":
+        """The entry with one more remark."""
+        return replace(self, remarks=(*self.remarks, remark))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entries:
+    """All inputs, in one body frame."""
+
+    reference: Entry
+    estimates: tuple[Entry, ...]
+    problem: Problem | None
+    """its observations are reprojected"""
+    held: HeldOut | None
+    """tracks that are in no problem, to judge all paths by"""
+    up: FloatArray | None
+    """(3,) up in the reference's world, where it is that of a run"""
+    one_world: bool
+    """whether reference and estimates share the world of a run"""
