@@ -7,10 +7,9 @@ import pandas as pd
 
 from ..page.accuracy_verdict import SAME_GRAPH
 from ..page.numbers import listed, number
-from .figures import judge
 from .grid import interval
 from .results import ANSWERED, METRICS, Metric, Results
-from .tables import consistency, overall, rankings, records
+from .tables import consistency, judge, overall, rankings, records
 
 MOST_CASES = 10
 """that are told one by one"""

@@ -126,7 +126,7 @@ class Comparison:
 
     def figures(self) -> dict[str, Figure]:
         """The figures by name."""
-        from .figures import draw
+        from ..figures.comparison import draw
 
         return draw(self)
 

@@ -8,9 +8,9 @@ import numpy as np
 from fgbaseline.data import write_tum
 
 from ..figures import save
+from ..figures.comparison import draw
 from ..whole_folder import whole_folder
 from .comparison import Comparison, Result
-from .figures import draw
 from .page import render
 from .paper import latex, markdown
 from .settings import MARK

@@ -8,7 +8,7 @@ from itertools import groupby
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..figures.palette import colours_of
+from ..figures.comparison import colors
 from ..page.embedding import picture
 from ..page.rendering import environment
 from .comparison import Comparison
@@ -49,7 +49,7 @@ def render(comparison: Comparison, figures: Mapping[str, Figure]) -> str:
             trust=None if trust is None else trust.verdict.name.lower(),
             names=names,
             groups=[(group, list(same)) for group, same in groupby(lines, key=lambda line: line.group)],
-            colours=colours_of([comparison.reference.name, *comparison.results], comparison.reference.name),
+            colours=colors(comparison),
             pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
         )
     )

@@ -1,9 +1,7 @@
-"""One colour for an estimator, in every figure and on the page: Okabe and Ito's, told apart by the colour-blind."""
+"""One color for an estimator, in every figure and on the page: Okabe and Ito's, distinct to the color-blind."""
 
 from collections.abc import Iterable, Mapping
 from itertools import chain, cycle
-
-from fgbaseline.reports.comparison import Run
 
 REFERENCE = "#000000"
 TRUTH = "#7f7f7f"
@@ -22,23 +20,18 @@ OWN: Mapping[str, str] = {
 """by the name an estimator is registered under; the reference of a run is black instead, whatever its name"""
 
 SPARE = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
-"""for estimators of other packages, once the colours are used up that this run leaves"""
+"""for estimators of other packages, once the colors are used up that this run leaves"""
 
 
-def colours(run: Run) -> dict[str, str]:
-    """The colour of every estimator of a run, by name."""
-    return colours_of(run.results, run.reference)
+def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
+    """Color of each of the names.
 
-
-def colours_of(names: Iterable[str], reference: str | None) -> dict[str, str]:
-    """The colour of each of the names.
-
-    The reference is black, a known name has its own colour, and the others take, in their order, those colours that
+    The reference is black, a known name has its own color, and the others take, in their order, those colors that
     none of the names has.
     """
     every = list(names)
     taken = {name: OWN[name] for name in every if name in OWN}
-    free = [colour for colour in OWN.values() if colour not in taken.values()]
+    free = [color for color in OWN.values() if color not in taken.values()]
     rest = chain(free, SPARE, cycle(SPARE))
     chosen: dict[str, str] = {}
     for name in every:
@@ -57,9 +50,9 @@ ON_DARK: Mapping[str, str] = {
     "#661100": "#B5533C",
     "#332288": "#8273D9",
 }
-"""the colours that dark ground would swallow: the same hue, lighter"""
+"""colors that dark ground would swallow: the same hue, lighter"""
 
 
-def on_dark(colour: str) -> str:
-    """The colour that stands for `colour` where the ground is dark."""
-    return ON_DARK.get(colour, colour)
+def on_dark(color: str) -> str:
+    """Color in place of `color` where the ground is dark."""
+    return ON_DARK.get(color, color)

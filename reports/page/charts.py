@@ -9,7 +9,7 @@ from fgbaseline.compare import reprojection_by
 from fgbaseline.compare.chi_square import bounds
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
-from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM, NEES_BOUNDS
+from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS
 from fgbaseline.reports.figures.view import TopView
 
 from .packing import floats

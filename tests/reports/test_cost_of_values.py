@@ -12,8 +12,8 @@ from fgbaseline.data import Problem, read_problem
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.figures.reprojections import WRONG
-from fgbaseline.reports.moving_sum import moving_sum
+from fgbaseline.reports.figures.panels import moving_sum
+from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.page.departure import worst_second
 
 from ..builders.commands import fgbaseline
