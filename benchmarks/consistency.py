@@ -32,7 +32,7 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.track_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearisation
-from fgbaseline.reports.figures.palette import OWN
+from fgbaseline.reports.figures.style import OWN
 
 FRAMES = 20
 PARTS = 5

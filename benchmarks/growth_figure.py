@@ -9,8 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.palette import OWN
-from fgbaseline.reports.figures.style import SCREEN, head, in_style
+from fgbaseline.reports.figures.style import OWN, SCREEN, head, in_style
 
 from .growth import ESTIMATORS, LEAST_MB, LEAST_SECONDS, Point, exponents, of
 

@@ -11,7 +11,7 @@ from fgbaseline.data import Truth
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .comparison import Result, Run
-from .figures.palette import TRUTH, colors, on_dark
+from .figures.style import TRUTH, colors, on_dark
 
 
 def require_rerun(file: Path) -> None:

@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..figures.palette import colors
+from ..figures.style import colors
 from ..page.embedding import picture
 from ..page.numbers import counted
 from ..page.rendering import environment

@@ -15,11 +15,10 @@ from fgbaseline.data.formats.beside import written_beside
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from .palette import TRUTH
 from .panels import Line, intervals, log_where_positive, short
 from .reprojection import medians_by_class
 from .run_data import RunData
-from .style import SCREEN, Style, head, in_style, plain
+from .style import SCREEN, TRUTH, Style, head, in_style, plain
 
 FEWEST = 10
 """landmarks of a class that a median in sigmas is shown for: few of them have a covariance of the difference"""

@@ -13,10 +13,10 @@ from fgbaseline import compare
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from . import palette
 from .layout import lay_out
 from .panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, intervals
 from .style import BAND, GRAY, GREEN, SCREEN, head, in_style, plain, sheet, swatch
+from .style import colors as colors_of
 
 if TYPE_CHECKING:
     from fgbaseline.reports.bench.results import Metric, Results
@@ -166,7 +166,7 @@ def _reach(values: list[FloatArray]) -> tuple[float, float]:
 
 
 def _colors(results: "Results") -> dict[str, str]:
-    return palette.colors(results.estimators, results.reference)
+    return colors_of(results.estimators, results.reference)
 
 
 def _marks(results: "Results") -> dict[str, str]:

@@ -12,7 +12,6 @@ from fgbaseline import compare
 from fgbaseline.compare import Align
 from fgbaseline.geometry import FloatArray
 
-from . import palette
 from .accuracy import maps_by_depth
 from .consistency import three_sigma_of
 from .layout import lay_out
@@ -21,6 +20,7 @@ from .panels import Line, fit_log_or_linear
 from .paths import from_above
 from .reprojection import distribution
 from .style import GRAY, SCREEN, WHITE, head, in_style, plain, sheet, swatch
+from .style import colors as colors_of
 from .style import line as line_of
 from .view import TopView, common_window
 
@@ -53,7 +53,7 @@ def draw(comparison: "Comparison") -> dict[str, Figure]:
 
 def colors(comparison: "Comparison") -> dict[str, str]:
     """Color of each trajectory by name; the reference is black."""
-    return palette.colors([comparison.reference.name, *comparison.results], comparison.reference.name)
+    return colors_of([comparison.reference.name, *comparison.results], comparison.reference.name)
 
 
 def paths(comparison: "Comparison") -> Figure:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.geometry import FloatArray
 
-from .over_time import Panel, over_time
+from .over_time import Expected, Panel, over_time
 from .panels import CONSISTENT, DEGREES_OF_FREEDOM, chi_square_band
 from .run_data import RunData
 from .style import GREEN, SCREEN, Style, head, plain
@@ -20,11 +20,8 @@ PRINTED = "95 % if consistent"
 
 def nees(run: RunData) -> Figure | None:
     """NEES of each pose against the truth; None without truth or covariances."""
-
-    def band(_: RunData, axes: Axes) -> list[Any]:
-        return [chi_square_band(axes, DEGREES_OF_FREEDOM, "95 % bounds (6 dof)")]
-
-    panel = Panel("NEES (above: overconfident)", "nees", 3.8 - SCREEN.room, decades=6.0, expected=band)
+    label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
+    panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
     title = "NEES of each pose: its true error against the error it claims"
     return over_time(run, [panel], title, SCREEN, linewidth=1.1)
 
@@ -35,16 +32,17 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
     On paper the NEES against the truth is with them.
     """
     if not style.titled:
+        pose, innovation = _pose_band(PRINTED, 0.6), _innovation_band(PRINTED, 0.6)
         panels = [
-            Panel("NEES", "nees", 0.95, 5.0, _printed_pose_band),
-            Panel("NEES of diff.", "nees_reference", 0.95, 5.0, _printed_pose_band),
-            Panel("NIS per row", "nis_per_row", 0.95, 5.0, _printed_innovation_band),
+            Panel("NEES", "nees", 0.95, 5.0, pose),
+            Panel("NEES of diff.", "nees_reference", 0.95, 5.0, pose),
+            Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
         return over_time(run, panels, "", style)
     panels = [
-        Panel("NEES of difference", "nees_reference", 1.75, 5.0, _pose_band),
-        Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band),
+        Panel("NEES of difference", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
+        Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
         Panel("position sigma\nover reference's", "sigma_ratio_position", 1.75, 5.0, _one),
         Panel("rotation sigma\nover reference's", "sigma_ratio_rotation", 1.75, 5.0, _one),
     ]
@@ -52,22 +50,18 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
     return over_time(run, panels, title, style, linewidth=1.0)
 
 
-def _pose_band(_: RunData, axes: Axes) -> list[Any]:
-    return [chi_square_band(axes, DEGREES_OF_FREEDOM, CONSISTENT)]
+def _pose_band(label: str, width: float = 0.9) -> Expected:
+    return lambda _, axes: [chi_square_band(axes, DEGREES_OF_FREEDOM, label, width=width)]
 
 
-def _innovation_band(run: RunData, axes: Axes) -> list[Any]:
-    rows = run.nis_rows
-    return [] if rows is None else [chi_square_band(axes, rows, CONSISTENT, per=rows)]
+def _innovation_band(label: str, width: float = 0.9) -> Expected:
+    """Band for as many rows as the median frame that has any."""
 
+    def draw(run: RunData, axes: Axes) -> list[Any]:
+        rows = run.nis_rows
+        return [] if rows is None else [chi_square_band(axes, rows, label, per=rows, width=width)]
 
-def _printed_pose_band(_: RunData, axes: Axes) -> list[Any]:
-    return [chi_square_band(axes, DEGREES_OF_FREEDOM, PRINTED, width=0.6)]
-
-
-def _printed_innovation_band(run: RunData, axes: Axes) -> list[Any]:
-    rows = run.nis_rows
-    return [] if rows is None else [chi_square_band(axes, rows, PRINTED, per=rows, width=0.6)]
+    return draw
 
 
 def _one(_: RunData, axes: Axes) -> list[Any]:

@@ -31,6 +31,10 @@ TITLE_ROOM = 58
 """letters that a title has for numbers"""
 
 
+Expected = Callable[[RunData, Axes], list[Any]]
+"""draws the values of a consistent estimator into a panel; gives their entries in the legend"""
+
+
 @dataclass(frozen=True, slots=True)
 class Panel:
     """Quantity of a run's series over time."""
@@ -41,8 +45,7 @@ class Panel:
     """inches"""
     decades: float | None = None
     """of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
-    expected: Callable[[RunData, Axes], list[Any]] | None = None
-    """draws what a consistent estimator shows; gives its entry in the legend"""
+    expected: Expected | None = None
 
 
 def over_time(

@@ -10,9 +10,8 @@ from matplotlib.lines import Line2D
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from .palette import LANDMARK, TRUTH
 from .run_data import RunData
-from .style import GRAY, SCREEN, WHITE, Style, head, label, note, plain, swatch
+from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, head, label, note, plain, swatch
 from .view import Window, common_window, known, robust_window
 
 ARROWS = 40
@@ -132,7 +131,8 @@ def _printed(run: RunData, style: Style, names: tuple[str, ...], points: FloatAr
     axes = figure.subplots()
     handles: list[Any] = []
     if points is not None:
-        axes.scatter(*points[box.holds(points)].T, s=0.6, color=LANDMARK, linewidths=0, rasterized=True)
+        x, y = points[box.holds(points)].T
+        axes.scatter(x, y, s=0.6, color=LANDMARK, linewidths=0, rasterized=True)
         handles.append(swatch(LANDMARK, "landmarks", 3.0))
     if truth is not None:
         handles += axes.plot(*truth.T, **style.truth)

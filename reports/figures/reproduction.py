@@ -68,33 +68,22 @@ def draw(studies: Several["Study"]) -> dict[str, Figure]:
 
 def numbered(study: "Study") -> dict[str, Figure]:
     """Figures of a recording by name, `figure_01` and so on where the report has them under a number."""
-    reported, name, label = study.subject.reported, study.subject.name, plain(study.subject.label)
-    predicted = study.predicted
-    figures = {
-        _key(reported.path if reported else None, name, "path"): plot(
-            f"path of the IMU after prediction, {plain(name)}", predicted, reported.path if reported else None
-        ),
-        _key(reported.arrows if reported else None, name, "arrows"): plot(
-            f"path of the IMU with orientations, {plain(name)}",
-            predicted,
-            reported.arrows if reported else None,
-            arrows=True,
-        ),
-    }
-    for features, mapped in study.mapped.items():
-        number = reported.mapped.get(features) if reported else None
-        landmarks = mapped.estimate.landmarks.position
-        title = f"after landmark update, {label}, N = {features}"
-        figures[_key(number, name, f"mapped_{features}")] = plot(
-            title, mapped.estimate.world_T_imu, number, landmarks=landmarks
-        )
-    number = reported.slam if reported else None
-    figures[_key(number, name, "slam")] = plot(
-        f"visual-inertial SLAM, {label}, N = {study.recorded.features}",
-        study.slam.world_T_imu,
-        number,
-        landmarks=study.slam.landmarks.position,
-    )
+    reported, name, label = study.subject.reported, plain(study.subject.name), plain(study.subject.label)
+    path, arrows, slam = (reported.path, reported.arrows, reported.slam) if reported else (None, None, None)
+    figures: dict[str, Figure] = {}
+
+    def add(kind: str, number: int | None, *what: Any, **how: Any) -> None:
+        key = f"figure_{number:02d}" if number is not None else f"{study.subject.name}_{kind}"
+        figures[key] = plot(*what, number, **how)
+
+    add("path", path, f"path of the IMU after prediction, {name}", study.predicted)
+    add("arrows", arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
+    for n, mapped in study.mapped.items():
+        number, estimate = reported.mapped.get(n) if reported else None, mapped.estimate
+        title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position
+        add(f"mapped_{n}", number, title, estimate.world_T_imu, landmarks=landmarks)
+    title, landmarks = f"visual-inertial SLAM, {label}, N = {study.recorded.features}", study.slam.landmarks.position
+    add("slam", slam, title, study.slam.world_T_imu, landmarks=landmarks)
     return figures
 
 
@@ -140,10 +129,6 @@ def _halves(text: str, most: int = 62) -> tuple[str, ...]:
         return (text,)
     cut = text.rfind(", ", 0, most) + 1
     return (text[:cut], text[cut + 1 :]) if cut > 1 else (text,)
-
-
-def _key(number: int | None, name: str, what: str) -> str:
-    return f"figure_{number:02d}" if number is not None else f"{name}_{what}"
 
 
 def _arrows(axes: Axes, path: FloatArray) -> None:

@@ -15,9 +15,8 @@ from fgbaseline.data.formats import read_landmarks
 from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.geometry import FloatArray, InputError
 
-from .palette import colors
 from .panels import Line
-from .style import SCREEN, Style, line, marked_line
+from .style import SCREEN, Style, colors, line, marked_line
 from .view import TopView
 
 if TYPE_CHECKING:

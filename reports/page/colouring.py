@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures.palette import TRUTH, colors, on_dark
+from fgbaseline.reports.figures.style import TRUTH, colors, on_dark
 
 
 def keys(run: Run) -> dict[str, str]:

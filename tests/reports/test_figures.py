@@ -17,10 +17,9 @@ from fgbaseline.data import Observations
 from fgbaseline.reports import figures
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.palette import OWN
 from fgbaseline.reports.figures.run import drawings
 from fgbaseline.reports.figures.run_data import of_run
-from fgbaseline.reports.figures.style import SCREEN, in_style, plain
+from fgbaseline.reports.figures.style import OWN, SCREEN, in_style, plain
 from fgbaseline.reports.figures.view import TopView
 
 from ..builders.reported import answer, failed, partly_known, run_of, scene, standard_run
