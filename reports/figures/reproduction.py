@@ -69,21 +69,21 @@ def draw(studies: Several["Study"]) -> dict[str, Figure]:
 def numbered(study: "Study") -> dict[str, Figure]:
     """Figures of a recording by name, `figure_01` and so on where the report has them under a number."""
     reported, name, label = study.subject.reported, plain(study.subject.name), plain(study.subject.label)
-    path, arrows, slam = (reported.path, reported.arrows, reported.slam) if reported else (None, None, None)
+    of_path, of_arrows, of_slam = (reported.path, reported.arrows, reported.slam) if reported else (None,) * 3
     figures: dict[str, Figure] = {}
 
-    def add(kind: str, number: int | None, *what: Any, **how: Any) -> None:
+    def add(kind: str, number: int | None, title: str, path: FloatArray, **shown: Any) -> None:
         key = f"figure_{number:02d}" if number is not None else f"{study.subject.name}_{kind}"
-        figures[key] = plot(*what, number, **how)
+        figures[key] = plot(title, path, number, **shown)
 
-    add("path", path, f"path of the IMU after prediction, {name}", study.predicted)
-    add("arrows", arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
+    add("path", of_path, f"path of the IMU after prediction, {name}", study.predicted)
+    add("arrows", of_arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
     for n, mapped in study.mapped.items():
         number, estimate = reported.mapped.get(n) if reported else None, mapped.estimate
         title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position
         add(f"mapped_{n}", number, title, estimate.world_T_imu, landmarks=landmarks)
     title, landmarks = f"visual-inertial SLAM, {label}, N = {study.recorded.features}", study.slam.landmarks.position
-    add("slam", slam, title, study.slam.world_T_imu, landmarks=landmarks)
+    add("slam", of_slam, title, study.slam.world_T_imu, landmarks=landmarks)
     return figures
 
 

@@ -31,7 +31,7 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
         return dict.fromkeys(drawings(data), Figure)
 
     patch.setattr(Figure, "savefig", savefig)
-    patch.setattr(saving, "_png", lambda _: empty["png"])
+    patch.setattr(saving, "_png", lambda *_: empty["png"])
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
     patch.setattr(run, "drawings", blank)
