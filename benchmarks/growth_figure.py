@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
-from fgbaseline.reports.figures.drawing import lay_out
-from fgbaseline.reports.figures.palette import OWN
-from fgbaseline.reports.figures.style import WIDTH, head, in_style
+from fgbaseline.reports.figures.layout import lay_out
+from fgbaseline.reports.figures.style import OWN, SCREEN, head, in_style
 
 from .growth import ESTIMATORS, LEAST_MB, LEAST_SECONDS, Point, exponents, of
 
@@ -23,7 +22,7 @@ def drawn(points: list[Point]) -> bytes:
     """A PNG: one column for what varies, the exponents of the fits beside the lines' ends."""
     names = list(dict.fromkeys(p.axis for p in points))
     with in_style():
-        figure = Figure(figsize=(WIDTH, 6.2))
+        figure = Figure(figsize=(SCREEN.width, 6.2))
         panels = figure.subplots(len(ROWS), len(names), sharex="col", sharey="row", squeeze=False)
         for row, (unit, title, least) in enumerate(ROWS):
             for column, name in enumerate(names):

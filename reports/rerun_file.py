@@ -11,7 +11,7 @@ from fgbaseline.data import Truth
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .comparison import Result, Run
-from .figures.palette import TRUTH, colours, on_dark
+from .figures.style import TRUTH, colors, on_dark
 
 
 def require_rerun(file: Path) -> None:
@@ -55,7 +55,7 @@ def _world(rr: Any, recording: Any, run: Run) -> None:
 def _estimator(rr: Any, recording: Any, run: Run, result: Result) -> None:
     """The whole path and map at once; camera, errors and reprojection frame by frame."""
     estimate, name = result.estimate, _safe(result.name)
-    colour = rgb(on_dark(colours(run)[result.name]))
+    colour = rgb(on_dark(colors(run.results, run.reference)[result.name]))
     poses = estimate.world_T_imu
     known = np.flatnonzero(np.isfinite(poses).all(axis=(1, 2)))
     recording.log(f"world/{name}/path", _strip(rr, poses[known, :3, 3], colour), static=True)

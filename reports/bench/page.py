@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..figures.palette import colours_of
+from ..figures.style import colors
 from ..formatting import counted, interval
 from ..html.environment import environment, picture
 from .grid import main_grid
@@ -55,7 +55,7 @@ def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
             spent=duration(results.seconds),
             verdict=sentences(results),
             grid=grid,
-            colours=colours_of(results.estimators, results.reference),
+            colours=colors(results.estimators, results.reference),
             figures=[_captioned(key, picture(key, figure)) for key, figure in figures.items()],
             words=WORDS,
             tables=[table for table in (*_rankings(results), _overall(results)) if table is not None],

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from ..figures.bench import draw
 from ..figures.saving import encoded
 from . import tables
-from .figures import draw
 from .grid import main_grid
 from .page import render
 from .results import Results
@@ -36,7 +36,7 @@ def write_report(name: str, results: Results, store: Store) -> None:
     with_costs = main_grid(results, with_costs=True)
     store.write(f"{COSTS}/table.md", markdown(with_costs).encode())
     store.write(f"{COSTS}/table.tex", latex(with_costs).encode())
-    figures = draw(results)
+    figures = draw(results, tables.judge(results), tables.cases(results), tables.costs(results))
     for title, figure in figures.items():
         for form in ("png", "svg"):
             store.write(f"{FIGURES}/{title}.{form}", encoded(figure, form))

@@ -8,7 +8,7 @@ import pandas as pd
 
 from fgbaseline import compare
 
-from .results import ANSWERED, METRICS, Results
+from .results import ANSWERED, METRICS, Metric, Results
 
 
 def cases(results: Results) -> pd.DataFrame:
@@ -101,6 +101,12 @@ def nees_over_time(results: Results) -> pd.DataFrame:
         table.insert(0, "case", case)
         parts.append(table)
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def judge(results: Results) -> Metric | None:
+    """Metric by which accuracy is judged: error to truth, else that on held-out tracks, else none."""
+    ranked = (metric for metric in METRICS if metric.ranked)
+    return next((metric for metric in ranked if results.runs[metric.name].notna().any()), None)
 
 
 def costs(results: Results) -> pd.DataFrame:

@@ -7,9 +7,8 @@ import pandas as pd
 
 from ..formatting import interval, listed, number
 from ..html.accuracy_verdict import SAME_GRAPH
-from .figures import judge
 from .results import ANSWERED, METRICS, Metric, Results
-from .tables import consistency, overall, rankings, records
+from .tables import consistency, judge, overall, rankings, records
 
 MOST_CASES = 10
 """that are told one by one"""

@@ -155,7 +155,7 @@ def _drawn(
     asked: dict[str, float | None],
     place: FilePath | None,
 ) -> Path:
-    from .accuracy_figure import draw  # matplotlib: only where something fell short
+    from ..figures.accuracy import draw  # matplotlib: only where something fell short
 
     path = Path(tempfile.mkdtemp(prefix="fgbaseline-")) / "accuracy.png" if place is None else Path(place)
     limited = {metric.partition(".")[0] for metric, limit in asked.items() if limit is not None}

@@ -32,13 +32,16 @@ def command(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     As wide as a column, letters of 7 points, lines told apart without colour, fonts embedded. Nothing is computed
     again: what is drawn is what the run wrote. captions.json has a caption for each.
     """
-    from .. import paper
-    from ..paper.writing import CAPTIONS
+    from ..figures.run import draw_printed
+    from ..figures.run_data import of_folder
+    from ..figures.saving import CAPTIONS, save, save_captions
+    from ..figures.style import PAPER
     from ..whole_folder import whole_folder
 
     place = out or folder / "paper"
-    figures = paper.draw(paper.read_drawn(folder))
+    figures = draw_printed(of_folder(folder))
     with whole_folder(place, force=force, mark=CAPTIONS) as building:
-        paper.write(figures, building, formats)
+        save({name: figure for name, (figure, _) in figures.items()}, building, formats, PAPER)
+        save_captions({name: caption for name, (_, caption) in figures.items()}, building)
     click.echo(f"{len(figures)} figures as {', '.join(formats)} are in {place}")
     return 0

@@ -62,7 +62,7 @@ class ComparisonReport(Comparison):
 
     def figures(self) -> "dict[str, Figure]":
         """The figures by name."""
-        from .figures import draw  # matplotlib takes longer to import than a short comparison
+        from ..figures.comparison import draw  # matplotlib takes longer to import than a short comparison
 
         return draw(self)
 

@@ -8,13 +8,13 @@ import numpy as np
 from fgbaseline.data import write_tum
 
 from ..figures import save
+from ..figures.comparison import draw
 from ..html.comparison_page import render
 from ..results.comparison import MARK, Summary
 from ..tables import latex, markdown
 from ..tables.comparison import comparison_table, main_table, metrics_table
 from ..trajectories.comparison import Comparison, Result
 from ..whole_folder import whole_folder
-from .figures import draw
 
 
 def write(comparison: Comparison, summary: Summary, place: Path, *, force: bool) -> Path:

@@ -1,9 +1,22 @@
-"""Figures of a run, in matplotlib: drawn from the comparison, one look, one colour for an estimator everywhere."""
+"""Figures in matplotlib, in two styles (screen and paper), with one color for an estimator everywhere."""
 
 from .diagnosis import draw_diagnosis
-from .drawing import draw
-from .palette import colours
+from .run import being_drawn, draw, draw_and_write, draw_printed
+from .run_data import RunData, of_folder, of_run
 from .saving import Written, encoded, save
-from .sharing import being_drawn, draw_and_write
+from .style import colors
 
-__all__ = ["Written", "being_drawn", "colours", "draw", "draw_and_write", "draw_diagnosis", "encoded", "save"]
+__all__ = [
+    "RunData",
+    "Written",
+    "being_drawn",
+    "colors",
+    "draw",
+    "draw_and_write",
+    "draw_diagnosis",
+    "draw_printed",
+    "encoded",
+    "of_folder",
+    "of_run",
+    "save",
+]

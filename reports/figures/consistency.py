@@ -1,4 +1,4 @@
-"""Whether an estimator knows its errors: beside the reference, in its innovations, and against truth."""
+"""Consistency: NEES against truth and reference, NIS, sigma ratios, and errors between three sigmas."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,68 +7,93 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import chi_square_bounds
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.comparison import Result, Run
 
-from .frames import fit_log, seconds, time_axis
-from .lettering import plain
-from .style import head, line, sheet
+from .over_time import Expected, Panel, over_time
+from .panels import CONSISTENT, DEGREES_OF_FREEDOM, chi_square_band
+from .run_data import RunData
+from .style import GREEN, SCREEN, Style, head, plain
 
-BAND: dict[str, Any] = {"color": "#d7e8d9", "zorder": 1, "linewidth": 0}
-MIDDLE: dict[str, Any] = {"color": "#6b9a72", "linewidth": 0.9, "zorder": 1.5}
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
+PRINTED = "95 % if consistent"
 
 
-def consistency(run: Run) -> Figure | None:
-    """NEES of the difference from the reference, NIS, and sigmas over the reference's; None without any of these."""
+def nees(run: RunData) -> Figure | None:
+    """NEES of each pose against the truth; None without truth or covariances."""
+    label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
+    panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
+    title = "NEES of each pose: its true error against the error it claims"
+    return over_time(run, [panel], title, SCREEN, linewidth=1.1)
+
+
+def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """NEES of the difference from the reference, NIS, and sigmas over the reference's; None without any of these.
+
+    On paper the NEES against the truth is with them.
+    """
+    if not style.titled:
+        pose, innovation = _pose_band(PRINTED, 0.6), _innovation_band(PRINTED, 0.6)
+        panels = [
+            Panel("NEES", "nees", 0.95, 5.0, pose),
+            Panel("NEES of diff.", "nees_reference", 0.95, 5.0, pose),
+            Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
+            Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
+        ]
+        return over_time(run, panels, "", style)
     panels = [
-        ("NEES of difference", {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference}),
-        ("NIS per row", {r.name: r.evidence.nis_per_degree for r in run.answered}),
-        ("position sigma\nover reference's", _ratio(run, "position")),
-        ("rotation sigma\nover reference's", _ratio(run, "rotation")),
+        Panel("NEES of difference", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
+        Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
+        Panel("position sigma\nover reference's", "sigma_ratio_position", 1.75, 5.0, _one),
+        Panel("rotation sigma\nover reference's", "sigma_ratio_rotation", 1.75, 5.0, _one),
     ]
-    known = [(name, {n: v for n, v in series.items() if np.isfinite(v).any()}) for name, series in panels]
-    known = [(name, series) for name, series in known if series]
-    if not known:
-        return None
-    figure, axes = sheet(1.2 + 1.75 * len(known), len(known))
-    handles: list[Any] = []
-    for panel, (name, series) in zip(axes, known, strict=True):
-        for estimator, values in series.items():
-            style = {**line(run, run.results[estimator]), "linewidth": 1.0}
-            handles += panel.plot(seconds(run), values, **style)
-        fit_log(panel, series, decades=5.0)
-        handles += _expected(panel, name, run)
-        panel.set_ylabel(name)
-    time_axis(run, axes)
-    head(figure, "Consistency without truth: above the band too sure of itself, below it too timid", handles)
-    return figure
+    title = "Consistency without truth: overconfident above the band, conservative below it"
+    return over_time(run, panels, title, style, linewidth=1.0)
 
 
-def three_sigma(run: Run, result: Result) -> Figure | None:
-    """The error of each pose in its own body frame, between three of its sigmas; None without truth or covariances."""
-    error, covariance = result.evidence.error, result.estimate.covariance
-    if error is None or covariance is None or not np.isfinite(error).any() or not np.isfinite(covariance).any():
+def _pose_band(label: str, width: float = 0.9) -> Expected:
+    return lambda _, axes: [chi_square_band(axes, DEGREES_OF_FREEDOM, label, width=width)]
+
+
+def _innovation_band(label: str, width: float = 0.9) -> Expected:
+    """Band for as many rows as the median frame that has any."""
+
+    def draw(run: RunData, axes: Axes) -> list[Any]:
+        rows = run.nis_rows
+        return [] if rows is None else [chi_square_band(axes, rows, label, per=rows, width=width)]
+
+    return draw
+
+
+def _one(_: RunData, axes: Axes) -> list[Any]:
+    axes.axhline(1.0, color=GREEN, linewidth=0.9, zorder=1.5)
+    return []
+
+
+def three_sigma(run: RunData, name: str) -> Figure | None:
+    """Error of each pose in its own body frame, between three of its sigmas; None without truth or covariances."""
+    if run.observed is None or name not in run.observed.errors:
         return None
-    return three_sigma_of(result.name, seconds(run), error, covariance, line(run, result))
+    error, covariance = run.observed.errors[name]
+    if not np.isfinite(error).any() or not np.isfinite(covariance).any():
+        return None
+    return three_sigma_of(name, run.t, error, covariance, run.line()(name))
 
 
 def three_sigma_of(
-    name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, style: Mapping[str, Any]
+    name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, look: Mapping[str, Any]
 ) -> Figure:
     """Errors (n, 6) in the body frame at t (n,), s, between three sigmas of their covariances (n, 6, 6)."""
     scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
     with np.errstate(invalid="ignore"):
         sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
-    figure = Figure(figsize=(8.0, 5.4))
+    figure = Figure(figsize=(SCREEN.width, 5.4))
     panels = figure.subplots(3, 2, sharex=True)
     handles: list[Any] = []
     for i, axis in enumerate(AXES):
         panel = panels[i % 3, i // 3]
         e, s = scale[i] * error[:, i], sigma[:, i]
         band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="three sigmas")
-        drawn = panel.plot(t, e, **{**style, "linewidth": 1.0, "label": "error"})
+        drawn = panel.plot(t, e, **{**look, "linewidth": 1.0, "label": "error"})
         panel.set_ylim(-(reach := _reach(e, s)), reach)
         both = np.isfinite(e) & np.isfinite(s) & (s > 0)
         inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
@@ -81,34 +106,8 @@ def three_sigma_of(
     return figure
 
 
-def _ratio(run: Run, part: str) -> dict[str, FloatArray]:
-    tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
-    return {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
-
-
-def _expected(panel: Axes, name: str, run: Run) -> list[Any]:
-    """What a consistent estimator shows."""
-    if name == "NEES of difference":
-        low, high = (float(limit) for limit in chi_square_bounds(6.0))
-        panel.axhline(6.0, **MIDDLE)
-    elif name == "NIS per row":
-        counts = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
-        seen = np.concatenate(counts)
-        if not seen.any():
-            return []
-        rows = float(np.median(seen[seen > 0]))
-        low, high = (float(limit) / rows for limit in chi_square_bounds(rows))
-        panel.axhline(1.0, **MIDDLE)
-    else:
-        panel.axhline(1.0, **MIDDLE)
-        return []
-    bottom, top = panel.get_ylim()
-    panel.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
-    return [panel.axhspan(low, high, **BAND, label="95 % of the frames of a consistent filter")]
-
-
 def _reach(error: FloatArray, sigma: FloatArray) -> float:
-    """How far a panel reaches: over nearly all of the error, and the band as far as that leaves it visible."""
+    """Limit of a panel: over nearly all of the error, and the band as far as that leaves it visible."""
     e = np.abs(error[np.isfinite(error)])
     s = 3.0 * sigma[np.isfinite(sigma)]
     most = float(np.percentile(e, 99)) if len(e) else 0.0

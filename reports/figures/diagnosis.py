@@ -1,4 +1,4 @@
-"""The evidence of a diagnosis: what the cameras see beside what was recorded, and how the answers were chosen."""
+"""Evidence of a diagnosis: what the cameras see beside what was recorded, and how the answers were chosen."""
 
 from typing import Any
 
@@ -12,20 +12,21 @@ from fgbaseline.data.plural import plural
 from fgbaseline.diagnosis import Diagnosis, TrackStatistics
 from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.moving_sum import moving_sum
 
 from .layout import lay_out
-from .style import head, in_style, sheet, swatch
+from .panels import moving_sum
+from .style import GRAY, SCREEN, head, in_style, sheet, swatch
 
-SEEN, RECORDED, REPAIRED, WRONG, COPIED = "#111111", "#D55E00", "#0072B2", "#c0392b", "#E69F00"
+SEEN, RECORDED, REPAIRED = "#111111", "#D55E00", "#0072B2"
 """the cameras, the recording and what the repair makes of it"""
+WRONG, COPIED, OTHERS = "#c0392b", "#E69F00", "#b8c4d0"
 SMOOTH = 1.0
 """s over which rates are averaged, so that the noise of one frame does not hide the rest"""
 BINS = np.linspace(-5.0, 5.0, 61)
 
 
 def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, Figure]:
-    """The figures of a diagnosis by name; those for which it has nothing to show are missing."""
+    """Figures of a diagnosis by name; those for which it has nothing to show are missing."""
     figures: dict[str, Figure] = {}
     with in_style():
         if diagnosis.odometry is not None and diagnosis.fit is not None:
@@ -41,7 +42,7 @@ def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, F
 
 
 def angular_rates(diagnosis: Diagnosis) -> Figure:
-    """What the cameras see, what was recorded and what the repair makes of it, about each axis of imu_T_cam."""
+    """Angular rates that the cameras see, as recorded and as repaired, about each axis of imu_T_cam."""
     assert diagnosis.odometry is not None
     sequence, odometry = diagnosis.sequence, diagnosis.odometry
     bias = significant_bias(diagnosis)
@@ -64,8 +65,8 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
             lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
         axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
         before, after = (median_error(seen[known, i], r[known, i]) for r in (recorded, repaired))
-        told = f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else "")
-        axis.set_title(told, loc="right", fontsize=8, color="#555555", pad=2.0)
+        text = f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else "")
+        axis.set_title(text, loc="right", fontsize=8, color=GRAY, pad=2.0)
         handles = handles or lines
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0.0, float(t[-1]))
@@ -74,16 +75,16 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
 
 
 def conventions(diagnosis: Diagnosis) -> Figure:
-    """By how much each of the 24 conventions falls behind the best, in log-likelihood, for both velocities."""
-    figure = Figure(figsize=(8.0, 5.0))
+    """Log-likelihood by which each of the 24 conventions falls behind the best, for both velocities."""
+    figure = Figure(figsize=(SCREEN.width, 5.0))
     panels = figure.subplots(1, 2)
     for panel, which, axes in zip(panels, ("angular", "linear"), (diagnosis.angular, diagnosis.linear), strict=True):
         ranked = sorted(axes.scores, key=lambda name: -axes.scores[name])
         best = axes.scores[ranked[0]]
         behind = [best - axes.scores[name] for name in ranked]
-        colours = [REPAIRED if n == axes.name else RECORDED if n == IDENTITY else "#b8c4d0" for n in ranked]
+        colors = [REPAIRED if n == axes.name else RECORDED if n == IDENTITY else OTHERS for n in ranked]
         rows = np.arange(len(ranked))
-        panel.barh(rows, behind, color=colours, height=0.75)
+        panel.barh(rows, behind, color=colors, height=0.75)
         panel.plot(
             [0.0] * sum(b == 0 for b in behind), [i for i, b in enumerate(behind) if b == 0], ".", color="#333333"
         )
@@ -100,13 +101,13 @@ def conventions(diagnosis: Diagnosis) -> Figure:
     changed = diagnosis.angular.changed or diagnosis.linear.changed
     handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
     handles += [swatch(RECORDED, "as recorded")] if changed else []
-    handles.append(swatch("#b8c4d0", "others"))
+    handles.append(swatch(OTHERS, "others"))
     head(figure, "Which of the 24 axis conventions agrees with the cameras", handles)
     return figure
 
 
 def delay(diagnosis: Diagnosis) -> Figure:
-    """How well the recorded rates agree with the cameras at each shift in time."""
+    """Agreement of the recorded rates with the cameras at each shift in time."""
     timing = diagnosis.timing
     dt = float(np.median(diagnosis.sequence.dt))
     figure, (axes,) = sheet(3.6)
@@ -129,7 +130,7 @@ def delay(diagnosis: Diagnosis) -> Figure:
             transform=axes.get_xaxis_transform(),
             va="top",
             fontsize=8,
-            color="#555555",
+            color=GRAY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 100.0])
@@ -144,13 +145,13 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     """Residuals of the velocities in the windows' fits, over the noise that was found, beside a normal distribution."""
     assert diagnosis.fit is not None
     fit = diagnosis.fit
-    figure = Figure(figsize=(8.0, 4.6))
+    figure = Figure(figsize=(SCREEN.width, 4.6))
     panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
     bell = np.exp(-0.5 * BINS**2) / np.sqrt(2.0 * np.pi)
     handles: list[Any] = []
     for i, panel in enumerate(panels):
         values = fit.motion[np.isfinite(fit.motion[:, i]), i]
-        panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color="#b8c4d0")
+        panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color=OTHERS)
         handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="what the noise found predicts")
         beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
         panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {beyond:.1%} beyond 3 sigma")
@@ -161,16 +162,16 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     sigma = fit.sigmas
     noise = f"{sigma.linear_velocity:.3f} m/s, {sigma.angular_velocity:.4f} rad/s"
     title = f"Residuals of the velocities over the noise found: {noise}"
-    head(figure, title, [swatch("#b8c4d0", plural(len(fit.motion), "interval")), *handles])
+    head(figure, title, [swatch(OTHERS, plural(len(fit.motion), "interval")), *handles])
     return figure
 
 
 def matches_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
-    """The features of each frame, and the share of its matches that contradict the motion."""
+    """Features of each frame, and the share of its matches that contradict the motion."""
     sequence = diagnosis.sequence
     t = sequence.t - sequence.t[0]
     figure, (upper, lower) = sheet(5.0, 2)
-    handles: list[Any] = list(upper.plot(t, tracks.usable, color="#555555", linewidth=1.0, label="usable features"))
+    handles: list[Any] = list(upper.plot(t, tracks.usable, color=GRAY, linewidth=1.0, label="usable features"))
     upper.set_ylabel("features per frame")
     upper.set_ylim(bottom=0)
     lower.bar(t[:-1], 100.0 * np.nan_to_num(tracks.wrong_share), sequence.dt, align="edge", color=WRONG)
@@ -192,17 +193,17 @@ def matches_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
 
 
 def smoothed(values: FloatArray, width: float) -> FloatArray:
-    """(n,) the mean over a window of so many; NaN takes no part, and stays where it fills the window."""
+    """(n,) mean over a window of so many entries; NaN is left out, and stays where it fills the window."""
     known = np.isfinite(values)
     total, count = moving_sum(np.where(known, values, 0.0), width), moving_sum(known, width)
     return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
 
 
 def median_error(seen: FloatArray, recorded: FloatArray) -> float:
-    """Of one axis."""
+    """Median absolute error of one axis."""
     return float(np.median(np.abs(seen - recorded)))
 
 
-def _mark(axes: Axes, t: FloatArray, colour: str, height: float) -> None:
+def _mark(axes: Axes, t: FloatArray, color: str, height: float) -> None:
     """Ticks along the lower or upper edge of a panel."""
-    axes.vlines(t, height, height + 0.06, transform=axes.get_xaxis_transform(), color=colour, linewidth=1.0, zorder=3)
+    axes.vlines(t, height, height + 0.06, transform=axes.get_xaxis_transform(), color=color, linewidth=1.0, zorder=3)

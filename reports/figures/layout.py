@@ -1,16 +1,42 @@
-"""Where everything in a figure stands: found once, then held, however often and in whatever form it is written."""
+"""Place of everything in a figure: found once, then held, however often and in whatever form it is written.
+
+Panels are placed by matplotlib's constrained layout in closed form, for figures that are one grid of panels below one
+legend. That engine solves for sizes, looks, and solves again, and looking at every label of every tick is most of what
+it does. Here it is done once, at sizes near those that come of it, and again only where that changed the ticks.
+Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where these would be long.
+"""
 
 from collections import defaultdict
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from matplotlib.lines import Line2D
+from matplotlib.markers import TICKDOWN, TICKLEFT, MarkerStyle
+from matplotlib.ticker import LogFormatter, LogFormatterSciNotation, NullLocator
 from matplotlib.transforms import Bbox, blended_transform_factory
+from numpy.typing import ArrayLike
 
-from .grid import fill_grid
-from .log_axis import draw_minor_ticks_at_once, label_with_numbers
+from fgbaseline.geometry import FloatArray
+
+PAD = 0.042
+"""inches around each panel with its labels, and around the legend"""
+USUAL = (0.6, 0.12, 0.25)
+"""inches to the left and right of a panel and above it, by which it is sized before anything is measured"""
+BELOW, BELOW_INNER = 0.5, 0.1
+"""inches under a panel of the lowest row, and of those above"""
+PASSES = 3
+"""at most, of measuring and placing; a second one is needed where a panel has other ticks at its new size"""
+LEFT, RIGHT, BOTTOM, TOP = range(4)
+LONG = (1e-4, 1e5)
+"""an axis that reaches beyond these is labeled with powers of ten"""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def lay_out(figure: Figure) -> None:
@@ -56,3 +82,121 @@ def _hold_labels(figure: Figure) -> None:
         left = round(min(x for _, x in panels), 3)
         for axes, _ in panels:
             axes.yaxis.set_label_coords(left, 0.5, blended_transform_factory(inches, axes.transAxes))
+
+
+def fill_grid(figure: Figure) -> None:
+    """Places the panels of a figure that are in a grid (the same for all of them), below its legends."""
+    panels = [(axes, spec) for axes in figure.axes if (spec := axes.get_subplotspec()) is not None]
+    if not panels:
+        return
+    FigureCanvasAgg(figure)  # measures without drawing
+    size = figure.get_size_inches()
+    head = max((legend.get_window_extent().height / figure.dpi + 2.0 * PAD for legend in figure.legends), default=0.0)
+    _place(panels, np.array([_usual(spec) for _, spec in panels]), size, head)
+    for _ in range(PASSES):
+        ticks = _ticks(panels)
+        _place(panels, np.array([_around(axes) for axes, _ in panels]) / figure.dpi, size, head)
+        if _ticks(panels) == ticks:
+            break
+
+
+def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:
+    """Where they are: a panel of another size may have others, whose labels take another space."""
+    return [axis.get_majorticklocs().tolist() for axes, _ in panels for axis in (axes.xaxis, axes.yaxis)]
+
+
+def _usual(spec: SubplotSpec) -> tuple[float, float, float, float]:
+    left, right, above = USUAL
+    return left, right, BELOW if spec.is_last_row() else BELOW_INNER, above
+
+
+def _around(axes: Axes) -> tuple[float, float, float, float]:
+    """px that labels, ticks and title take to the left and right of a panel, below and above it."""
+    own, everything = axes.get_window_extent(), axes.get_tightbbox(for_layout_only=True)
+    if everything is None:  # it is not visible
+        return 0.0, 0.0, 0.0, 0.0
+    return own.x0 - everything.x0, everything.x1 - own.x1, own.y0 - everything.y0, everything.y1 - own.y1
+
+
+def _place(panels: list[tuple[Axes, SubplotSpec]], around: FloatArray, size: FloatArray, head: float) -> None:
+    """Sizes the panels, with `around` (n, 4) inches around them, so that they fill what is below the head."""
+    grid = panels[0][1].get_gridspec()
+    margin = np.full((4, max(grid.nrows, grid.ncols)), PAD)
+    for (_, spec), needed in zip(panels, around + PAD, strict=True):
+        places = spec.colspan.start, spec.colspan.stop - 1, spec.rowspan.stop - 1, spec.rowspan.start
+        for side, place in enumerate(places):
+            margin[side, place] = max(margin[side, place], needed[side])
+    columns = _spans(size[0], margin[LEFT], margin[RIGHT], grid.get_width_ratios(), grid.ncols)
+    rows = size[1] - _spans(size[1] - head, margin[TOP], margin[BOTTOM], grid.get_height_ratios(), grid.nrows) - head
+    for axes, spec in panels:
+        x0, x1 = columns[spec.colspan.start, 0], columns[spec.colspan.stop - 1, 1]
+        y0, y1 = rows[spec.rowspan.stop - 1, 1], rows[spec.rowspan.start, 0]
+        axes.set_position(Bbox([[x0 / size[0], y0 / size[1]], [x1 / size[0], y1 / size[1]]]))
+        axes.apply_aspect()
+
+
+def _spans(length: float, before: FloatArray, after: FloatArray, ratios: ArrayLike | None, n: int) -> FloatArray:
+    """(n, 2) where the panels of each column or row begin and end, inches, with these margins before and after them."""
+    share = np.ones(n) if ratios is None else np.asarray(ratios, dtype=np.float64)
+    inner = share / share.sum() * max(length - float((before[:n] + after[:n]).sum()), 0.1)
+    begin = np.cumsum(before[:n]) + np.concatenate([[0.0], np.cumsum(inner + after[:n])[:-1]])
+    return np.stack([begin, begin + inner], axis=1)
+
+
+class Numbers(LogFormatter):
+    """Which ticks are labeled is matplotlib's choice; how, needs none of its mathematics, slow to be set."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of the tick at x; empty where it has none."""
+        return self._number(x) if super().__call__(x, pos) else ""
+
+    def _number(self, x: float) -> str:
+        low, high = sorted(self.axis.get_view_interval())  # type: ignore[union-attr]
+        if LONG[0] <= low and high <= LONG[1]:
+            return f"{x:g}"
+        mantissa, _, exponent = f"{x:e}".partition("e")
+        power = f"10{str(int(exponent)).translate(RAISED)}"
+        return power if float(mantissa) == 1.0 else f"{float(mantissa):g}×{power}"
+
+
+def label_with_numbers(axis: Axis) -> None:
+    """Labels a logarithmic axis, once its limits are final, unless it was given labels of its own."""
+    if not isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
+        return
+    axis.set_major_formatter(Numbers())
+    if isinstance(axis.get_minor_formatter(), LogFormatterSciNotation):
+        axis.set_minor_formatter(Numbers(labelOnlyBase=False))
+    if not any(axis.get_minor_formatter().format_ticks(list(axis.get_minorticklocs()))):
+        axis.set_tick_params(which="minor", labelleft=False, labelbottom=False)
+
+
+def draw_minor_ticks_at_once(panels: Iterable[Axes]) -> None:
+    """Makes one line of the minor ticks of each logarithmic axis, once its limits are final, unless some have labels.
+
+    As ticks each is five artists, which are measured and drawn in every form whether they show or not.
+    """
+    bare = [(axes, axis, _unlabeled(axis)) for axes in panels for axis in (axes.xaxis, axes.yaxis)]
+    for axes, axis, at in bare:  # panels that share an axis share its locator too: all are asked before
+        if len(at) == 0:
+            continue
+        axis.set_minor_locator(NullLocator())
+        zero, rc = np.zeros(len(at)), mpl.rcParams
+        if axis.axis_name == "x":
+            ticks = Line2D(at, zero, transform=axes.get_xaxis_transform(), marker=MarkerStyle(TICKDOWN))
+            size, width, color = rc["xtick.minor.size"], rc["xtick.minor.width"], rc["xtick.color"]
+        else:
+            ticks = Line2D(zero, at, transform=axes.get_yaxis_transform(), marker=MarkerStyle(TICKLEFT))
+            size, width, color = rc["ytick.minor.size"], rc["ytick.minor.width"], rc["ytick.color"]
+        ticks.set(markersize=size, markeredgewidth=width, color=color, linestyle="none", clip_on=False)
+        ticks.set_in_layout(False)
+        axes.add_artist(ticks)
+
+
+def _unlabeled(axis: Axis) -> FloatArray:
+    """(n,) where the minor ticks of a logarithmic axis are; none where one of them has a label."""
+    if axis.get_scale() != "log":
+        return np.empty(0)
+    low, high = sorted(axis.get_view_interval())
+    at = np.asarray(axis.get_minorticklocs(), dtype=np.float64)
+    at = at[(at >= low) & (at <= high)]
+    return np.empty(0) if any(axis.get_minor_formatter().format_ticks(at.tolist())) else at

@@ -1,11 +1,12 @@
-"""Figures as bytes and as files: the same run gives the same bytes."""
+"""Figures as bytes and as files: the same data give the same bytes."""
 
+import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -14,8 +15,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from .layout import held
-from .style import DPI, in_style
+from .style import SCREEN, Style, in_style
 
+FORMATS: Final = ("pdf", "svg", "png")
+"""forms of the files of a paper"""
+CAPTIONS: Final = "captions.json"
 UNDATED: Mapping[str, Mapping[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """metadata without the time of writing"""
 COMPRESSION = 3
@@ -25,7 +29,7 @@ _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A figure of which only what was written is left."""
+    """Figure of which only what was written is left."""
 
     title: str
     size: tuple[float, float]
@@ -35,43 +39,56 @@ class Written:
 
 
 def written(figure: Figure, forms: Iterable[str]) -> Written:
-    """What is left of a figure once it was written in these forms."""
+    """Remainder of a figure once it was written in these forms."""
     width, height = (float(side) for side in figure.get_size_inches())
     return Written(str(figure.get_label()), (width, height), {form: encoded(figure, form) for form in forms})
 
 
-def save(figures: Mapping[str, Figure | Written], folder: Path, forms: Iterable[str] = ("png", "svg")) -> None:
-    """Writes NAME.png (150 dpi), NAME.svg or what other forms are asked for of each figure into an existing folder."""
+def save(
+    figures: Mapping[str, Figure | Written],
+    folder: Path,
+    forms: Iterable[str] = ("png", "svg"),
+    style: Style = SCREEN,
+) -> None:
+    """Writes NAME.FORM of each figure and form (`png`, `svg`, `pdf`) into an existing folder."""
     chosen = tuple(forms)
     for name, figure in figures.items():
         stem = re.sub(r"[^\w.-]", "_", name)
         for form in chosen:
-            (folder / f"{stem}.{form}").write_bytes(encoded(figure, form))
+            (folder / f"{stem}.{form}").write_bytes(encoded(figure, form, style))
 
 
-def encoded(figure: Figure | Written, form: str) -> bytes:
-    """The figure as a file of the form `png`, `svg` or `pdf`; written once, remembered as long as the figure lives."""
+def save_captions(captions: Mapping[str, str], folder: Path) -> None:
+    """Writes captions.json into an existing folder."""
+    (folder / CAPTIONS).write_text(json.dumps(captions, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def encoded(figure: Figure | Written, form: str, style: Style = SCREEN) -> bytes:
+    """File of a figure in the form `png`, `svg` or `pdf`; written once, remembered as long as the figure lives."""
     if isinstance(figure, Written):
         return figure.files[form]
     forms = _written.setdefault(figure, {})
     if form not in forms:
-        with in_style(), held():
-            forms[form] = _png(figure) if form == "png" else _saved(figure, form, metadata=UNDATED[form])
+        with in_style(style), held():
+            if form == "png":
+                forms[form] = _png(figure, style.dpi)
+            else:
+                forms[form] = _saved(figure, form, dpi=style.dpi, metadata=UNDATED[form])
     return forms[form]
 
 
-def _png(figure: Figure) -> bytes:
-    """Without an alpha channel, since the ground is white: three quarters of the time."""
+def _png(figure: Figure, dpi: int) -> bytes:
+    """PNG without an alpha channel, since the ground is white: three quarters of the time."""
     canvas = FigureCanvasAgg(figure)
-    figure.dpi = DPI
+    figure.dpi = dpi
     canvas.draw()
     colors = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])  # as many rows and columns as it has
     stream = BytesIO()
-    Image.fromarray(colors).save(stream, "png", compress_level=COMPRESSION, dpi=(DPI, DPI))
+    Image.fromarray(colors).save(stream, "png", compress_level=COMPRESSION, dpi=(dpi, dpi))
     return stream.getvalue()
 
 
 def _saved(figure: Figure, form: str, **options: Any) -> bytes:
     stream = BytesIO()
-    figure.savefig(stream, format=form, dpi=DPI, **options)
+    figure.savefig(stream, format=form, **options)
     return stream.getvalue()

@@ -1,118 +1,246 @@
-"""How all figures look: sheet, line, legend and note."""
+"""Two styles of all figures, for the screen and for paper: colors, sheets, lines, legends and safe text.
 
-from collections.abc import Iterable, Mapping
+An estimator has one color in every figure and on the page: Okabe and Ito's, distinct to the color-blind.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain, cycle
 from typing import Any
 
-from matplotlib import style
+from matplotlib import style as rc_style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
 
-from fgbaseline.reports.comparison import Result, Run
+REFERENCE = "#000000"
+TRUTH = "#7f7f7f"
+LANDMARK = "#5fb98c"
 
-from .lettering import plain
-from .palette import TRUTH, colours
+OWN: Mapping[str, str] = {
+    "dead-reckoning": "#0072B2",
+    "ekf": "#D55E00",
+    "joint-ekf": "#E69F00",
+    "isam2": "#882255",
+    "isam2-online": "#CC79A7",
+    "fixed-lag": "#56B4E9",
+    "batch": "#009E73",
+    "landmark-mapping": "#B3A100",
+}
+"""by the name an estimator is registered under; the reference of a run is black instead, whatever its name"""
 
-WIDTH = 8.0
-"""inches: 1200 px in a PNG, readable at 800"""
-DPI = 150
-"""of a PNG"""
-LETTERS_IN_A_ROW = 92
-"""that a legend has room for, with six to spare for each mark"""
+SPARE = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
+"""for estimators of other packages, once the colors are used up that this run leaves"""
+ON_DARK: Mapping[str, str] = {
+    REFERENCE: "#FFFFFF",
+    TRUTH: "#A8A8A8",
+    "#0072B2": "#2E96D3",
+    "#882255": "#C2457F",
+    "#661100": "#B5533C",
+    "#332288": "#8273D9",
+}
+"""colors that dark ground would swallow: the same hue, lighter"""
 
-STYLE: Mapping[str, Any] = {
+LONGEST = 48
+"""characters of a name that a figure has room for"""
+GREEN, BAND, GRAY = "#6b9a72", "#d7e8d9", "#555555"
+"""expected values, the band around them, and marks of no estimator"""
+MARKS = "os^Dv<P*X>"
+"""of lines on paper, told apart without color"""
+MARKED = 8
+"""marks of a line on paper"""
+WHITE: Mapping[str, Any] = {"color": "white", "markeredgecolor": "black", "zorder": 5}
+"""marks of a start or an end"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Style:
+    """Settings and measures of one style; lengths are in inches."""
+
+    settings: Mapping[str, Any]
+    """matplotlib's rcParams"""
+    width: float
+    dpi: int
+    """of a PNG"""
+    room: float
+    """height of everything around the panels of a column"""
+    letters: int
+    """characters in a row of the legend"""
+    spare: int
+    """of these, how many the mark of each entry takes"""
+    truth: Mapping[str, Any]
+    """line of the true path"""
+    titled: bool
+    """whether figures have a title and remarks; a paper has captions for both"""
+
+
+SHARED: Mapping[str, Any] = {
     "font.family": ["DejaVu Sans"],
-    "font.size": 9.5,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.edgecolor": "#555555",
-    "axes.labelcolor": "#333333",
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.xmargin": 0.01,
     "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.7,
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "lines.linewidth": 1.4,
     "legend.frameon": False,
-    "legend.fontsize": 9.5,
-    "legend.handlelength": 1.6,
-    "figure.dpi": DPI,  # so that letters are measured once for layout and PNG
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
     "figure.constrained_layout.use": True,
-    "svg.fonttype": "path",
     "svg.hashsalt": "fgbaseline",
-    "path.simplify_threshold": 0.25,
-    "agg.path.chunksize": 0,
 }
+SCREEN = Style(
+    settings={
+        **SHARED,
+        "font.size": 9.5,
+        "axes.titlesize": 10,
+        "axes.titlelocation": "left",
+        "axes.labelsize": 9.5,
+        "axes.edgecolor": GRAY,
+        "axes.labelcolor": "#333333",
+        "grid.linewidth": 0.7,
+        "xtick.color": GRAY,
+        "ytick.color": GRAY,
+        "xtick.labelsize": 9,
+        "ytick.labelsize": 9,
+        "lines.linewidth": 1.4,
+        "legend.fontsize": 9.5,
+        "legend.handlelength": 1.6,
+        "figure.dpi": 150,  # so that letters are measured once for layout and PNG
+        "figure.facecolor": "white",
+        "savefig.facecolor": "white",
+        "svg.fonttype": "path",
+        "path.simplify_threshold": 0.25,
+        "agg.path.chunksize": 0,
+    },
+    width=8.0,  # 1200 px in a PNG, readable at 800
+    dpi=150,
+    room=1.2,
+    letters=92,
+    spare=6,
+    truth={"color": TRUTH, "linewidth": 1.8, "linestyle": (0, (4, 2)), "zorder": 2.2, "label": "truth"},
+    titled=True,
+)
+PAPER = Style(
+    settings={
+        **SHARED,
+        "font.size": 7,
+        "axes.labelsize": 7,
+        "axes.titlesize": 7,
+        "xtick.labelsize": 6.5,
+        "ytick.labelsize": 6.5,
+        "legend.fontsize": 6.5,
+        "legend.handlelength": 2.2,
+        "legend.columnspacing": 1.2,
+        "legend.borderpad": 0.1,
+        "axes.linewidth": 0.6,
+        "grid.linewidth": 0.5,
+        "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6,
+        "lines.linewidth": 0.9,
+        "pdf.fonttype": 42,
+        "svg.fonttype": "none",
+        "savefig.pad_inches": 0.02,
+    },
+    width=3.5,  # a column of IEEE's and of most others' two
+    dpi=300,
+    room=0.55,
+    letters=58,
+    spare=8,
+    truth={"color": TRUTH, "linewidth": 2.4, "alpha": 0.6, "zorder": 1.8, "label": "truth"},
+    titled=False,
+)
 
 
-def in_style() -> AbstractContextManager[None]:
-    """What figures are drawn and written under; whatever the user has set for figures of their own is left alone."""
-    return style.context(dict(STYLE), after_reset=True)
+def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
+    """Color of each of the names.
+
+    The reference is black, a known name has its own color, and the others take, in their order, those colors that
+    none of the names has.
+    """
+    every = list(names)
+    taken = {name: OWN[name] for name in every if name in OWN}
+    free = [color for color in OWN.values() if color not in taken.values()]
+    rest = chain(free, SPARE, cycle(SPARE))
+    chosen: dict[str, str] = {}
+    for name in every:
+        if name == reference:
+            chosen[name] = REFERENCE
+        else:
+            chosen[name] = taken[name] if name in taken else next(rest)
+    return chosen
 
 
-def sheet(height: float, rows: int = 1, **grid: Any) -> tuple[Figure, list[Axes]]:
-    """An empty figure with `rows` panels above one another that share the abscissa."""
-    figure = Figure(figsize=(WIDTH, height))
+def on_dark(color: str) -> str:
+    """Color in place of `color` where the ground is dark."""
+    return ON_DARK.get(color, color)
+
+
+def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
+    """Context in which figures are drawn and written; the user's own settings hold again after it."""
+    return rc_style.context(dict(style.settings), after_reset=True)
+
+
+def sheet(height: float, rows: int = 1, style: Style = SCREEN, **grid: Any) -> tuple[Figure, list[Axes]]:
+    """Empty figure with `rows` panels above one another that share the abscissa."""
+    figure = Figure(figsize=(style.width, height))
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False, **grid)
     return figure, list(axes[:, 0])
 
 
-def head(figure: Figure, title: str, handles: Iterable[Any] = ()) -> None:
-    """The finding, or the quantity, on top of a figure, and below it one legend: each label once, in rows."""
+def head(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
+    """Title on top of a figure (not on paper) and below it one legend: each label once, in rows."""
     by_label = {str(handle.get_label()): handle for handle in handles}
-    letters = sum(len(text) + 6 for text in by_label)
-    rows = -(-letters // LETTERS_IN_A_ROW)
+    figure.set_label(title)
+    if not style.titled and not by_label:
+        return
+    rows = -(-sum(len(text) + style.spare for text in by_label) // style.letters)
+    bold: dict[str, Any] = {"title": title, "title_fontproperties": {"weight": "bold", "size": 11.5}}
     legend = figure.legend(
         list(by_label.values()),
         list(by_label),
         loc="outside upper left",
         ncols=-(-len(by_label) // max(1, rows)) or 1,
-        borderpad=0.2,
-        alignment="left",
-        title=title,
-        title_fontproperties={"weight": "bold", "size": 11.5},
+        **({"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}),
     )
     legend.get_title().set_color("#222222")
-    figure.set_label(title)
 
 
-def line(run: Run, result: Result) -> dict[str, Any]:
-    """How the line of an estimator is drawn: the reference lies below the others, and shows beside them."""
-    is_reference = result.name == run.reference
+def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
+    """Look of an estimator's line on the screen: the reference lies below the others, and shows beside them."""
+    thick = name == reference
     return {
-        "color": colours(run)[result.name],
-        "linewidth": 2.6 if is_reference else 1.3,
-        "zorder": 2.0 if is_reference else 2.5,
-        "label": label(run, result.name),
+        "color": color,
+        "linewidth": 2.6 if thick else 1.3,
+        "zorder": 2.0 if thick else 2.5,
+        "label": label(name, reference),
     }
 
 
-TRUTH_LINE: Mapping[str, Any] = {
-    "color": TRUTH,
-    "linewidth": 1.8,
-    "linestyle": (0, (4, 2)),
-    "zorder": 2.2,
-    "label": "truth",
-}
+def marked_line(name: str, color: str, reference: str | None, others: Sequence[str], points: int) -> dict[str, Any]:
+    """Look of an estimator's line of so many points on paper: the reference thick and lowest, the `others` marked."""
+    look: dict[str, Any] = {"color": color, "label": label(name, reference)}
+    if name == reference:
+        return look | {"linewidth": 1.6, "zorder": 2.0}
+    number, apart = others.index(name), max(1, points // MARKED)
+    return look | {
+        "linewidth": 0.8,
+        "zorder": 2.5,
+        "marker": MARKS[number % len(MARKS)],
+        "markevery": (apart * number // len(others), apart),
+        "markersize": 3.0,
+        "markerfacecolor": "white",
+        "markeredgewidth": 0.7,
+    }
 
 
-def label(run: Run, name: str) -> str:
-    """The name of an estimator as a legend has it."""
-    return plain(name) + (" (reference)" if name == run.reference else "")
+def label(name: str, reference: str | None) -> str:
+    """Name of an estimator in a legend."""
+    return plain(name) + (" (reference)" if name == reference else "")
 
 
 def note(axes: Axes, text: str) -> None:
-    """A remark in the lower right corner of a panel."""
+    """Remark in the lower right corner of a panel."""
     axes.text(
         0.995,
         0.015,
@@ -127,6 +255,24 @@ def note(axes: Axes, text: str) -> None:
     )
 
 
-def swatch(colour: str, text: str) -> Line2D:
-    """A legend's entry for an area or a cloud of points."""
-    return Line2D([], [], color=colour, marker="s", linestyle="none", markersize=7, label=text)
+def swatch(color: str, text: str, size: float = 7.0) -> Line2D:
+    """Legend's entry for an area or a cloud of points."""
+    return Line2D([], [], color=color, marker="s", linestyle="none", markersize=size, label=text)
+
+
+def plain(text: str) -> str:
+    """`text` as it can stand in a figure: no mathematics, no line breaks, nothing the font cannot draw, not too long.
+
+    A dollar sign would begin mathematics and a leading underscore would hide a line from the legend.
+    """
+    known = _drawable()
+    letters = "".join(c if ord(c) in known and c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    if len(letters) > LONGEST:
+        letters = letters[: LONGEST - 1] + "…"
+    letters = letters.replace("$", r"\$")
+    return " " + letters if letters.startswith("_") else letters
+
+
+@cache
+def _drawable() -> frozenset[int]:
+    return frozenset(get_font(findfont(FontProperties(family=["DejaVu Sans"]))).get_charmap())

@@ -8,7 +8,7 @@ import numpy as np
 from fgbaseline.compare import chi_square_bounds, reprojection_by
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
-from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM, NEES_BOUNDS
+from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS
 from fgbaseline.reports.figures.view import TopView
 
 from .packing import floats

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures.palette import TRUTH, colours, on_dark
+from fgbaseline.reports.figures.style import TRUTH, colors, on_dark
 
 
 def keys(run: Run) -> dict[str, str]:
@@ -15,7 +15,7 @@ def keys(run: Run) -> dict[str, str]:
 
 def colour_rules(run: Run) -> Markup:
     """`.who-KEY` sets `--who`, for paper and bright ground, and for dark ground."""
-    of = {keys(run)[name]: colour for name, colour in colours(run).items()} | {"truth": TRUTH}
+    of = {keys(run)[name]: colour for name, colour in colors(run.results, run.reference).items()} | {"truth": TRUTH}
     dark = {key: on_dark(colour) for key, colour in of.items()}
     return Markup(f"{_rules(of)}\n@media screen and (prefers-color-scheme: dark) {{\n{_rules(dark)}\n}}")
 

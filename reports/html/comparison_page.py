@@ -6,7 +6,7 @@ from dataclasses import replace
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..figures.palette import colours_of
+from ..figures.style import colors
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables import Row
@@ -35,8 +35,8 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     """`report.html`. All text that comes from files is escaped."""
     reference, estimates = summary.reference, summary.estimates
     table = comparison_table(comparison, summary, mark_reference=True)
-    colors = colours_of([reference.name, *estimates], reference.name)
-    titles = {name: f"{name} (reference)" if name == reference.name else name for name in colors}
+    palette = colors([reference.name, *estimates], reference.name)
+    titles = {name: f"{name} (reference)" if name == reference.name else name for name in palette}
     notes = {f"What {name} has no figure for": estimate.notes for name, estimate in estimates.items()}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
     return (
@@ -51,7 +51,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                 caption=f"{table.caption} Best of a line in bold.",
                 rows=tuple(_with_intervals_below(row) for row in table.rows),
             ),
-            swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in colors.items()},
+            swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in palette.items()},
             pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
             trees={**notes, "Files": sources, "Settings": summary.settings, "Versions": summary.versions},
         )

@@ -8,7 +8,7 @@ import numpy as np
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
-from fgbaseline.reports.figures.reprojections import WRONG
+from fgbaseline.reports.figures.reprojection import WRONG
 
 FAR = 5.0
 """m, at most"""

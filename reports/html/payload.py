@@ -7,9 +7,9 @@ import numpy as np
 from fgbaseline.data import Estimate, Excluded, Problem
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.comparison import Result, Run
-from fgbaseline.reports.figures.reprojections import WRONG
+from fgbaseline.reports.figures.panels import moving_sum
+from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.figures.view import TopView
-from fgbaseline.reports.moving_sum import moving_sum
 
 from .accuracy_verdict import compared
 from .charts import charts

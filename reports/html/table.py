@@ -10,7 +10,7 @@ import numpy as np
 
 from fgbaseline.reports.common_frames import same_frames
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures import colours
+from fgbaseline.reports.figures import colors
 from fgbaseline.reports.results.tree import INFINITE
 
 from ..formatting import DASH, INFINITY, counted, number
@@ -160,7 +160,7 @@ def table_of(run: Run, estimators: Mapping[str, Mapping[str, Any]], chosen: Sequ
             reference=name == run.reference,
             cells=[cell(name, c) for c in columns] if name in answered else [],
         )
-        for name, colour in colours(run).items()
+        for name, colour in colors(run.results, run.reference).items()
     ]
     groups = [
         (f"divergence from {run.reference}" if group == REFERENCE else group, len(list(same)))

@@ -8,7 +8,7 @@ from fgbaseline.compare import Verdict, divergence_summary, reprojection_summary
 from fgbaseline.data import Status
 from fgbaseline.reports.common_frames import known
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures.health import DEGREES_OF_FREEDOM
+from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM
 
 from ..formatting import counted, listed, number, per_cent
 from .accuracy_verdict import by_products, compared, nearest_sentences, truth_sentences

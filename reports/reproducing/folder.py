@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..figures import save
+from ..figures.reproduction import draw
 from .claim import Claim
-from .drawing import draw
 from .page import render
 from .study import Study
 from .trial import Outcome

@@ -8,10 +8,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from fgbaseline.reports.comparing import figures as comparing
-from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures import drawing, layout, saving, sharing
-from fgbaseline.reports.figures.drawing import drawings
+from fgbaseline.reports.figures import comparison, layout, run, saving
+from fgbaseline.reports.figures.run import drawings
+from fgbaseline.reports.figures.run_data import RunData
 
 
 def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
@@ -28,13 +27,13 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
         else:
             written(figure, target, **options)  # type: ignore[arg-type]
 
-    def blank(run: Run) -> dict[str, Callable[[], Figure]]:
-        return dict.fromkeys(drawings(run), Figure)
+    def blank(data: RunData) -> dict[str, Callable[[], Figure]]:
+        return dict.fromkeys(drawings(data), Figure)
 
     patch.setattr(Figure, "savefig", savefig)
-    patch.setattr(saving, "_png", lambda _: empty["png"])
+    patch.setattr(saving, "_png", lambda *_: empty["png"])
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
-    patch.setattr(sharing, "drawings", blank)
-    for module in (sharing, drawing, comparing):
+    patch.setattr(run, "drawings", blank)
+    for module in (run, comparison):
         patch.setattr(module, "lay_out", lambda _: None)

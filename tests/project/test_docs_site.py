@@ -23,7 +23,7 @@ API = {
     "ekf": ("ekf",),
     "smoother": ("smoother",),
     "compare": ("compare",),
-    "reports": ("reports.comparing", "reports.checking", "reports.paper"),
+    "reports": ("reports.comparing", "reports.checking", "reports.figures"),
 }
 """page -> the packages on it"""
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")

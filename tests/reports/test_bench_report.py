@@ -17,7 +17,6 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.reports.bench import tables
 from fgbaseline.reports.bench.channels import FileChannel, Tiding
 from fgbaseline.reports.bench.crews import Processes
-from fgbaseline.reports.bench.figures import draw
 from fgbaseline.reports.bench.grid import main_grid
 from fgbaseline.reports.bench.job import Planned
 from fgbaseline.reports.bench.page import render
@@ -30,6 +29,7 @@ from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.text import latex, markdown
 from fgbaseline.reports.bench.wording import sentences
 from fgbaseline.reports.bench.work import Outcome, work
+from fgbaseline.reports.figures.bench import draw
 
 from ..builders.benches import written
 from ..builders.commands import fgbaseline
@@ -181,7 +181,7 @@ class Page(HTMLParser):
 
 
 def test_the_page_is_whole_escaped_and_leads_to_every_run(results: Results) -> None:
-    figures = draw(results)
+    figures = draw(results, tables.judge(results), tables.cases(results), tables.costs(results))
     assert set(figures) == {"accuracy", "accuracy_against_time", "scaling", "nees_1", "nees_2"}
     page = Page(render("x & y", results, figures))
     assert "script" not in page.tags

@@ -12,9 +12,9 @@ from fgbaseline.data import Problem, read_problem
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.figures.reprojections import WRONG
+from fgbaseline.reports.figures.panels import moving_sum
+from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.html.departure import worst_second
-from fgbaseline.reports.moving_sum import moving_sum
 
 from ..builders.commands import fgbaseline
 from ..builders.mutated_files import good_recording, good_trajectory

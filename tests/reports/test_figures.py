@@ -16,11 +16,10 @@ from PIL import Image
 from fgbaseline.data import Observations
 from fgbaseline.reports import figures
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures.drawing import drawings
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.lettering import plain
-from fgbaseline.reports.figures.palette import OWN
-from fgbaseline.reports.figures.style import DPI, in_style
+from fgbaseline.reports.figures.run import drawings
+from fgbaseline.reports.figures.run_data import of_run
+from fgbaseline.reports.figures.style import OWN, SCREEN, in_style, plain
 from fgbaseline.reports.figures.view import TopView
 
 from ..builders.reported import answer, failed, partly_known, run_of, scene, standard_run
@@ -35,8 +34,9 @@ def drawn_standard() -> dict[str, Figure]:
 
 def drawn(run: Run, *names: str) -> dict[str, Figure]:
     """Some of the figures of a run, as `figures.draw` draws them."""
+    draw_one = drawings(of_run(run))
     with in_style():
-        some = {name: figure for name in names if (figure := drawings(run)[name]()) is not None}
+        some = {name: figure for name in names if (figure := draw_one[name]()) is not None}
         for figure in some.values():
             lay_out(figure)
     return some
@@ -124,8 +124,8 @@ def test_the_distribution_ends_where_the_table_says_under_3_px() -> None:
 
 def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black() -> None:
     run = standard_run()
-    colours = figures.colours(run)
-    assert colours == {"dead-reckoning": OWN["dead-reckoning"], "ekf": OWN["ekf"], "isam2": "#000000"}
+    colors = figures.colors(run.results, run.reference)
+    assert colors == {"dead-reckoning": OWN["dead-reckoning"], "ekf": OWN["ekf"], "isam2": "#000000"}
     for name, figure in drawn_standard().items():
         drawn = {
             to_hex(line.get_color())
@@ -140,9 +140,9 @@ def test_a_known_name_keeps_its_colour_whoever_else_runs_and_strangers_take_what
     problem = plain_problem(scene())
     strangers = [answer(problem, f"mine-{i}") for i in range(9)]
     run = run_of(problem, *strangers, answer(problem, "ekf"), answer(problem, "isam2"))
-    colours = figures.colours(run)
-    assert colours["ekf"] == OWN["ekf"]
-    assert len(set(colours.values())) == len(colours)
+    colors = figures.colors(run.results, run.reference)
+    assert colors["ekf"] == OWN["ekf"]
+    assert len(set(colors.values())) == len(colors)
 
 
 def test_saved_bytes_are_those_of_the_run(tmp_path: Path) -> None:
@@ -280,10 +280,10 @@ def test_labels_of_a_column_of_panels_stand_in_one_line() -> None:
 
 @pytest.mark.parametrize("height", [2.0, np.nextafter(10.32, 0.0), 7.7799])  # the second is a tick below 1548 rows
 def test_a_png_has_the_pixels_of_the_canvas_at_any_height(height: float) -> None:
-    figure = Figure(figsize=(4.0, height), dpi=DPI)
+    figure = Figure(figsize=(4.0, height), dpi=SCREEN.dpi)
     figure.subplots().plot([0.0, 1.0], [0.0, height])
     raw = BytesIO()
-    figure.savefig(raw, format="rgba", dpi=DPI)
+    figure.savefig(raw, format="rgba", dpi=SCREEN.dpi)
     pixels = np.asarray(Image.open(BytesIO(figures.encoded(figure, "png"))))
     canvas = np.frombuffer(raw.getvalue(), np.uint8).reshape(-1, pixels.shape[1], 4)
     np.testing.assert_array_equal(pixels, canvas[:, :, :3])

@@ -9,9 +9,9 @@ import pytest
 
 from fgbaseline.data import Status
 from fgbaseline.geometry import InputError
-from fgbaseline.reports import figures, paper
+from fgbaseline.reports import figures
 from fgbaseline.reports.cli import main
-from fgbaseline.reports.paper.style import COLUMN
+from fgbaseline.reports.figures.style import PAPER
 from fgbaseline.reports.run_folder import write_run
 
 from ..builders.reported import answer, failed, run_of, scene, standard_run
@@ -50,7 +50,7 @@ def test_every_figure_is_there_in_every_format_with_a_caption(folder: Path, caps
     }
     width = re.search(r'width="([\d.]+)pt"', (out / "divergence.svg").read_text())
     assert width is not None
-    assert float(width[1]) == pytest.approx(72 * COLUMN)
+    assert float(width[1]) == pytest.approx(72 * PAPER.width)
 
 
 def test_the_same_folder_gives_the_same_bytes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,7 +61,7 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, capsys: pytest.Captu
 
 
 def test_what_is_read_is_what_the_run_had(folder: Path) -> None:
-    run, read = standard_run(), paper.read_drawn(folder)
+    run, read = standard_run(), figures.of_folder(folder)
     for name, result in run.results.items():
         there = result.estimate.world_T_imu[:, :3, 3]
         np.testing.assert_allclose(np.linalg.norm(read.paths[name], axis=1), np.linalg.norm(there, axis=1), atol=1e-9)
@@ -92,10 +92,10 @@ def test_what_a_run_lacks_is_not_drawn(tmp_path: Path, monkeypatch: pytest.Monke
         ),
         tmp_path,
     )
-    read = paper.read_drawn(tmp_path)
+    read = figures.of_folder(tmp_path)
     assert read.names == ("dead-reckoning",)
     assert read.truth is None
-    assert set(paper.draw(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
+    assert set(figures.draw_printed(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
 
 
 def test_bad_input_is_told_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,4 +113,4 @@ def test_bad_input_is_told_in_one_sentence(folder: Path, tmp_path: Path, capsys:
     del summary["sequence"]["ahead"]
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     with pytest.raises(InputError, match="earlier version"):
-        paper.read_drawn(tmp_path)
+        figures.of_folder(tmp_path)

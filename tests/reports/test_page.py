@@ -15,7 +15,7 @@ import pytest
 from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures, html
 from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.figures.palette import OWN, REFERENCE, SPARE, TRUTH, on_dark
+from fgbaseline.reports.figures.style import OWN, REFERENCE, SPARE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.table import COLUMNS, main_table
 

@@ -18,6 +18,7 @@ from fgbaseline.data import Excluded, Landmarks
 from fgbaseline.reports import html
 from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.paths import paths_overlaid
+from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style
 
 from ..builders.reported import answer, as_dict, failed, run_of, scene
@@ -54,7 +55,7 @@ def run() -> Run:
 def address(run: Run, tmp_path_factory: pytest.TempPathFactory) -> str:
     file = tmp_path_factory.mktemp("page") / "report.html"
     with in_style():
-        drawn = {"paths_overlaid": paths_overlaid(run)}
+        drawn = {"paths_overlaid": paths_overlaid(of_run(run))}
     file.write_text(html.render(run, as_dict(run), drawn), encoding="utf-8")
     return file.as_uri()
 

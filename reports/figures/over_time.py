@@ -1,0 +1,211 @@
+"""Figures over time: divergence from the reference, error to the truth, height, and the time that frames took."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fgbaseline.geometry import FloatArray
+
+from .panels import Line, few_ticks, fit_log, fit_log_or_linear, fit_signed, note_leaving, plot_series
+from .run_data import RunData
+from .style import SCREEN, Style, head, plain, sheet
+from .view import common_window, span
+
+COMPONENTS = {
+    "position": "distance, m",
+    "rotation_deg": "rotation, °",
+    "along": "along, m",
+    "across": "to the left, m",
+    "up": "up, m",
+}
+"""columns of `compare.pose_errors`, as the panels have them"""
+SIGNED = ("along", "across", "up")
+LEVEL = 0.1
+"""height over extent, up to which any path is shown"""
+TITLE_ROOM = 58
+"""letters that a title has for numbers"""
+
+
+Expected = Callable[[RunData, Axes], list[Any]]
+"""draws the values of a consistent estimator into a panel; gives their entries in the legend"""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Quantity of a run's series over time."""
+
+    label: str
+    column: str
+    height: float
+    """inches"""
+    decades: float | None = None
+    """of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
+    expected: Expected | None = None
+
+
+def over_time(
+    run: RunData, wanted: Sequence[Panel], title: str, style: Style, *, without: str | None = None, **look: Any
+) -> Figure | None:
+    """Panels that have something to show above one another, `look` being that of the lines; None where none has."""
+    known = [(panel, run.column(panel.column, without)) for panel in wanted]
+    if not style.titled:  # a line of zeros, such as the time of an estimator without one, cannot be described in print
+        known = [(panel, {name: v for name, v in series.items() if np.nansum(np.abs(v))}) for panel, series in known]
+    shown = [(panel, series) for panel, series in known if series]
+    if not shown:
+        return None
+    heights = [panel.height for panel, _ in shown]
+    figure, axes = sheet(style.room + sum(heights), len(shown), style, height_ratios=heights)
+    handles: list[Any] = []
+    for on, (panel, series) in zip(axes, shown, strict=True):
+        handles += plot_series(on, run.t, series, run.line(style), **look)
+        if panel.decades is None:
+            fit_log_or_linear(on, series)
+        else:
+            fit_log(on, series, panel.decades)
+        if panel.expected is not None:
+            handles += panel.expected(run, on)
+        if not style.titled and on.get_yscale() == "log":
+            few_ticks(on)
+        on.set_ylabel(panel.label)
+    time_axis(run, axes, style)
+    head(figure, title, handles, style)
+    return figure
+
+
+def time_axis(run: RunData, axes: Sequence[Axes], style: Style = SCREEN) -> None:
+    """Labels the lowest panel and, on the screen, fits all to the recording."""
+    if style.titled:
+        axes[-1].set_xlim(0.0, float(run.t[-1]))
+    axes[-1].set_xlabel("time, s")
+
+
+def divergence(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Distance, angle and (on the screen) the components of the difference from the reference; None without any."""
+    if not style.titled:
+        panels = [
+            Panel("distance, m", "divergence_position", 0.95),
+            Panel("angle, °", "divergence_rotation_deg", 0.95),
+        ]
+        return over_time(run, panels, "", style, without=run.reference)
+    names = [name for name in run.names if name != run.reference and "divergence_position" in run.series[name]]
+    if not names or run.reference is None:
+        return None
+    doubt = "" if run.trust == "trusted" else f" ({run.trust})"
+    rivals = [name for name in names if name not in run.by_products] or names
+    return _errors(run, "divergence", names, f"Divergence from {plain(run.reference)}{doubt}", rivals)
+
+
+def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Distance, angle and (on the screen) the components of the difference from the unaligned truth; None without."""
+    if not style.titled:
+        panels = [Panel("error, m", "truth_position", 0.95), Panel("error, °", "truth_rotation_deg", 0.95)]
+        return over_time(run, panels, "", style)
+    names = [name for name in run.names if "truth_position" in run.series[name]]
+    return _errors(run, "truth", names, "Error, unaligned", names) if names else None
+
+
+def component_panels(
+    tables: Mapping[str, pd.DataFrame], t: Mapping[str, FloatArray], line: Line
+) -> tuple[Figure, list[Axes], list[Any]]:
+    """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles."""
+    figure, axes = sheet(8.6, len(COMPONENTS), height_ratios=[1.7, 1.0, 1.0, 1.0, 1.0])
+    handles: list[Any] = []
+    for panel, (column, text) in zip(axes, COMPONENTS.items(), strict=True):
+        series = columns(tables, column)
+        for name, values in series.items():
+            handles += panel.plot(t[name], values, **line(name))
+        panel.set_ylabel(text)
+        if column in SIGNED:
+            panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
+        else:
+            fit_log_or_linear(panel, series)
+    return figure, axes, handles
+
+
+def columns(tables: Mapping[str, pd.DataFrame], column: str) -> dict[str, FloatArray]:
+    """(n,) values of a column of each table."""
+    return {name: table[column].to_numpy(dtype=np.float64) for name, table in tables.items()}
+
+
+def height(run: RunData) -> Figure:
+    """Height above the start over time."""
+    heights = {name: path[:, 2] for name, path in run.paths.items()}
+    true = None if run.truth is None else run.truth[:, 2]
+    figure, axes = sheet(3.4)
+    handles = axes[0].plot(run.t, true, **SCREEN.truth) if true is not None else []
+    handles += plot_series(axes[0], run.t, heights, run.line())
+    least = LEVEL * common_window(run.paths.values(), run.truth).side
+    box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
+    box = box.grown(0.06 * box.side + 0.05)
+    axes[0].set_ylim(float(box.low[0]), float(box.high[0]))
+    axes[0].set_ylabel("height, m")
+    note_leaving(axes[0], run.t, heights, float(box.low[0]), float(box.high[0]))
+    time_axis(run, axes)
+    head(figure, "Height above the start", handles)
+    return figure
+
+
+def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Time that each frame took, on the screen beside the interval between frames; None where none is known."""
+    if not style.titled:
+        return over_time(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0)], "", style)
+    times = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
+    if not times:
+        return None
+    figure, axes = sheet(3.4)
+    handles: list[Any] = []
+    for names in _shared(times):
+        together = " and ".join(map(plain, names))
+        handles += plot_series(axes[0], run.t, {names[0]: times[names[0]]}, run.line(), linewidth=0.9, label=together)
+    interval = 1e3 * float(np.median(np.diff(run.t)))
+    fit_log(axes[0], {**times, "": np.array([interval])})
+    real_time = axes[0].axhline(
+        interval, color="#888888", linewidth=1.0, linestyle=":", label=f"interval between frames ({interval:.3g} ms)"
+    )
+    axes[0].set_ylabel("time, ms")
+    time_axis(run, axes)
+    head(figure, "Time per frame", [*handles, real_time])
+    return figure
+
+
+def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals: Sequence[str]) -> Figure:
+    """Panels of the components, with notes of what leaves them; the title has the maxima of the rivals."""
+    tables = {n: run.series[n].filter(like=f"{prefix}_").rename(columns=lambda c: c[len(prefix) + 1 :]) for n in names}
+    t = dict.fromkeys(names, run.t)
+    figure, axes, handles = component_panels(tables, t, run.line())
+    travelled = max((float(np.nanmax(v)) for v in columns(tables, "travelled").values()), default=0.0)
+    reach = span(
+        [table[list(SIGNED)].to_numpy(dtype=np.float64).ravel() for table in tables.values()], 0.05 * travelled
+    )
+    for panel, column in zip(axes, COMPONENTS, strict=True):
+        if column in SIGNED:
+            fit_signed(panel, run.t, columns(tables, column), reach)
+    time_axis(run, axes)
+    head(figure, title + _farthest({name: tables[name] for name in rivals}), handles)
+    return figure
+
+
+def _farthest(tables: Mapping[str, pd.DataFrame]) -> str:
+    """Largest distance of each, nearest first; only the farthest where there is no room for all."""
+    farthest = {name: float(t["position"].max()) for name, t in tables.items() if t["position"].notna().any()}
+    if not farthest:
+        return ""
+    each = [f"{plain(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
+    return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else each[-1])
+
+
+def _shared(times: Mapping[str, FloatArray]) -> list[list[str]]:
+    """Names that share their times, because one run gave both answers."""
+    shared: list[list[str]] = []
+    for name, ms in times.items():
+        same = next((names for names in shared if np.array_equal(times[names[0]], ms)), None)
+        if same is None:
+            shared.append([name])
+        else:
+            same.append(name)
+    return shared

@@ -1,0 +1,135 @@
+"""Building blocks of panels: series over time with their axes, chi-square bands, intervals, medians by depth."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import ArrayLike
+
+from fgbaseline.compare import chi_square_bounds
+from fgbaseline.geometry import FloatArray
+
+from .style import BAND, GREEN, note, plain
+
+DECADES = 1.5
+"""between what the estimators reach, from which on an axis is logarithmic"""
+DEGREES_OF_FREEDOM = 6
+"""of a pose"""
+NEES_BOUNDS = tuple(float(limit) for limit in chi_square_bounds(float(DEGREES_OF_FREEDOM)))
+"""95 % chi-square bounds of the NEES of a pose"""
+CONSISTENT = "95 % chi-square band of a consistent estimator"
+
+Line = Callable[[str], Mapping[str, Any]]
+"""look of the line of an estimator"""
+
+
+def plot_series(axes: Axes, t: ArrayLike, series: Mapping[str, FloatArray], line: Line, **look: Any) -> list[Any]:
+    """Draws series (T,) over t (T,), each with its line, of which `look` replaces parts; gives the legend's handles."""
+    return [handle for name, values in series.items() for handle in axes.plot(t, values, **{**line(name), **look})]
+
+
+def fit_log_or_linear(axes: Axes, series: Mapping[str, FloatArray]) -> None:
+    """Logarithmic ordinate for positive values where the series differ by decades, else a linear one from zero."""
+    reach = {name: v[np.isfinite(v) & (v > 0)] for name, v in series.items()}
+    tops = [float(np.percentile(v, 95)) for v in reach.values() if len(v)]
+    if not tops:
+        return
+    if np.log10(max(tops) / min(tops)) > DECADES:
+        fit_log(axes, series, decades=4.0)
+    else:
+        axes.set_ylim(bottom=0.0)
+
+
+def fit_log(axes: Axes, series: Mapping[str, FloatArray], decades: float = 6.0) -> None:
+    """Logarithmic ordinate over the bulk of the positive values, of so many decades at most."""
+    positive = np.concatenate([v[np.isfinite(v) & (v > 0)] for v in series.values()] or [np.empty(0)])
+    if len(positive) == 0:
+        return
+    low, high, highest = np.percentile(positive, [2.0, 99.0, 100.0])
+    top = min(float(highest), 3.0 * float(high)) * 1.3
+    axes.set_yscale("log")
+    axes.set_ylim(max(float(low) / 1.5, top * 10.0**-decades), top)
+
+
+def log_where_positive(axes: Axes) -> None:
+    """Logarithmic ordinate, unless no line of the panel has anything positive to show on it."""
+    values = [np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.get_lines()]
+    if any((v[np.isfinite(v)] > 0.0).any() for v in values):
+        axes.set_yscale("log")
+
+
+def few_ticks(axes: Axes) -> None:
+    """Limits the ticks of a low logarithmic panel: plain numbers at 1, 2, 5 where there are less than two decades."""
+    low, high = axes.get_ylim()
+    if high < 100.0 * low:
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30.0 * low else (1.0, 3.0), numticks=6))
+        axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def fit_signed(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], reach: float) -> None:
+    """Linear ordinate out to `reach` on either side, with a note of which series (T,) leave it and when."""
+    values = np.concatenate([v[np.isfinite(v)] for v in series.values()] or [np.empty(0)])
+    low, high = (float(values.min()), float(values.max())) if len(values) else (-reach, reach)
+    low, high = max(low, -reach), min(high, reach)
+    margin = max(0.06 * (high - low), 1e-9)
+    axes.set_ylim(low - margin, high + margin)
+    note_leaving(axes, t, series, -reach, reach)
+
+
+def note_leaving(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], low: float, high: float) -> None:
+    """Note of which series (T,), m, go beyond the panel, from when on and how far."""
+    leaving = []
+    for name, values in series.items():
+        beyond = np.flatnonzero((values < low) | (values > high))
+        if len(beyond):
+            farthest = values[beyond[np.argmax(np.abs(values[beyond]))]]
+            text = f"to {farthest:.3g}".replace("-", "\N{MINUS SIGN}")
+            leaving.append(f"{plain(name)} leaves the panel at {t[beyond[0]]:.1f} s, {text} m")
+    if leaving:
+        note(axes, "; ".join(leaving))
+
+
+def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
+    """Expected value and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
+    low, high = (float(limit) / per for limit in chi_square_bounds(degrees))
+    axes.axhline(degrees / per, color=GREEN, linewidth=width, zorder=1.5)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
+    return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)
+
+
+def intervals(
+    axes: Axes,
+    rows: Iterable[tuple[float, float, float, float, str]],
+    size: float,
+    width: float,
+    cap: Literal["butt", "projecting"] = "butt",
+) -> None:
+    """Draws a dot and a horizontal interval for each row: ordinate, low end (NaN: none), value, high end, color."""
+    for y, low, value, high, color in rows:
+        if np.isfinite(low):
+            axes.plot([low, high], [y, y], color=color, linewidth=width, solid_capstyle=cap)
+        axes.plot([value], [y], marker="o", markersize=size, color=color)
+    axes.grid(axis="y", visible=False)
+
+
+def short(text: str) -> str:
+    """Name of a class as a tick has room for it: `5 to 10 m` is 5–10 m."""
+    return text.replace(" and more", "+").replace(" to ", "–")
+
+
+def moving_sum(values: ArrayLike, width: float) -> FloatArray:
+    """(n,) sums of values (n,) over the `width` entries around each, as many of them as there are.
+
+    The window is rounded to whole entries, at least one; an even one reaches one entry further back than ahead. The
+    time it takes does not depend on the width.
+    """
+    known = np.asarray(values, dtype=np.float64)
+    n = len(known)
+    size = max(1, round(min(width, 2.0 * n)))
+    last = np.arange(n) + (size - 1) // 2
+    total = np.concatenate([[0.0], np.cumsum(known)])
+    return np.asarray(total[np.minimum(last + 1, n)] - total[np.maximum(last + 1 - size, 0)])

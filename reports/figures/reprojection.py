@@ -1,0 +1,182 @@
+"""Reprojection errors: over time with the matches they rest on, as a distribution, by classes, and by track."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fgbaseline.compare import evaluated_rows, track_chi_square
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.geometry import FloatArray
+
+from .over_time import Panel, over_time, time_axis
+from .panels import Line, fit_log, log_where_positive, plot_series, short
+from .run_data import Observed, RunData
+from .style import GRAY, GREEN, SCREEN, Style, head, sheet, swatch
+
+NEAR = 3.0
+"""px: what the tables count as explained"""
+WRONG = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
+"""reasons that say a match is wrong, its point not static, or the velocities wrong that carry the track along"""
+COARSE = (Excluded.DISPARITY, Excluded.SHORT)
+"""reasons that say a match determines little"""
+BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
+GRID = np.geomspace(0.05, 2000.0, 300)
+"""px, where the distribution is drawn"""
+DASHED: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
+CLASSES = {"distance": "by distance", "track age": "by age of the track, sights", "region": "by place in the image"}
+
+
+def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median error of each frame, on the screen over its numbers of used and excluded matches; None without any."""
+    if not style.titled:
+        return over_time(run, [Panel("median error, px", "reprojection_median", 1.2, decades=5.0)], "", style)
+    if run.observed is None or len(run.observed.problem.sequence.observations) == 0:
+        return None
+    figure, (upper, lower) = sheet(5.6, 2, height_ratios=[2, 1])
+    medians = run.column("reprojection_median")
+    handles = plot_series(upper, run.t, medians, run.line(), linewidth=1.0)
+    fit_log(upper, medians)
+    _mark_near(upper, vertical=False)
+    upper.set_ylabel("median error, px")
+    counts = matches_by_frame(run.observed.problem)
+    colors = [BANDS[name] for name in counts]
+    lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
+    lower.set_ylabel("matches per frame")
+    lower.set_ylim(bottom=0)
+    time_axis(run, [upper, lower])
+    bands = [swatch(BANDS[name], name) for name in counts if counts[name].any()]
+    head(figure, "Reprojection error by frame, and the matches it rests on", [*handles, *bands])
+    return figure
+
+
+def reprojection_distribution(run: RunData) -> Figure | None:
+    """Share of observations that each estimator explains to within so many pixels; None without any."""
+    tables = {} if run.observed is None else {n: t for n, t in run.observed.reprojection.items() if len(t)}
+    if not tables:
+        return None
+    used = {name: table.loc[table["used"], "error"] for name, table in tables.items()}
+    figure = distribution(
+        {name: table["error"] for name, table in tables.items()},
+        {name: errors for name, errors in used.items() if len(errors)},
+        run.line(),
+        ("of its landmarks", "those it used"),
+    )
+    _mark_near(figure.axes[0], vertical=True)
+    return figure
+
+
+def distribution(
+    errors: Mapping[str, "pd.Series[float]"],
+    dashed: Mapping[str, "pd.Series[float]"],
+    line: Line,
+    labels: Iterable[str],
+) -> Figure:
+    """Shares of `errors` and, in dashed lines, of others of the same names, by their limit; `labels` are of both."""
+    figure, (axes,) = sheet(4.2)
+    handles: list[Any] = []
+    for name, known in errors.items():
+        handles += axes.plot(GRID, 100.0 * share_within(known, GRID), **line(name))
+        if name in dashed:
+            axes.plot(GRID, 100.0 * share_within(dashed[name], GRID), **{**line(name), **DASHED, "label": None})
+    axes.set_xscale("log")
+    last = max(float(np.nanpercentile(known, 99)) for known in errors.values())
+    axes.set_xlim(GRID[0], float(np.clip(last, 30.0, GRID[-1])))
+    axes.set_ylim(0.0, 101.0)
+    axes.set_xlabel("reprojection error, px (norm of the four differences)")
+    axes.set_ylabel("share of observations, %")
+    for label, look in zip(labels, ({}, DASHED), strict=False):
+        handles += axes.plot([], [], color=GRAY, label=label, **look)
+    head(figure, "Share of the observations explained to within so many pixels", handles)
+    return figure
+
+
+def reprojection_classes(run: RunData) -> Figure | None:
+    """Median error of each class, and the probabilities of tracks, uniform where the noise is as assumed."""
+    if run.observed is None or not run.observed.classes:
+        return None
+    figure = Figure(figsize=(SCREEN.width, 5.8))
+    panels = figure.subplots(2, 2).ravel()
+    handles: list[Any] = []
+    for panel, (by, title) in zip(panels, CLASSES.items(), strict=False):
+        handles += _medians(panel, run.observed.classes, by, run.line())
+        panel.set_title(title)
+        log_where_positive(panel)
+        panel.set_ylabel("median error, px")
+    handles += _probabilities(panels[3], run.observed, run.line())
+    head(figure, "Reprojection errors in classes, and tracks against chi-square", handles)
+    return figure
+
+
+def medians_by_class(
+    panel: Axes,
+    tables: Mapping[str, "pd.Series[float]"],
+    line: Line,
+    style: Style = SCREEN,
+    label: Callable[[str], str] = short,
+) -> list[Any]:
+    """Draws medians of classes that index each series; classes are in the order of the longest one."""
+    names: dict[str, None] = {}
+    for table in sorted(tables.values(), key=len, reverse=True):
+        names |= dict.fromkeys(map(str, table.index))
+    place = {name: i for i, name in enumerate(names)}
+    look: dict[str, Any] = {"marker": "o", "markersize": 3.5} if style.titled else {}
+    handles: list[Any] = []
+    for name, table in tables.items():
+        at = np.array([place[str(of)] for of in table.index])
+        order = np.argsort(at)
+        handles += panel.plot(at[order], table.to_numpy()[order], **{**line(name), **look})
+    turned: dict[str, Any] = {"rotation": 30, "ha": "right", "fontsize": 8} if style.titled else {}
+    panel.set_xticks(range(len(names)), [label(name) for name in names], **turned)
+    return handles
+
+
+def matches_by_frame(problem: Problem) -> dict[str, FloatArray]:
+    """(T,) numbers of matches of each frame in the problem, too coarse, and contradicting, by the names of BANDS."""
+    frame, excluded = problem.sequence.observations.frame, problem.excluded
+    reasons = [(Excluded.NO,), COARSE, WRONG]
+    return {
+        name: np.bincount(frame[np.isin(excluded, reason)], minlength=problem.n_frames).astype(np.float64)
+        for name, reason in zip(BANDS, reasons, strict=True)
+    }
+
+
+def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
+    """(m,) share of all errors (n,), unknown ones included, that is at most each of the limits (m,)."""
+    known = np.sort(errors.dropna().to_numpy(dtype=np.float64))
+    return np.searchsorted(known, limits, side="right") / max(1, len(errors))
+
+
+def _medians(panel: Axes, classes: Mapping[str, pd.DataFrame], by: str, line: Line) -> list[Any]:
+    tables = {name: table.loc[table["by"] == by].set_index("of")["median"] for name, table in classes.items()}
+    return medians_by_class(panel, tables, line, label=str if by == "region" else short)
+
+
+def _probabilities(panel: Axes, observed: Observed, line: Line) -> list[Any]:
+    """Share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
+    for name in observed.classes:
+        tracks = track_chi_square(observed.problem, evaluated_rows(observed.problem, observed.reprojection[name]))
+        p = np.sort(tracks["probability"].dropna().to_numpy())
+        share = np.arange(1, len(p) + 1) / max(1, len(p))
+        panel.plot(p, 100.0 * share, **{**line(name), "label": None})
+    diagonal = panel.plot([0, 1], [0, 100], color=GREEN, linewidth=1.0, linestyle=":", label="noise as assumed")
+    panel.set_xlim(0.0, 1.0)
+    panel.set_ylim(0.0, 100.0)
+    panel.set_xlabel("probability of a track's residuals, or larger")
+    panel.set_ylabel("share of tracks, %")
+    panel.set_title("by chi-square of each track")
+    return list(diagonal)
+
+
+def _mark_near(axes: Axes, *, vertical: bool) -> None:
+    style: dict[str, Any] = {"color": "#888888", "linewidth": 0.9, "linestyle": ":", "zorder": 1.8}
+    letters: dict[str, Any] = {"fontsize": 8.5, "color": GRAY}
+    if vertical:
+        axes.axvline(NEAR, **style)
+        axes.text(NEAR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="bottom", **letters)
+    else:
+        axes.axhline(NEAR, **style)
+        axes.text(1.003, NEAR, "3 px", transform=axes.get_yaxis_transform(), ha="left", va="center", **letters)

@@ -1,0 +1,153 @@
+"""All figures of a run, in the order in which the page shows them, and those of its folder for a paper."""
+
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from fgbaseline.data.parallel import shared
+
+from .accuracy import held_out, map_difference
+from .consistency import consistency, nees, three_sigma
+from .layout import lay_out
+from .over_time import divergence, error_to_truth, height, time_per_frame
+from .paths import mapped, path_with_landmarks, paths_overlaid, paths_side_by_side
+from .reprojection import reprojection_classes, reprojection_distribution, reprojection_over_time
+from .run_data import RunData, of_run
+from .saving import Written, written
+from .style import PAPER, in_style
+
+if TYPE_CHECKING:
+    from fgbaseline.reports.comparison import Run
+
+FORMS = ("png", "svg")
+OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
+    divergence,
+    error_to_truth,
+    height,
+    reprojection_over_time,
+    reprojection_distribution,
+    nees,
+    time_per_frame,
+    held_out,
+    consistency,
+    reprojection_classes,
+    map_difference,
+)
+"""each answers None where the run has nothing for it to show"""
+PRINTED: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
+    "paths": (partial(paths_overlaid, style=PAPER), "Paths on {sequence} from above."),
+    "landmarks": (
+        lambda run: path_with_landmarks(run, mapped(run), PAPER),
+        "Path and landmarks of {mapped} on {sequence} from above.",
+    ),
+    "divergence": (
+        partial(divergence, style=PAPER),
+        "Distance and angle from the reference, {reference} ({trust}), on {sequence}, without alignment.",
+    ),
+    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to the truth on {sequence}, without alignment."),
+    "reprojection": (
+        partial(reprojection_over_time, style=PAPER),
+        "Median reprojection error of each frame of {sequence} (norm of the four pixel differences).",
+    ),
+    "consistency": (
+        partial(consistency, style=PAPER),
+        "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
+        "sigmas are those of the position over those of {reference}.",
+    ),
+    "held_out": (
+        partial(held_out, style=PAPER),
+        "Median error on tracks of {sequence} that no estimator saw, with 95 % intervals.",
+    ),
+    "map_difference": (
+        partial(map_difference, style=PAPER),
+        "Median distance of landmarks from those of {reference}, as the cameras see them, by depth.",
+    ),
+    "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}."),
+}
+"""name -> figure, which may be None, and caption"""
+
+
+def draw(run: "Run") -> dict[str, Figure]:
+    """Figures of a run by name, as `DIR/figures` and the page have them; none where no estimator answered.
+
+    `paths_overlaid`, `paths_side_by_side`, `path_NAME` for each estimator that answered, then those over time that
+    have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations. Last the
+    `three_sigma_NAME` of each that has covariances, where there is truth.
+    """
+    with in_style():
+        drawn = {name: draw_one() for name, draw_one in drawings(of_run(run)).items()}
+        figures = {name: figure for name, figure in drawn.items() if figure is not None}
+        for figure in figures.values():
+            lay_out(figure)
+    return figures
+
+
+def drawings(run: RunData) -> dict[str, Callable[[], Figure | None]]:
+    """Functions that draw each of these figures, within `in_style()` and without layout; each may answer None."""
+    if not run.names:
+        return {}
+    overlaid: dict[str, Callable[[], Figure | None]] = {
+        "paths_overlaid": partial(paths_overlaid, run),
+        "paths_side_by_side": partial(paths_side_by_side, run),
+    }
+    paths = {f"path_{name}": partial(path_with_landmarks, run, name) for name in run.names}
+    over_time = {draw_one.__name__: partial(draw_one, run) for draw_one in OVER_TIME}
+    bands = {f"three_sigma_{name}": partial(three_sigma, run, name) for name in run.names}
+    return {**overlaid, **paths, **over_time, **bands}
+
+
+def draw_printed(run: RunData) -> dict[str, tuple[Figure, str]]:
+    """Figures of a run for a paper in two columns: name -> figure and caption."""
+    words = {"sequence": run.sequence, "reference": run.reference, "trust": run.trust, "mapped": mapped(run) or ""}
+    drawn = {}
+    with in_style(PAPER):
+        for name, (draw_one, caption) in PRINTED.items():
+            figure = draw_one(run)
+            if figure is not None:
+                lay_out(figure)
+                drawn[name] = (figure, caption.format(**words))
+    return drawn
+
+
+@contextmanager
+def being_drawn(run: "Run", processes: int) -> Iterator[Callable[[], dict[str, Written]]]:
+    """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, written as PNG and SVG.
+
+    The bytes are the same however many processes share the work. The figures over time, which take longest, are the
+    last and come first.
+    """
+    each = drawings(of_run(run))
+    names = list(each)
+    with shared(lambda number: _one(each[names[number]]), len(names), processes) as gathered:
+        yield lambda: {name: one for name, one in zip(names, gathered(), strict=True) if one is not None}
+
+
+def draw_and_write(run: "Run", processes: int = 1) -> dict[str, Written]:
+    """Figures as `being_drawn` gives them, with nothing else to do meanwhile."""
+    with being_drawn(run, processes) as drawn:
+        return drawn()
+
+
+def _one(draw_one: Callable[[], Figure | None]) -> Written | None:
+    with _not_collecting(), in_style():
+        figure = draw_one()
+        if figure is None:
+            return None
+        lay_out(figure)
+        return written(figure, FORMS)
+
+
+@contextmanager
+def _not_collecting() -> Iterator[None]:
+    """Without the search for cyclic garbage, a seventh of the time; that garbage is 13 MB for seven estimators."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collected:
+            gc.enable()
