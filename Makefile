@@ -103,7 +103,7 @@ $(VENV)/tools.stamp: pyproject.toml
 	touch $@
 
 schema: install
-	$(BIN)/python -m fgbaseline.reports.schema > docs/summary.schema.json
+	$(BIN)/python -m fgbaseline.reports.results.run > docs/summary.schema.json
 	$(BIN)/python -m fgbaseline.reports.results.comparison > docs/comparison.schema.json
 
 wheel: install

@@ -25,8 +25,8 @@ from rich.table import Table
 
 from fgbaseline import compare, data, diagnosis
 from fgbaseline.data import Estimate, Problem, Sequence, Status, estimator_names
+from fgbaseline.data.solving import solve_all
 from fgbaseline.diagnosis import Calibration
-from fgbaseline.reports.solving import solve_all
 
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 KITTI_07 = ("ece276a_2020/0027.npz", "ground_truth/kitti_odometry_07.txt")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.reports.comparison import Result, Run
+from fgbaseline.compare.estimate_comparison import Result, Run
 from tests.builders.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
 
 from . import page

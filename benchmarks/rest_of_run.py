@@ -49,16 +49,15 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
 
     with watch("imports"):
         from fgbaseline.data.parallel import cores, shared
-        from fgbaseline.reports import job
-        from fgbaseline.reports.cli import progress  # noqa: F401
+        from fgbaseline.reports.run import job
     settings = job.RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = job.read_sequence(settings)
     with watch(POSING), shared(lambda _: job.pose_problem(sequence, settings, cores()), 1, cores()) as posed:
+        from fgbaseline.compare.estimate_comparison import compare_all
+        from fgbaseline.data.solving import solve_all
         from fgbaseline.reports import figures
-        from fgbaseline.reports.comparison import compare_all
-        from fgbaseline.reports.run_folder import write_numbers, write_page
-        from fgbaseline.reports.solving import solve_all
+        from fgbaseline.reports.run.folder import write_numbers, write_page
 
         job.load_estimators(estimators)
         (problem,) = posed()

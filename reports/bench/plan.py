@@ -10,8 +10,8 @@ from fgbaseline.data import estimator_names
 from fgbaseline.data.simulate import Simulation
 from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.run.job import check_estimators
 
-from ..job import check_estimators
 from .drives import DriveError, drives
 from .identity import code_of
 from .job import Job, Planned, Recorded, Simulated

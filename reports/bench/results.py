@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.geometry import FloatArray
+from fgbaseline.reports.run.job import MARK
 
-from ..job import MARK
 from ..results.tree import INFINITE
 from .job import Planned
 from .store import Store

@@ -5,8 +5,9 @@ from typing import Any
 
 import pandas as pd
 
+from fgbaseline.reports.phrases.run_accuracy import SAME_GRAPH
+
 from ..formatting import interval, listed, number
-from ..html.accuracy_verdict import SAME_GRAPH
 from .results import ANSWERED, METRICS, Metric, Results
 from .tables import consistency, judge, overall, rankings, records
 

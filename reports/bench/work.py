@@ -10,16 +10,16 @@ from threading import Lock
 
 from threadpoolctl import threadpool_limits
 
+from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Sequence, documented, read
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.solving import solve_all, told
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
+from fgbaseline.reports.run.folder import write_numbers, write_page, write_run
 
-from ..comparison import Run, compare_all
-from ..run_folder import write_numbers, write_page, write_run
-from ..solving import solve_all, told
 from .costs import CostWatch, Tell
 from .identity import code_of, content_of
 from .job import File, Job, Recorded

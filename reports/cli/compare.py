@@ -142,6 +142,9 @@ def command(
     """
     import numpy as np
 
+    from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
+    from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
+    from fgbaseline.data.formats.atomic_folder import require_free
     from fgbaseline.geometry import InputError
 
     from ..comparing.inputs import read_entries
@@ -150,9 +153,6 @@ def command(
     from ..results.comparison_summary import summarize
     from ..tables import print_table
     from ..tables.comparison import comparison_table
-    from ..trajectories.metrics import compare_entries
-    from ..trajectories.settings import Delta, Settings
-    from ..whole_folder import require_free
 
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
     if out is not None:

@@ -30,8 +30,7 @@ def command(
     Exits 0 when the recording is clean, 1 with findings, 2 when it cannot tell, and on bad input.
     """
     from fgbaseline.data import TimeUnit
-
-    from ..diagnosing import tell
+    from fgbaseline.reports.run.diagnose import tell
 
     unit = None if time_unit is None else TimeUnit(time_unit)
     return tell(sequence, out, as_json=as_json, repairs=write_repairs, force=force, time_unit=unit)

@@ -49,8 +49,8 @@ def command(
     calibration and time stamps: whoever solves it, in any language, solves the same problem. What comes out of it goes
     back through `fgbaseline compare`. Ground truth is not exported.
     """
-    from ..exporting import export
-    from ..job import RunSettings
+    from fgbaseline.reports.run.export import export
+    from fgbaseline.reports.run.job import RunSettings
 
     settings = RunSettings(
         sequence=sequence,

@@ -32,11 +32,12 @@ def command(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     As wide as a column, letters of 7 points, lines told apart without colour, fonts embedded. Nothing is computed
     again: what is drawn is what the run wrote. captions.json has a caption for each.
     """
+    from fgbaseline.data.formats.atomic_folder import whole_folder
+
     from ..figures.run import draw_printed
     from ..figures.run_data import of_folder
     from ..figures.saving import CAPTIONS, save, save_captions
     from ..figures.style import PAPER
-    from ..whole_folder import whole_folder
 
     place = out or folder / "paper"
     figures = draw_printed(of_folder(folder))

@@ -117,9 +117,8 @@ def command(
     input.
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
-
-    from ..job import RunSettings
-    from .report import report
+    from fgbaseline.reports.cli.run_output import report
+    from fgbaseline.reports.run.job import RunSettings
 
     settings = RunSettings(
         sequence=sequence,

@@ -1,7 +1,8 @@
 """Trajectories from anywhere against one another: tables, figures, page and folder, from Python or the command line."""
 
-from ..trajectories.comparison import Comparison, Result
-from ..trajectories.settings import Delta, Settings
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
+
 from .api import ComparisonReport, compare
 
 __all__ = ["Comparison", "ComparisonReport", "Delta", "Result", "Settings", "compare"]

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
+from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
 from fgbaseline.data import Trajectory
 
 from ..phrases import comparison as phrases
@@ -16,9 +19,6 @@ from ..results.comparison import Summary
 from ..results.comparison_summary import summarize
 from ..tables import Table
 from ..tables.comparison import comparison_table, main_table, metrics_table
-from ..trajectories.comparison import Comparison
-from ..trajectories.metrics import compare_entries
-from ..trajectories.settings import Delta, Settings
 from .inputs import Given, read_entries
 
 if TYPE_CHECKING:

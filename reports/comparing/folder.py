@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.data import write_tum
+from fgbaseline.data.formats.atomic_folder import whole_folder
 
 from ..figures import save
 from ..figures.comparison import draw
@@ -13,8 +15,6 @@ from ..html.comparison_page import render
 from ..results.comparison import MARK, Summary
 from ..tables import latex, markdown
 from ..tables.comparison import comparison_table, main_table, metrics_table
-from ..trajectories.comparison import Comparison, Result
-from ..whole_folder import whole_folder
 
 
 def write(comparison: Comparison, summary: Summary, place: Path, *, force: bool) -> Path:

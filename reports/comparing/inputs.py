@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from fgbaseline.compare.trajectory_comparison.bodies import moved_body, with_body_recognized, with_lever_arm
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
+from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Landmarks, Problem, Trajectory
 from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ..trajectories.bodies import moved_body, with_body_recognized, with_lever_arm
-from ..trajectories.conventions import Resolved, Source, resolve
-from ..trajectories.entry import Entries, Entry
-from ..trajectories.settings import Body, Settings
 from .problem_loader import load_problem
 from .run_folder import RunFolder, read_run_folder
 

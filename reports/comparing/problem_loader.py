@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.run import job
 
-from .. import job
-from ..trajectories.settings import Settings
 from .run_folder import RunFolder
 
 

@@ -25,7 +25,7 @@ from .style import line as line_of
 from .view import TopView, common_window
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.trajectories.comparison import Comparison, Result
+    from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 
 SLIMMEST = (0.35, 1.1)
 """height over width of the plan, at least and at most"""

@@ -21,7 +21,7 @@ from .saving import Written, written
 from .style import PAPER, in_style
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.comparison import Run
+    from fgbaseline.compare.estimate_comparison import Run
 
 FORMS = ("png", "svg")
 OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (

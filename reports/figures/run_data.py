@@ -20,7 +20,7 @@ from .style import SCREEN, Style, colors, line, marked_line
 from .view import TopView
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.comparison import Result, Run
+    from fgbaseline.compare.estimate_comparison import Result, Run
 
 SUMMARY, TRUTH_FILE = "summary.json", "truth.tum"
 

@@ -6,12 +6,13 @@ from dataclasses import replace
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+
 from ..figures.style import colors
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables import Row
 from ..tables.comparison import comparison_table
-from ..trajectories.comparison import Comparison
 from .environment import environment, picture
 
 CAPTIONS: Mapping[str, str] = {

@@ -12,10 +12,10 @@ from fgbaseline.compare import (
     distance_traveled,
     is_insufficient,
 )
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
 from ..formatting import MINUS, interval, listed, number, per_cent
-from ..trajectories.comparison import Comparison, Result
-from ..trajectories.samples import coverage, samples
 from . import comparison_evidence as evidence
 
 MEANING = {

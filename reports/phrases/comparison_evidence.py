@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+
 from ..formatting import counted, listed, number
-from ..trajectories.comparison import Comparison
 
 
 def remarks(comparison: Comparison) -> list[str]:

@@ -6,10 +6,10 @@ from pathlib import Path
 import click
 from threadpoolctl import threadpool_limits
 
+from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.progress import reporter
 
-from ..cli.progress import reporter
-from ..whole_folder import require_free, whole_folder
 from .claim import Claim
 from .claims import claims_of, missing_claims
 from .folder import MARK, Reproduction, write

@@ -5,8 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from ..schema import Nees, Reprojection
-from ..schema_base import Number, Part
+from fgbaseline.reports.results.run import Nees, Number, Part, Reprojection
 
 MARK = "comparison.json"
 """the file by which a comparison's folder is known"""

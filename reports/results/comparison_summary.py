@@ -11,11 +11,11 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors, distance_traveled
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
+from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
-from ..trajectories.comparison import Comparison, Result
-from ..trajectories.reported_covariance import ReportedCovariance
-from ..trajectories.reprojection import Pixels
-from ..trajectories.samples import coverage, samples
 from .comparison import Summary
 from .tree import INFINITE, finite, nulls
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.compare.limits import Better
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..results.comparison import Summary
-from ..trajectories.comparison import Comparison
 from .table import Column, Row, Table, Value, compared
 
 LOWER = Better.LOWER

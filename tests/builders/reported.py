@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import Estimate, Landmarks, Problem, Sequence, Status, Truth
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.comparison import Run, compare_all
-from fgbaseline.reports.summary import summarise
+from fgbaseline.reports.results.run_summary import summarise
 
 from .synthetic import Scene, plain_problem
 

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fgbaseline import compare
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.bench.results import METRICS
 from fgbaseline.reports.bench.wording import _winner
-from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.html.accuracy_verdict import claimed, nearest_sentences, truth_sentences
-from fgbaseline.reports.html.table import main_table
+from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, truth_sentences
+from fgbaseline.reports.tables.run import main_table
 
 from ..builders.reported import FRAMES, answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
@@ -120,7 +120,7 @@ def test_figures_that_read_the_same_are_best_together_and_the_same_graph_is_not_
     run = run_of(problem, *(answer(problem, name, (0.0, drift, 0.0)) for name, drift in drifts.items()))
     document = as_dict(run)["estimators"]
     table = main_table(run, document)
-    at = [i for i, cell in enumerate(table.headings) if cell.text == "RMSE, m"][1]
+    at = [i for i, column in enumerate(table.columns) if column.heading == "RMSE, m"][1]
     assert {row.name: row.cells[at].best for row in table.rows if row.name != "isam2"} == {
         "ekf": True,
         "joint-ekf": True,

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 
 from fgbaseline import compare as figures
 from fgbaseline import data
+from fgbaseline.compare.trajectory_comparison.ranking import ranking_of
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.bench.results import METRICS
 from fgbaseline.reports.bench.wording import _winner
 from fgbaseline.reports.comparing import compare
-from fgbaseline.reports.html.table import main_table
-from fgbaseline.reports.html.verdict import verdict
 from fgbaseline.reports.phrases.comparison import order_in_words
+from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.tables import latex, markdown
-from fgbaseline.reports.trajectories.ranking import ranking_of
+from fgbaseline.reports.tables.run import main_table
 
 from ..builders.reported import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
@@ -168,9 +168,9 @@ def test_a_run_ranks_over_the_frames_that_all_estimators_have() -> None:
     assert any(s.startswith("Nearest to isam2 is dead-reckoning") for s in said)
     assert any(f"over the {problem.n_frames // 2} frames that all have" in s and "ekf 49.2 %" in s for s in said)
     table = main_table(run, estimators)
-    assert {"of the time, %", "RMSE over common frames, m"} <= {h.text for h in table.headings}
+    assert {"of the time, %", "RMSE over common frames, m"} <= {c.heading for c in table.columns}
     whole = main_table(run_of(problem, answer(problem, "ekf"), answer(problem, "isam2")), estimators)
-    assert "of the time, %" not in {h.text for h in whole.headings}
+    assert "of the time, %" not in {c.heading for c in whole.columns}
 
 
 @given(st.lists(st.lists(st.sampled_from([np.nan, 1.0, 2.0, 3.0]), min_size=3, max_size=3), min_size=2, max_size=6))

@@ -11,13 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
+from fgbaseline.compare import estimate_comparison as comparison
 from fgbaseline.compare.statistics.descriptive import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
-from fgbaseline.reports import comparison, html
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.html.table import main_table
-from fgbaseline.reports.summary import metrics_table, summarise
+from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.results.run_summary import metrics_table, summarise
+from fgbaseline.reports.tables.run import main_table
 
 from ..builders.synthetic import Scene, plain_problem
 
@@ -126,7 +127,7 @@ def test_summary_page_and_metrics_say_infinite_and_count_the_missing() -> None:
     assert any("4 errors are missing (NaN) and left out" in text for _, text in table.notes)
     written = metrics_table(summary).set_index(["estimator", "metric"])["value"]
     assert written["half", "ate.missing"] == 4
-    assert html.render(run, document, {})
+    assert render(run, document, {})
 
 
 def test_an_infinite_number_reads_so() -> None:

@@ -20,7 +20,7 @@ from fgbaseline.diagnosis import (
     track_statistics,
 )
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.summary import summarise
+from fgbaseline.reports.results.run_summary import summarise
 
 from ..builders.commands import fgbaseline
 from ..builders.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, base, cell, cut, solved, velocity_jump

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.whole_folder import require_free, whole_folder
 
 from ..builders.commands import everything_in
 

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
+from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.solving import solve_all
 from fgbaseline.ekf import slam
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
-from fgbaseline.reports import job
 from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.comparison import compare_all
-from fgbaseline.reports.solving import solve_all
-from fgbaseline.reports.summary import summarise
+from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.run import job
 
 from ..builders.commands import fgbaseline
 

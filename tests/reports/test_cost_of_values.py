@@ -14,7 +14,7 @@ from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.figures.panels import moving_sum
 from fgbaseline.reports.figures.reprojection import WRONG
-from fgbaseline.reports.html.departure import worst_second
+from fgbaseline.reports.phrases.run_accuracy import worst_second
 
 from ..builders.commands import fgbaseline
 from ..builders.mutated_files import good_recording, good_trajectory

@@ -13,9 +13,8 @@ from pathlib import Path
 import pytest
 
 from fgbaseline import data
+from fgbaseline.data.formats.atomic_folder import exchanged, whole_folder
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.exchange_names import exchanged
-from fgbaseline.reports.whole_folder import whole_folder
 
 from ..builders.commands import COMMAND, everything_in, fgbaseline, started
 from ..builders.summaries import estimator, summary
@@ -28,7 +27,7 @@ WRITER = """
 import sys
 from itertools import count
 from pathlib import Path
-from fgbaseline.reports.whole_folder import whole_folder
+from fgbaseline.data.formats.atomic_folder import whole_folder
 
 print("ready", flush=True)
 for n in count():
@@ -42,7 +41,7 @@ RIVAL = """
 import os, sys, time
 from pathlib import Path
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.whole_folder import whole_folder
+from fgbaseline.data.formats.atomic_folder import whole_folder
 
 print("ready", flush=True)
 sys.stdin.readline()

@@ -13,9 +13,9 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Observations
 from fgbaseline.reports import figures
-from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.layout import lay_out
 from fgbaseline.reports.figures.run import drawings
 from fgbaseline.reports.figures.run_data import of_run

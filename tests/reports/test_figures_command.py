@@ -12,7 +12,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports import figures
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.figures.style import PAPER
-from fgbaseline.reports.run_folder import write_run
+from fgbaseline.reports.run.folder import write_run
 
 from ..builders.reported import answer, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

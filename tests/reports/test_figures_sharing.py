@@ -2,8 +2,8 @@
 
 from functools import cache
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.reports import figures
-from fgbaseline.reports.comparison import Run
 
 from ..builders.reported import answer, run_of, scene
 from ..builders.synthetic import plain_problem

@@ -12,12 +12,13 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, Excluded, Observations, Status
-from fgbaseline.reports import figures, html
-from fgbaseline.reports.comparison import Run
+from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import OWN, REFERENCE, SPARE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.html.table import COLUMNS, main_table
+from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.tables.run import COLUMNS, main_table
 
 from ..builders.reported import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
@@ -26,7 +27,7 @@ SCRIPT = "<script>alert(1)</script>"
 
 
 def rendered(run: Run, *, with_figures: bool = False) -> str:
-    return html.render(run, as_dict(run), figures.draw(run) if with_figures else {})
+    return render(run, as_dict(run), figures.draw(run) if with_figures else {})
 
 
 @cache
@@ -77,7 +78,7 @@ def test_the_table_holds_every_number_of_the_summary_it_has_a_column_for() -> No
 def test_the_best_of_a_column_is_marked_and_the_reference_is_not_nearest_to_itself() -> None:
     run = standard_run()
     table = main_table(run, as_dict(run)["estimators"])
-    at = [i for i, heading in enumerate(table.headings) if heading.text == "RMSE, m"]
+    at = [i for i, column in enumerate(table.columns) if column.heading == "RMSE, m"]
     best = {row.name: [row.cells[i].best for i in at] for row in table.rows}
     assert best == {"dead-reckoning": [False, False], "ekf": [False, True], "isam2": [True, False]}
     assert [row.name for row in table.rows if row.reference] == ["isam2"]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Landmarks
-from fgbaseline.reports import html
-from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.figures.paths import paths_overlaid
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style
+from fgbaseline.reports.html.run_page import render
 
 from ..builders.reported import answer, as_dict, failed, run_of, scene
 from ..builders.synthetic import plain_problem
@@ -56,7 +56,7 @@ def address(run: Run, tmp_path_factory: pytest.TempPathFactory) -> str:
     file = tmp_path_factory.mktemp("page") / "report.html"
     with in_style():
         drawn = {"paths_overlaid": paths_overlaid(of_run(run))}
-    file.write_text(html.render(run, as_dict(run), drawn), encoding="utf-8")
+    file.write_text(render(run, as_dict(run), drawn), encoding="utf-8")
     return file.as_uri()
 
 
@@ -289,7 +289,7 @@ def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: An
     gone[20:] = np.nan
     run = run_of(problem, failed(problem, "ekf", "no"), replace(alone, world_T_imu=gone))
     file = tmp_path / "report.html"
-    file.write_text(html.render(run, as_dict(run), {}), encoding="utf-8")
+    file.write_text(render(run, as_dict(run), {}), encoding="utf-8")
     opened = Opened(chromium, file.as_uri())
     opened.page.click('[data-do="ellipses"]')
     opened.page.click('[data-do="landmarks"]')

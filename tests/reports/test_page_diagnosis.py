@@ -4,17 +4,18 @@ from dataclasses import replace
 
 import pytest
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data.finding import Finding
-from fgbaseline.reports import html
-from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import quantity
-from fgbaseline.reports.summary import summarise
+from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.run_summary import summarise
 
 from ..builders.reported import standard_run
 
 
 def rendered(run: Run) -> str:
-    return html.render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
+    return render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
 
 
 def test_findings_stand_with_their_figures_and_repairs_below() -> None:
@@ -45,7 +46,7 @@ def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -
 
 def test_three_sentences_stand_above_the_table_and_the_rest_is_folded_below() -> None:
     run = standard_run()
-    sentences, page = html.verdict(run), rendered(run)
+    sentences, page = verdict(run), rendered(run)
     assert len(sentences) > 3
     table = page.index('<section id="table"')
     above, below = page[:table], page[table:]

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import compare
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Observations
-from fgbaseline.reports.comparison import Run
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.html import verdict
-from fgbaseline.reports.html.departure import departure
+from fgbaseline.reports.phrases import run as verdict
+from fgbaseline.reports.phrases.run_accuracy import departure
 
 from ..builders.reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fgbaseline import compare, data, diagnosis, smoother
+from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.reports.comparing import compare as compared
-from fgbaseline.reports.comparison import compare_all
-from fgbaseline.reports.html import verdict
+from fgbaseline.reports.phrases import run as verdict
 
 Recordings = Callable[[str], Path]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fgbaseline.geometry import InputError
-from fgbaseline.reports import rerun_file
 from fgbaseline.reports.cli import main
+from fgbaseline.reports.run import rerun as rerun_file
 
 from ..builders.reported import standard_run
 

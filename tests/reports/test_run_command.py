@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.reports import job
-from fgbaseline.reports.job import RunSettings
-from fgbaseline.reports.run_folder import write_run
-from fgbaseline.reports.summary import summarise
+from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.run import job
+from fgbaseline.reports.run.folder import write_run
+from fgbaseline.reports.run.job import RunSettings
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
@@ -149,7 +149,7 @@ def test_elsewhere_than_on_a_terminal_progress_is_plain_lines(finished: Finished
 def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures and page cost more than all the rest."""
     monkeypatch.setattr("fgbaseline.reports.figures.draw", lambda *_: {})
-    monkeypatch.setattr("fgbaseline.reports.html.render", lambda *_: "")
+    monkeypatch.setattr("fgbaseline.reports.run.folder.render", lambda *_: "")
 
 
 @pytest.mark.usefixtures("without_figures")

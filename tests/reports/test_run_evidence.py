@@ -11,12 +11,14 @@ import pandas as pd
 import pytest
 
 from fgbaseline import data, diagnosis
+from fgbaseline.compare.estimate_comparison import Run, compare_all, frames_in_words
 from fgbaseline.data import Innovations
 from fgbaseline.geometry import InputError
-from fgbaseline.reports import figures, html, job
-from fgbaseline.reports.comparison import Run, compare_all
-from fgbaseline.reports.evidence import frames_in_words
-from fgbaseline.reports.run_folder import write_run
+from fgbaseline.reports import figures
+from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.run import job
+from fgbaseline.reports.run.folder import write_run
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty
@@ -94,7 +96,7 @@ def test_the_figures_show_it_and_the_page_has_its_table() -> None:
     error = run.results["ekf"].evidence.error
     assert error is not None
     np.testing.assert_array_equal(ordinate, error[:, 0])
-    page = html.render(run, as_dict(run), drawn)
+    page = render(run, as_dict(run), drawn)
     assert page.count('id="figure-held_out"') == 1
     assert page.count('id="figure-three_sigma_ekf"') == 1
     assert 'id="evidence"' in page
@@ -105,14 +107,14 @@ def test_the_figures_show_it_and_the_page_has_its_table() -> None:
 def test_the_sentences_tell_who_is_best_and_who_cannot_be_told_apart() -> None:
     run = held_out_run()
     assert run.held_out is not None
-    (sentence,) = (s for s in html.verdict(run) if "held-out" in s)
+    (sentence,) = (s for s in verdict(run) if "held-out" in s)
     ranking = run.held_out.ranking
     assert f"{ranking.index[0]} errs by" in sentence
     assert "does not separate dead-reckoning" not in sentence
     twins = ranking.copy()
     twins["behind_low"] = 0.0
     alike = replace(run, held_out=replace(run.held_out, ranking=twins))
-    assert any("the bootstrap does not separate" in s and f"from {ranking.index[0]}" in s for s in html.verdict(alike))
+    assert any("the bootstrap does not separate" in s and f"from {ranking.index[0]}" in s for s in verdict(alike))
 
 
 def test_covariances_that_are_none_are_told_with_their_frames() -> None:
@@ -125,15 +127,15 @@ def test_covariances_that_are_none_are_told_with_their_frames() -> None:
     summary = as_dict(run)["estimators"]["ekf"]
     assert summary["covariance"] == {"frames": 60, "held": 0, "not_positive_definite": 4, "where": "3, 7 to 9"}
     assert summary["nees"]["frames"] == 56
-    assert any("4 pose covariances that are not positive definite (frames 3, 7 to 9)" in s for s in html.verdict(run))
-    assert "not positive definite</th>" in html.render(run, as_dict(run), {})
+    assert any("4 pose covariances that are not positive definite (frames 3, 7 to 9)" in s for s in verdict(run))
+    assert "not positive definite</th>" in render(run, as_dict(run), {})
 
 
 def test_a_run_in_which_nobody_answers_says_that_nothing_can_be_judged() -> None:
     kept, held = diagnosis.hold_out(drive(), 0.5)
     problem = matched(kept)
     run = compare_all(problem, {"ekf": failed(problem, "ekf", "no")}, {}, held)
-    assert any("none is left to judge" in sentence for sentence in html.verdict(run))
+    assert any("none is left to judge" in sentence for sentence in verdict(run))
     summary = as_dict(run)
     assert summary["held_out"]["judged"] == 0
     assert summary["estimators"]["ekf"]["notes"] == {"*": "the estimator failed: no"}

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from fgbaseline import ekf
-from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status
+from fgbaseline.compare.estimate_comparison import compare_all
+from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status, solving
+from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import InputError
-from fgbaseline.reports import solving
-from fgbaseline.reports.comparison import compare_all
-from fgbaseline.reports.job import RunSettings, check_estimators, read_sequence
-from fgbaseline.reports.solving import solve_all
+from fgbaseline.reports.run.job import RunSettings, check_estimators, read_sequence
 
 from ..builders.synthetic import Scene, plain_problem
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Landmarks, Observations, Status
-from fgbaseline.reports.comparison import Run
-from fgbaseline.reports.schema import json_schema
-from fgbaseline.reports.summary import metrics_table, summarise
+from fgbaseline.reports.results.run import json_schema
+from fgbaseline.reports.results.run_summary import metrics_table, summarise
 
 from ..builders.reported import answer, as_dict, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

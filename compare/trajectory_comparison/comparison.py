@@ -1,0 +1,108 @@
+"""Estimates against a reference as plain data: what tables, sentences, figures and files are made of."""
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from fgbaseline.compare import (
+    ErrorDecomposition,
+    Exceedance,
+    MatchedTrajectories,
+    RmseDifference,
+    SegmentErrors,
+    TimeOffset,
+)
+from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.compare.trajectory_comparison.ranking import Ranking
+from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
+from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.geometry import FloatArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Result:
+    """Figures of one estimate."""
+
+    entry: Entry
+    matched: MatchedTrajectories
+    """the pairs of poses, the estimate's aligned"""
+    offset: TimeOffset | None
+    """the estimated time offset, where it was searched for"""
+    absolute: pd.DataFrame
+    """see `compare.absolute_errors`"""
+    departure: pd.DataFrame
+    """see `compare.divergence_along_path`: along, across, up and heading over the distance travelled"""
+    relative: dict[str, pd.DataFrame]
+    """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
+    segments: SegmentErrors | None
+    drift: pd.DataFrame | None
+    """see `compare.drift`"""
+    shares: ErrorDecomposition
+    share_intervals: pd.DataFrame
+    """see `compare.decomposition_intervals`"""
+    bound: float
+    """m: 1 % of the path, at most 5 m"""
+    passing: Exceedance | None
+    """first pose whose position is farther off than `bound`"""
+    statistics: dict[str, pd.DataFrame]
+    """statistics of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
+    relative_statistics: dict[str, dict[str, pd.DataFrame]]
+    """statistics by delta, then `translation` and `rotation_deg`"""
+    reported_covariance: ReportedCovariance | None
+    """its covariances beside its errors against the truth"""
+    pixels: Pixels | None
+    map: pd.DataFrame | None
+    """see `compare.map_difference`; the landmarks are aligned as the path is"""
+    notes: dict[str, str]
+    """why figures are missing, by key"""
+
+    @property
+    def name(self) -> str:
+        """Name in tables and figures."""
+        return self.entry.name
+
+    @property
+    def rmse(self) -> float:
+        """RMSE of the positions over all paired poses, m."""
+        return float(self.statistics["translation"]["value"]["rmse"])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Comparison:
+    """A reference, and the figures of every estimate against it."""
+
+    reference: Entry
+    reference_pixels: Pixels | None
+    results: dict[str, Result]
+    """by name, in the order of the input"""
+    up: FloatArray
+    """(3,) in the reference's world"""
+    up_from: str
+    """the source of `up`"""
+    deltas: tuple[str, ...]
+    settings: Settings
+    ranking: Ranking
+    held_out: pd.DataFrame | None
+    """see `compare.held_out_ranking`: the reference among them"""
+    sequence: str | None
+    """the recording whose observations are reprojected"""
+
+    @property
+    def behind(self) -> dict[str, RmseDifference]:
+        """RMSE of each estimate above that of the nearest rival, which is missing."""
+        return self.ranking.behind
+
+    @property
+    def ranked(self) -> list[Result]:
+        """Results by rank; those without a rank last, in the order of the input."""
+        order = list(self.ranking.at)
+        last = len(order)
+        return sorted(self.results.values(), key=lambda r: order.index(r.name) if r.name in order else last)
+
+    @property
+    def pixels(self) -> dict[str, Pixels]:
+        """Reprojection of every trajectory that has one, the reference first."""
+        every = {self.reference.name: self.reference_pixels}
+        every |= {name: result.pixels for name, result in self.results.items()}
+        return {name: pixels for name, pixels in every.items() if pixels is not None}

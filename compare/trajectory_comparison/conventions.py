@@ -1,0 +1,229 @@
+"""Conventions that trajectory files leave open, decided by the files beside them: time units, quaternion orders."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fgbaseline import compare
+from fgbaseline.compare import MatchedTrajectories
+from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.data import TimeUnit, Trajectory
+from fgbaseline.data.formats import Order, TrajectoryFile
+from fgbaseline.data.formats.shared_clock import Spans, units_in_common
+from fgbaseline.data.formats.trajectory_file import bends, in_doubt
+from fgbaseline.geometry import FloatArray, InputError, so3
+
+Source = TrajectoryFile | Trajectory
+Times = Sequence[FloatArray]
+"""stamps of frames, s, for files without: each takes those that have one for each of its poses"""
+FEWEST = 10
+"""least number of pairs of poses to judge quaternion orders by"""
+VARIED, TURNED = np.deg2rad(1.0), np.deg2rad(10.0)
+"""rad: least angle between orientations that vary, and between those of a body on a curve"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Resolved:
+    """A trajectory file, or a trajectory in memory, with the conventions decided so far."""
+
+    source: Source
+    unit: TimeUnit = TimeUnit.S
+    order: Order = "xyzw"
+    oriented: bool = True
+    remarks: tuple[str, ...] = ()
+    """findings: each completes a sentence that begins with the trajectory's name"""
+
+    def trajectory(self, times: Times, order: Order | None = None) -> Trajectory:
+        """The trajectory, with its quaternions in another order if one is given."""
+        if isinstance(self.source, TrajectoryFile):
+            return self.source.trajectory(self.unit, order or self.order, times, oriented=self.oriented)
+        return replace(self.source, oriented=self.source.oriented and self.oriented)
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """(n, 6, 6) of the right perturbation of each pose, where the file has them."""
+        return self.source.covariance(self.order) if isinstance(self.source, TrajectoryFile) else None
+
+    @property
+    def up(self) -> FloatArray | None:
+        """(3,) what points up in its world, where the format defines it."""
+        return self.source.up if isinstance(self.source, TrajectoryFile) else None
+
+    @property
+    def orders(self) -> tuple[Order, ...]:
+        """The orders that its quaternions may have, the likeliest first."""
+        return self.source.orders if isinstance(self.source, TrajectoryFile) else ("xyzw",)
+
+    def remarked(self, remark: str) -> "Resolved":
+        """The input with one more remark."""
+        return replace(self, remarks=(*self.remarks, remark))
+
+
+def resolve(sources: Sequence[Source], times: Times, settings: Settings) -> list[Resolved]:
+    """Reference, which is the first source, and estimates, with their conventions decided by each other.
+
+    Raises InputError for units that nothing decides.
+    """
+    _require_same_frames(sources, times)
+    reference, *estimates = _with_units(sources, settings)
+    reference, *estimates = _with_orders(reference, estimates, times, settings)
+    return _without_constant_orientations([reference, *estimates], times)
+
+
+def _require_same_frames(sources: Sequence[Source], times: Times) -> None:
+    """Raises InputError where files without stamps and numbers of frames differ in length."""
+    bare = [s for s in sources if isinstance(s, TrajectoryFile) and s.stamps is None and s.frame is None]
+    for other in () if times else bare[1:]:
+        if len(other.position) != len(bare[0].position):
+            raise InputError(
+                f"{other.source}: it has {len(other.position):,} poses and {bare[0].source} has "
+                f"{len(bare[0].position):,}; without stamps pose k is that of frame k in both, so they cannot be "
+                "paired: put the number of its frame before each pose (13 columns), or give --times for each file"
+            )
+
+
+def _with_units(sources: Sequence[Source], settings: Settings) -> list[Resolved]:
+    spans = [_spans(source, settings.unit) for source in sources]
+    first, *others = spans
+    shifted = [{u: (a + settings.offset, b + settings.offset) for u, (a, b) in each.items()} for each in others]
+    if len(first) > 1:
+        found = next((f for each in shifted if each and (f := units_in_common(first, each))), None)
+        first = {found[0]: first[found[0]]} if found else first
+    chosen = [_only(sources[0], first)]
+    for source, each in zip(sources[1:], shifted, strict=True):
+        common = units_in_common({chosen[0]: first[chosen[0]]}, each) if first and len(each) > 1 else None
+        chosen.append(common[1] if common else _only(source, each))
+    return [_with_unit(source, unit) for source, unit in zip(sources, chosen, strict=True)]
+
+
+def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
+    """First and last stamp by the units that they may have; nothing without stamps."""
+    if isinstance(source, Trajectory):
+        return {TimeUnit.S: (float(source.t[0]), float(source.t[-1]))} if source.stamped else {}
+    if source.stamps is None:
+        return {}
+    units = (wanted,) if wanted is not None and not source.unit_settled else source.units
+    return {u: (float(t[0]), float(t[-1])) for u in units for t in (source.stamps.seconds(u),)}
+
+
+def _only(source: Source, spans: Spans) -> TimeUnit:
+    """The only possible unit. Raises InputError where there are several, or none although there are stamps."""
+    if isinstance(source, Trajectory) or source.stamps is None or len(spans) == 1:
+        return next(iter(spans), TimeUnit.S)
+    raise InputError(in_doubt(source, list(spans)))
+
+
+def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
+    remarks = source.remarks if isinstance(source, TrajectoryFile) else ()
+    found = Resolved(source, unit, remarks=remarks)
+    if unit is TimeUnit.S or isinstance(source, Trajectory) or source.stamps is None or source.stamps.unit is not None:
+        return found
+    return found.remarked(f"its time stamps are in {unit.noun} and are divided by {unit.per_second:,}")
+
+
+def _with_orders(
+    reference: Resolved, estimates: Sequence[Resolved], times: Times, settings: Settings
+) -> list[Resolved]:
+    """Quaternion orders: as a header or the user names them, else as fits clearly better, else as usual."""
+    reference, *estimates = [_asked_for(each, settings.quaternion) for each in (reference, *estimates)]
+    if settings.quaternion is not None:
+        return [reference, *estimates]
+    matrices = [_misfits(reference, each, times, settings) for each in estimates]
+    known = [matrix for matrix in matrices if matrix is not None]
+    if known and known[0].shape[0] > 1:
+        assumed, other = np.median([matrix.min(axis=1) for matrix in known], axis=0)
+        reference, row = _decided(reference, assumed, other)
+    else:
+        row = 0
+        reference, _ = _decided(reference, *_travel_misfits(reference, times))
+    decided_estimates = []
+    for each, matrix in zip(estimates, matrices, strict=True):
+        misfits = _travel_misfits(each, times) if matrix is None else matrix[row]
+        decided_estimates.append(_decided(each, *misfits)[0])
+    return [reference, *decided_estimates]
+
+
+def _asked_for(each: Resolved, order: Order | None) -> Resolved:
+    """The input with the user's order, where the file names none."""
+    if order is None or len(each.orders) == 1:
+        return replace(each, order=each.orders[0])
+    return replace(each, order=order)
+
+
+def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Settings) -> FloatArray | None:
+    """Misfits of the rotations, deg: a row for each order of the reference, a column for each of the estimate.
+
+    The rotation between the worlds is that of the positions, else of the rotations themselves. None without
+    orientations, and with too few pairs.
+    """
+    if len(reference.orders) == len(estimate.orders) == 1:
+        return None
+    rows = []
+    for row in reference.orders:
+        cells = []
+        for column in estimate.orders:
+            matched = paired(reference.trajectory(times, row), estimate.trajectory(times, column), settings)
+            if matched is None or len(matched) < FEWEST or not (_vary(matched.reference) and _vary(matched.estimate)):
+                return None
+            rotations = matched.reference.rotation, matched.estimate.rotation
+            world = compare.world_rotation_from_positions(matched)
+            cells.append(
+                compare.rotation_misfit(
+                    *rotations, compare.world_rotation_from_orientations(*rotations) if world is None else world
+                )
+            )
+        rows.append(cells)
+    return np.array(rows)
+
+
+def _travel_misfits(each: Resolved, times: Times) -> tuple[float, ...]:
+    """Change of the direction of travel in the body frame along a path, deg, by quaternion order."""
+    if len(each.orders) == 1:
+        return ()
+    paths = [each.trajectory(times, order) for order in each.orders]
+    return tuple(compare.travel_direction_misfit(path.position, path.rotation) for path in paths)
+
+
+def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[Resolved, int]:
+    """The input with the order that fits clearly better, and 1 where that is not the usual one."""
+    if len(each.orders) == 1 or not compare.fits_clearly_better(other, assumed):
+        return each, 0
+    order = each.orders[1]
+    remark = (
+        f"its quaternions are read as {' '.join(order)}: so its rotations fit to {other:.2g}° in the median, and to "
+        f"{assumed:.2g}° as {' '.join(each.orders[0])}"
+    )
+    return replace(each, order=order).remarked(remark), 1
+
+
+def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> MatchedTrajectories | None:
+    """Pairs of poses, not aligned; None without any (which is reported later) and without orientations."""
+    if reference.stamped != estimate.stamped or not (reference.oriented and estimate.oriented):
+        return None
+    try:
+        return compare.associate(
+            reference, estimate, how=settings.association, tolerance=settings.tolerance, offset=settings.offset
+        )
+    except InputError:
+        return None
+
+
+def _without_constant_orientations(every: list[Resolved], times: Times) -> list[Resolved]:
+    """Inputs without the orientations of files that have a single one while their path bends or another file turns."""
+    paths = [each.trajectory(times) for each in every]
+    turning = [path.oriented and _vary(path, TURNED) for path in paths]
+    result = []
+    for each, path, turns in zip(every, paths, turning, strict=True):
+        constant = path.oriented and len(path) > 1 and bool(np.abs(path.rotation - path.rotation[0]).max() < 1e-12)
+        if constant and not turns and (any(turning) or bends(path.position)):
+            each = replace(each, oriented=False).remarked(
+                "all its orientations are the same: it has positions and no orientations"
+            )
+        result.append(each)
+    return result
+
+
+def _vary(path: Trajectory, by: float = VARIED) -> bool:
+    """Whether orientations differ from the first by more than an angle, rad."""
+    return bool(so3.rotation_angle(path.rotation[0].T @ path.rotation).max() > by)

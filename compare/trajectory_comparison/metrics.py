@@ -1,0 +1,216 @@
+"""All figures of a comparison: association, alignment, errors, drift, consistency, reprojection and ranking."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline import compare
+from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
+from fgbaseline.compare.trajectory_comparison.ranking import ranking_of, spread
+from fgbaseline.compare.trajectory_comparison.reported_covariance import reported_covariance
+from fgbaseline.compare.trajectory_comparison.reprojection import (
+    Pixels,
+    held_out_of,
+    map_of,
+    paths_of,
+    pixels_of,
+    up_of_problem,
+)
+from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
+from fgbaseline.geometry import FloatArray, InputError
+
+Computed = TypeVar("Computed")
+
+FAR, FAR_SHARE = 5.0, 0.01
+"""m, and share of the path: an estimate farther off than the smaller of both has left the reference"""
+TILT = 10.0
+"""largest angle between the ups of two level worlds, deg"""
+FEWEST = 2
+"""least number of pairs of poses"""
+
+
+def compare_entries(entries: Entries, settings: Settings) -> Comparison:
+    """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
+    up, up_from = _up(entries, settings)
+    everything = [entries.reference, *entries.estimates]
+    settings = replace(
+        settings,
+        align=str(settings.align or (Align.NONE if entries.one_world else Align.SE3)),
+        deltas=tuple(settings.deltas or _usual(everything)),
+    )
+    if settings.align == Align.YAW:
+        _require_one_up(entries, up)
+    paths = paths_of(entries.problem, everything, settings.offset)
+    pixels = pixels_of(entries.problem, everything, paths)
+    results = {e.name: _compared(entries, e, up, settings, paths, pixels.get(e.name)) for e in entries.estimates}
+    return Comparison(
+        reference=entries.reference,
+        reference_pixels=pixels.get(entries.reference.name),
+        results=results,
+        up=up,
+        up_from=up_from,
+        deltas=tuple(delta.text for delta in settings.deltas),
+        settings=settings,
+        ranking=ranking_of(
+            errors={name: r.absolute["translation"] for name, r in results.items()},
+            stamps={name: r.matched.reference.t for name, r in results.items()},
+            tolerance=min(r.matched.tolerance for r in results.values()),
+            by_products=frozenset(name for name, r in results.items() if r.entry.by_product),
+            seed=settings.seed,
+        ),
+        held_out=held_out_of(entries.problem, entries.held, paths),
+        sequence=None if entries.problem is None else entries.problem.sequence.name,
+    )
+
+
+def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
+    """Direction (3,) of up in the reference's world, and its source.
+
+    Sources in order: the option, the format of the reference, the run, the recording, +z.
+    """
+    if settings.up is not None:
+        up = np.asarray(settings.up, dtype=np.float64)
+        if not (np.isfinite(up).all() and np.linalg.norm(up) > 0):
+            raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
+        return up / np.linalg.norm(up), "--up"
+    if entries.reference.up is not None:
+        return entries.reference.up, "KITTI's camera frame"
+    if entries.up is not None:
+        return entries.up, "the run"
+    found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
+    return (np.array([0.0, 0.0, 1.0]), "by default") if found is None else (found, "the recording")
+
+
+def _require_one_up(entries: Entries, up: FloatArray) -> None:
+    """Raises InputError where up of the recording is another direction in the world of an estimate."""
+    if entries.problem is None:
+        return
+    for entry in entries.estimates:
+        there = up_of_problem(entries.problem, entry.trajectory)
+        apart = 0.0 if there is None else float(np.rad2deg(np.arccos(np.clip(there @ up, -1.0, 1.0))))
+        if apart > TILT:
+            raise InputError(
+                f"{entry.trajectory.source or entry.name}: up in its world is {apart:.0f} degrees off that of "
+                f"{entries.reference.name}, which a yaw alignment cannot mend; ask for --align se3 or first-pose"
+            )
+
+
+def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
+    stamped = all(entry.trajectory.stamped for entry in entries)
+    return (Delta(1.0, "s") if stamped else Delta(1.0, "frames"), Delta(10.0, "m"))
+
+
+def _compared(
+    entries: Entries,
+    entry: Entry,
+    up: FloatArray,
+    settings: Settings,
+    paths: Mapping[str, FloatArray],
+    pixels: Pixels | None,
+) -> Result:
+    reference, seed = entries.reference, settings.seed
+    notes = {} if pixels is None else dict(pixels.notes)
+    matched, offset = _matched(reference, entry, up, settings)
+    absolute = compare.absolute_errors(matched)
+    departure = compare.divergence_along_path(matched, up)
+    bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
+    if bare:
+        absolute[["rotation_deg", "rotation_chord", "pose"]] = np.nan
+        departure[["rotation_deg", "heading_deg"]] = np.nan
+        notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
+    bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
+    relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
+    tables = {delta: table for delta, table in relative.items() if table is not None}
+    return Result(
+        entry=entry,
+        matched=matched,
+        offset=offset,
+        absolute=absolute,
+        departure=departure,
+        relative=tables,
+        segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
+        reported_covariance=_or_note("nees", notes, lambda: reported_covariance(reference, entry, _oriented(matched))),
+        drift=_or_note("drift", notes, lambda: compare.drift(_oriented(matched), seed=seed)),
+        shares=compare.error_decomposition(matched, up),
+        share_intervals=compare.decomposition_intervals(matched, up, seed=seed),
+        bound=bound,
+        passing=_passing(matched, departure, bound, notes),
+        statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
+        relative_statistics={
+            delta: {name: spread(table[name], seed) for name in ("translation", "rotation_deg")}
+            for delta, table in tables.items()
+        },
+        pixels=pixels,
+        map=_or_note("map", notes, lambda: map_of(entries.problem, paths, reference, entry, matched)),
+        notes=notes,
+    )
+
+
+def _oriented(matched: MatchedTrajectories) -> MatchedTrajectories:
+    """The pairs; raises InputError where reference or estimate has positions only."""
+    for path in (matched.reference, matched.estimate):
+        if not path.oriented:
+            raise InputError(f"{path.name} has no orientations, so no motion of a body can be compared")
+    return matched
+
+
+def _passing(
+    matched: MatchedTrajectories, departure: pd.DataFrame, bound: float, notes: dict[str, str]
+) -> Exceedance | None:
+    """First pose beyond the bound; only of paths that start together."""
+    if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
+        return compare.first_exceedance(departure, bound)
+    notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
+    return None
+
+
+def _relative(
+    matched: MatchedTrajectories, delta: Delta, settings: Settings, notes: dict[str, str]
+) -> pd.DataFrame | None:
+    return _or_note(
+        f"relative.{delta.text}",
+        notes,
+        lambda: compare.relative_errors(_oriented(matched), delta.length, delta.unit, all_pairs=settings.all_pairs),
+    )
+
+
+def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -> Computed | None:
+    """Result, or None with a note where the path does not allow it (too short, standing, without stamps)."""
+    try:
+        return compute()
+    except InputError as error:
+        notes[key] = str(error)
+        return None
+
+
+def _matched(
+    reference: Entry, entry: Entry, up: FloatArray, settings: Settings
+) -> tuple[MatchedTrajectories, TimeOffset | None]:
+    """Pairs of poses, aligned, and the time offset where it is searched for."""
+    there, here, kind = reference.trajectory, entry.trajectory, settings.align or Align.NONE
+    if there.stamped != here.stamped:
+        bare = there if here.stamped else here
+        raise InputError(
+            f"{bare.source or bare.name}: it has no time stamps, but the other trajectory does; "
+            "add --times FILE, or --sequence with the recording"
+        )
+    seconds, found = settings.offset, None
+    if settings.search_offset is not None:
+        sought = Align.SE3 if Align(kind) is Align.NONE else kind
+        moved = here.later(seconds) if seconds else here
+        found = compare.time_offset(there, moved, settings.search_offset, sought)
+        seconds += found.seconds
+    matched = compare.associate(there, here, how=settings.association, tolerance=settings.tolerance, offset=seconds)
+    if len(matched) < FEWEST:
+        raise InputError(
+            f"{here.source or here.name}: only {len(matched)} of its poses has a partner in {there.name}, "
+            f"{FEWEST} are needed; give a larger --tolerance, or an --offset"
+        )
+    if kind == Align.FIRST_POSE:
+        _oriented(matched)
+    return matched.aligned(kind, first=settings.align_first, up=up), found

@@ -1,0 +1,67 @@
+"""What a person sees of a run: progress, the main table and where the report is."""
+
+from pathlib import Path
+
+import click
+
+from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.parallel import cores, shared
+from fgbaseline.data.plural import plural
+from fgbaseline.reports.run import job
+
+FAILED = 1
+UNWRAPPED = 120
+"""columns of the table where no terminal says how many there are"""
+
+
+def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
+    """Runs, writes the folder and tells of it; gives the exit code: 1 where an estimator failed, else 0."""
+    job.check_estimators(settings.estimators)
+    sequence = job.read_sequence(settings)
+    place = out or Path("out") / sequence.name
+    require_free(place, force=force, mark=job.MARK)
+    if rerun_file is not None:
+        from fgbaseline.reports.run.rerun import require_rerun
+
+        require_rerun(rerun_file)
+
+    kept, held = job.split(sequence, settings)
+
+    from fgbaseline.reports.progress import reporter
+
+    told = reporter()
+    told.say(
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
+        f"of {plural(sequence.n_landmarks, 'track')}"
+    )
+    if held is not None:
+        told.say(f"{plural(held.n_tracks, 'track')} held out, {plural(len(held.observations), 'observation')}")
+    if settings.preset == "calibrated" and not settings.as_recorded:
+        told.say("diagnosing the recording")
+    with shared(lambda _: job.pose_problem(kept, settings, cores()), 1, cores()) as posed:
+        # Two seconds of imports: bad input is told before, and the diagnosis goes on meanwhile.
+        from fgbaseline.reports.phrases.run import verdict
+        from fgbaseline.reports.run.folder import as_dict, write_run
+        from fgbaseline.reports.tables import print_table
+        from fgbaseline.reports.tables.run import terminal_table
+
+        job.load_estimators(settings.estimators)
+        (problem,) = posed()
+    for sentence in job.to_print_first(problem):
+        click.echo(sentence)
+    run = job.solve(problem, settings, told.estimator, held, cores())
+    for name, result in run.results.items():
+        if not result.answered:
+            told.say(f"{name} failed: {result.estimate.reason}")
+    told.say("writing the report")
+    with whole_folder(place, force=force, mark=job.MARK) as folder:
+        summary = write_run(run, folder, cores())
+        if rerun_file is not None:
+            from fgbaseline.reports.run.rerun import write_rerun
+
+            write_rerun(run, rerun_file)
+    print_table(terminal_table(as_dict(summary)["estimators"], summary.reference.name), width=UNWRAPPED)
+    for sentence in verdict(run):
+        click.echo(sentence)
+    click.echo(f"\nThe report is in {place / 'report.html'}")
+    return 0 if len(run.answered) == len(run.results) else FAILED

@@ -1,0 +1,1 @@
+"""A run: settings, the problem it poses, its solution and the folder that it writes."""

@@ -1,0 +1,158 @@
+"""What a person sees of a diagnosis: a table of findings, what cannot be told, the noise, and a folder if wanted."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from fgbaseline.data import TimeUnit, read
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.plural import plural
+from fgbaseline.diagnosis import (
+    Diagnosis,
+    TrackStatistics,
+    diagnose,
+    findings_of,
+    not_identifiable,
+    repairs_text,
+    to_json,
+    track_statistics,
+)
+from fgbaseline.geometry import InputError
+
+MARK = "diagnosis.json"
+"""the file by which a diagnosis's folder is known"""
+CLEAN, FINDINGS, CANNOT_TELL = 0, 1, 2
+UNWRAPPED = 120
+"""columns of the table where no terminal says how many there are"""
+
+
+def tell(
+    path: Path,
+    out: Path | None,
+    *,
+    as_json: bool,
+    repairs: Path | None,
+    force: bool,
+    time_unit: TimeUnit | None = None,
+) -> int:
+    """Diagnoses a recording and says what was found; gives the exit code."""
+    if force and out is None and repairs is None:
+        raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
+    if out is not None:
+        require_free(out, force=force, mark=MARK)
+    if repairs is not None:
+        _require_writable(repairs, force=force)
+    diagnosis = diagnose(read(path, time_unit=time_unit))
+    tracks = track_statistics(diagnosis)
+    findings = findings_of(diagnosis, tracks)
+    report = to_json(diagnosis, tracks, findings)
+    if out is not None:
+        with whole_folder(out, force=force, mark=MARK) as folder:
+            write(diagnosis, tracks, report, folder)
+    if repairs is not None:
+        with atomic_write(repairs) as file:
+            file.write(repairs_text(diagnosis).encode())
+    if as_json:
+        click.echo(text(report), nl=False)
+    else:
+        _print(diagnosis, findings)
+        if out is not None:
+            click.echo(f"\nThe evidence is in {out}")
+        if repairs is not None:
+            click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
+    if diagnosis.cannot_tell:
+        return CANNOT_TELL
+    return FINDINGS if findings else CLEAN
+
+
+def _require_writable(file: Path, *, force: bool) -> None:
+    if file.exists() and not force:
+        raise InputError(f"{file}: the file exists; choose another, or replace it with --force")
+    if file.exists() and not file.is_file():
+        raise InputError(f"{file}: this is no file; give the name of one")
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: there is no folder {file.parent}; make it, or choose another place")
+
+
+def write(diagnosis: Diagnosis, tracks: TrackStatistics, report: dict[str, Any], folder: Path) -> None:
+    """diagnosis.json and the figures, into an existing, empty folder."""
+    from fgbaseline.reports import figures
+
+    (folder / "figures").mkdir()
+    figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
+    (folder / MARK).write_text(text(report), encoding="utf-8")
+
+
+def text(report: dict[str, Any]) -> str:
+    """The file, to the byte the same for the same diagnosis."""
+    return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
+    sequence = diagnosis.sequence
+    click.echo(
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
+        f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
+    )
+    if diagnosis.cannot_tell:
+        click.echo(f"Nothing can be found out about its velocities: {diagnosis.cannot_tell}.")
+    if findings:
+        _table(findings)
+    elif not diagnosis.cannot_tell:
+        click.echo("Nothing wrong was found.")
+    unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
+    if unknown:
+        click.echo("\nNot identifiable in this recording:")
+        for sentence in unknown:
+            click.echo(f"- {sentence}")
+    if diagnosis.fit is not None:
+        click.echo(f"\n{noise(diagnosis)}")
+
+
+def noise(diagnosis: Diagnosis) -> str:
+    """The noise that was found, in a sentence."""
+    fit = diagnosis.fit
+    assert fit is not None
+    sigma = fit.sigmas
+    told = (
+        f"Noise (one sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity held "
+        f"over an interval, {sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
+    )
+    if fit.inflation.pixel > 1.0:
+        told += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"
+    if fit.inflation.velocity > 1.0:
+        told += f"; velocities {fit.inflation.velocity:.1f} times what single intervals show, because their errors last"
+    return told + ")."
+
+
+def _table(findings: tuple[Finding, ...]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0))
+    for title in ("finding", "what was found", "before", "after"):
+        table.add_column(title, justify="right" if title in ("before", "after") else "left", overflow="fold")
+    for f in findings:
+        sentence = f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"
+        table.add_row(f.code, sentence, *figures_of(f))
+    console = Console()
+    Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False).print(table)
+
+
+def figures_of(finding: Finding) -> tuple[str, str]:
+    """Before and after, the unit with the first."""
+    before, after = (_number(value, finding.unit) for value in (finding.before, finding.after))
+    return before, after
+
+
+def _number(value: float, unit: str) -> str:
+    if unit.startswith("share"):
+        return f"{value:.1%}"
+    if unit in ("m/s", "rad/s"):
+        return f"{value:.3g} {unit}"
+    return f"{value:,.4g}" if abs(value) < 1e4 else f"{value:,.0f}"

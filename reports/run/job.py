@@ -1,0 +1,177 @@
+"""The main job: from a recording and the user's wishes to a run that can be reported."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from fgbaseline.data import (
+    HeldOut,
+    LandmarkMode,
+    Problem,
+    Sequence,
+    TimeUnit,
+    documented,
+    estimator_names,
+    find_estimator,
+    read,
+)
+from fgbaseline.data.finding import OF_THE_FILE
+from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.problem.documented import DEFAULT_FEATURES
+from fgbaseline.data.solving import Watch, solve_all, unwatched
+from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
+from fgbaseline.diagnosis.conventions.units import evidence
+from fgbaseline.geometry import InputError
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Run
+
+
+FEW_TRUE = 0.5
+"""share of frames with truth, below which a run says so first"""
+MARK = "summary.json"
+"""the file by which a run's folder is known"""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What the user asked for."""
+
+    sequence: Path | None = None
+    """None for the simulated drive"""
+    preset: Literal["calibrated", "documented"] = "calibrated"
+    estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+    features: int | Literal["all"] | None = None
+    """None for the preset's default"""
+    landmarks: LandmarkMode = LandmarkMode.UPDATED
+    truth: Path | None = None
+    truth_frame: BodyFrame | None = None
+    seed: int = 0
+    as_recorded: bool = False
+    """take the recording as it is: no diagnosis, no repairs, assumed noise"""
+    time_unit: TimeUnit | None = None
+    """of the recording's stamps; None to find it out"""
+    held_out: float = 0.0
+    """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
+    repairs: Path | None = None
+    """TOML file of what is set by hand in place of what the diagnosis finds"""
+
+    def record(self) -> dict[str, str | int | float | bool | None]:
+        """The settings as `summary.json` has them."""
+        return {
+            "sequence": None if self.sequence is None else str(self.sequence),
+            "preset": self.preset,
+            "estimators": ",".join(self.estimators),
+            "features": self.features or (DEFAULT_FEATURES if self.preset == "documented" else "all"),
+            "landmarks": str(self.landmarks),
+            "truth": None if self.truth is None else str(self.truth),
+            "truth_frame": self.truth_frame,
+            "seed": self.seed,
+            "as_recorded": self.as_recorded,
+            "time_unit": None if self.time_unit is None else str(self.time_unit),
+            "held_out": self.held_out,
+            "repairs": None if self.repairs is None else str(self.repairs),
+        }
+
+
+def check_estimators(names: tuple[str, ...]) -> None:
+    """Raises InputError for no name, an unknown one, or one given twice."""
+    installed = estimator_names()
+    if not names:
+        raise InputError(f"estimators: name at least one of {', '.join(installed)}")
+    for name in names:
+        if name not in installed:
+            raise InputError(f"estimators: there is no '{name}'; installed are {', '.join(installed)}")
+        if names.count(name) > 1:
+            raise InputError(f"estimators: '{name}' is named twice; name it once")
+        if "/" in name or "\\" in name or name.startswith("."):
+            raise InputError(f"estimators: '{name}' can be no file's name; register it under another")
+
+
+def load_estimators(names: tuple[str, ...]) -> None:
+    """Imports them beforehand; one that cannot be imported says so when its turn comes."""
+    for name in names:
+        with suppress(Exception):
+            find_estimator(name)
+
+
+def read_sequence(settings: RunSettings) -> Sequence:
+    """The recording, with its truth; raises InputError."""
+    if settings.sequence is None:
+        if settings.time_unit is not None:
+            raise InputError(
+                "time-unit: the simulated drive has its stamps in seconds; give a SEQUENCE with --time-unit"
+            )
+        if settings.truth is not None or settings.truth_frame is not None:
+            raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
+        from fgbaseline.data.simulate import Simulation, simulate
+
+        return simulate(Simulation(seed=settings.seed))
+    if settings.truth is not None and settings.truth_frame is None:
+        raise InputError(
+            f"truth: {settings.truth} may have the poses of either body; add --truth-frame camera or --truth-frame imu"
+        )
+    if settings.truth is None and settings.truth_frame is not None:
+        raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
+    return read(settings.sequence, settings.truth, settings.truth_frame, settings.time_unit)
+
+
+def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
+    """The recording that diagnosis and estimators see, and the tracks held out; raises InputError."""
+    return hold_out(sequence, settings.held_out, settings.seed) if settings.held_out != 0.0 else (sequence, None)
+
+
+def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) -> Problem:
+    """The problem that the preset makes of a recording, `processes` sharing its diagnosis; raises InputError."""
+    if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
+        why = "--as-recorded" if settings.as_recorded else "the documented preset"
+        raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
+    if len(sequence.observations) and (reason := unusable(sequence)):
+        raise InputError(f"{sequence.source}: features: {reason}")
+    if settings.as_recorded or settings.preset == "documented":
+        _require_units(sequence)
+    repairs = None if settings.repairs is None else read_repairs(settings.repairs)
+    features = None if settings.features == "all" else settings.features
+    if settings.preset == "documented":
+        if settings.features is None:
+            features = DEFAULT_FEATURES
+        return documented(sequence, features, settings.landmarks)
+    taken = Calibration() if settings.as_recorded else None
+    return calibrated(sequence, features, settings=taken, repairs=repairs, processes=processes)
+
+
+def to_print_first(problem: Problem) -> list[str]:
+    """What a run says before anything else: faults of the file itself, and a truth of few frames."""
+    said = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
+    truth = problem.sequence.truth
+    if truth is not None and truth.known.mean() < FEW_TRUE:
+        said += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]
+    return said
+
+
+def _require_units(sequence: Sequence) -> None:
+    """Raises InputError for a recording in other units than SI where nothing is to be repaired."""
+    units = known_units(sequence)
+    if units.doubt:
+        raise InputError(f"{sequence.source}: {units.doubt}")
+    wrong = [finding.sentence.rstrip(".").split("; multiplied")[0] for finding in unit_findings(units, sequence)]
+    if wrong:
+        raise InputError(
+            f"{sequence.source}: {'. '.join(wrong)} ({evidence(units)}). Taken as recorded, this is another motion; "
+            "convert the file, or run it with --preset calibrated and without --as-recorded, which repairs it"
+        )
+
+
+def solve(
+    problem: Problem,
+    settings: RunSettings,
+    watch: Watch = unwatched,
+    held: HeldOut | None = None,
+    processes: int = 1,
+) -> "Run":
+    """All estimators on the problem, one after another, and their comparison, which `processes` share."""
+    from fgbaseline.compare.estimate_comparison import compare_all
+
+    answers = solve_all(problem, settings.estimators, watch)
+    return compare_all(problem, answers, settings.record(), held, processes)
