@@ -1,5 +1,5 @@
 """Problems: their definition, the `documented` preset, and the noise over gaps between frames."""
 
-from .definition import Excluded, LandmarkMode, LandmarkPrior, NoiseSettings, Problem
+from .definition import WRONG_MATCH, Excluded, LandmarkMode, LandmarkPrior, NoiseSettings, Problem
 
-__all__ = ["Excluded", "LandmarkMode", "LandmarkPrior", "NoiseSettings", "Problem"]
+__all__ = ["WRONG_MATCH", "Excluded", "LandmarkMode", "LandmarkPrior", "NoiseSettings", "Problem"]

@@ -35,6 +35,10 @@ class Excluded(IntEnum):
     """a copy of the frame before: it was never tracked"""
 
 
+WRONG_MATCH = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
+"""Reasons that say that a match is wrong, that its point moved, or that the velocities that predict it are wrong."""
+
+
 class LandmarkMode(StrEnum):
     """Treatment of landmarks in the documented SLAM, which can be read either way."""
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare import evaluated_rows, track_chi_square
 from fgbaseline.data import Excluded, Problem
+from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 
 from .over_time import Panel, over_time, time_axis
@@ -19,8 +20,6 @@ from .style import GRAY, GREEN, SCREEN, Style, head, sheet, swatch
 
 NEAR = 3.0
 """px: what the tables count as explained"""
-WRONG = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
-"""reasons that say a match is wrong, its point not static, or the velocities wrong that carry the track along"""
 COARSE = (Excluded.DISPARITY, Excluded.SHORT)
 """reasons that say a match determines little"""
 BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
@@ -137,7 +136,7 @@ def medians_by_class(
 def matches_by_frame(problem: Problem) -> dict[str, FloatArray]:
     """(T,) numbers of matches of each frame in the problem, too coarse, and contradicting, by the names of BANDS."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
-    reasons = [(Excluded.NO,), COARSE, WRONG]
+    reasons = [(Excluded.NO,), COARSE, WRONG_MATCH]
     return {
         name: np.bincount(frame[np.isin(excluded, reason)], minlength=problem.n_frames).astype(np.float64)
         for name, reason in zip(BANDS, reasons, strict=True)

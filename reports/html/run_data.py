@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from fgbaseline.compare import chi_square_bounds, reprojection_by
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, Excluded, Problem
+from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
-from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.figures.view import TopView
 from fgbaseline.reports.phrases.run_accuracy import compared, departure, far
 
@@ -284,7 +284,7 @@ def _jumps(run: Run) -> list[dict[str, Any]]:
 def _most_excluded(problem: Problem) -> int | None:
     """The frame around which, for a second, the largest share of matches was found wrong; None where none was."""
     frame, T = problem.sequence.observations.frame, problem.n_frames
-    wrong = np.bincount(frame[np.isin(problem.excluded, (*WRONG, Excluded.COPIED))], minlength=T)
+    wrong = np.bincount(frame[np.isin(problem.excluded, (*WRONG_MATCH, Excluded.COPIED))], minlength=T)
     every = np.bincount(frame[problem.excluded != Excluded.FEATURE_NOT_CHOSEN], minlength=T)
     if not wrong.any():
         return None

@@ -6,18 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline.compare import (
-    MIN_COVERAGE,
-    MIN_SAMPLE_SIZE,
     CovarianceState,
     Verdict,
     divergence_summary,
     held_out_ranking,
-    is_insufficient,
     reprojection_summary,
 )
-from fgbaseline.compare.estimate_comparison import Run, frames_in_words, known, of_truth, same_frames, share_of_time
+from fgbaseline.compare.estimate_comparison import Run, frames_in_words, known, same_frames, share_of_time
 from fgbaseline.data import Status
-from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM
 from fgbaseline.reports.formatting import counted, listed, number, per_cent
 from fgbaseline.reports.phrases.run_accuracy import (
     AROUND,
@@ -25,6 +21,7 @@ from fgbaseline.reports.phrases.run_accuracy import (
     compared,
     departure,
     far,
+    little_truth_sentences,
     nearest_sentences,
     same_graph,
     truth_sentences,
@@ -32,18 +29,8 @@ from fgbaseline.reports.phrases.run_accuracy import (
     wrong_share,
 )
 
-
-def little_truth_sentences(run: Run) -> list[str]:
-    """That the truth is too little to judge by, where it is."""
-    sample = of_truth(run)
-    if sample is None or not is_insufficient(sample, MIN_SAMPLE_SIZE, MIN_COVERAGE):
-        return []
-    n = int(sample["n"])
-    return [
-        f"Too little truth to judge by: {number(n)} of {number(run.problem.n_frames)} frames "
-        f"{'has' if n == 1 else 'have'} one, over {per_cent(sample['coverage'])} of the recording's time; "
-        f"fgbaseline check asks for {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}."
-    ]
+DEGREES_OF_FREEDOM = 6
+"""of a pose"""
 
 
 def coverage_sentences(run: Run) -> list[str]:

@@ -11,13 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
-from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare import (
+    MIN_COVERAGE,
+    MIN_SAMPLE_SIZE,
+    PairedRanking,
+    RmseDifference,
+    divergence_summary,
+    is_insufficient,
+    paired_ranking,
+    rmse_difference,
+)
+from fgbaseline.compare.estimate_comparison import Result, Run, of_truth
 from fgbaseline.data import Problem
+from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.formatting import listed, number, per_cent
-from fgbaseline.reports.phrases.run import little_truth_sentences
 
 FAR = 5.0
 """m, at most"""
@@ -66,7 +74,7 @@ def departure(run: Run, result: Result) -> Departure | None:
 
 def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | None:
     """Share of the matches of the chosen frames (T,) that the mask excluded as wrong; None without mask or match."""
-    wrong = np.isin(problem.excluded, WRONG)
+    wrong = np.isin(problem.excluded, WRONG_MATCH)
     there = frames[problem.sequence.observations.frame]
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
 
@@ -85,7 +93,7 @@ def worst_second(problem: Problem) -> WrongSecond | None:
 
     Only seconds that have a frame are looked at: a span in nanoseconds has a billion others between two of them.
     """
-    wrong = np.isin(problem.excluded, WRONG)
+    wrong = np.isin(problem.excluded, WRONG_MATCH)
     if not wrong.any():
         return None
     t, frame = problem.sequence.t, problem.sequence.observations.frame
@@ -130,6 +138,19 @@ def divergence_rmse(result: Result) -> float:
 def claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
     """Whether a larger RMSE may be called so: the bootstrap settles the sign, and the two do not read the same."""
     return difference.settled and difference.value > 0.0 and larger > smaller and number(larger) != number(smaller)
+
+
+def little_truth_sentences(run: Run) -> list[str]:
+    """That the truth is too little to judge by, where it is."""
+    sample = of_truth(run)
+    if sample is None or not is_insufficient(sample, MIN_SAMPLE_SIZE, MIN_COVERAGE):
+        return []
+    n = int(sample["n"])
+    return [
+        f"Too little truth to judge by: {number(n)} of {number(run.problem.n_frames)} frames "
+        f"{'has' if n == 1 else 'have'} one, over {per_cent(sample['coverage'])} of the recording's time; "
+        f"fgbaseline check asks for {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}."
+    ]
 
 
 def truth_sentences(run: Run) -> list[str]:

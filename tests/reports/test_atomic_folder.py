@@ -116,7 +116,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, when: str, which: int
 ) -> None:
     written(tmp_path / "out", "old")
-    monkeypatch.setattr("fgbaseline.reports.whole_folder.exchanged", lambda *_: False)
+    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder.exchanged", lambda *_: False)
     rename, calls = Path.rename, 0
 
     def failing(self: Path, target: Path) -> Path:

@@ -13,7 +13,7 @@ from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.solving import solve_all
-from fgbaseline.ekf import slam
+from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
@@ -83,13 +83,13 @@ def test_one_run_of_it_holds(quick: Quick) -> None:
 
 def pose_jacobian(patch: pytest.MonkeyPatch) -> None:
     """Of the pixels by the pose, equation 13."""
-    right = slam.pose_innovation
+    right = decoupled_ekf.pose_innovation
 
     def wrong(*arguments: Any) -> PoseInnovation:
         innovation = right(*arguments)
         return innovation._replace(jacobian=-innovation.jacobian)
 
-    patch.setattr(slam, "pose_innovation", wrong)
+    patch.setattr(decoupled_ekf, "pose_innovation", wrong)
 
 
 def camera_jacobian(patch: pytest.MonkeyPatch) -> None:

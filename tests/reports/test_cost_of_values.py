@@ -10,10 +10,10 @@ import pytest
 from fgbaseline import diagnosis
 from fgbaseline.data import Problem, read_problem
 from fgbaseline.data.exchange import write_problem
+from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.figures.panels import moving_sum
-from fgbaseline.reports.figures.reprojection import WRONG
 from fgbaseline.reports.phrases.run_accuracy import worst_second
 
 from ..builders.commands import fgbaseline
@@ -101,7 +101,7 @@ def test_the_worst_second_is_the_one_with_the_largest_share_of_wrong_matches() -
     problem = matched(drive(wrong=0.05))
     frame = problem.sequence.observations.frame
     second = np.floor(problem.sequence.t - problem.sequence.t[0])[frame]
-    wrong = np.isin(problem.excluded, WRONG)
+    wrong = np.isin(problem.excluded, WRONG_MATCH)
     shares = {s: float(wrong[second == s].mean()) for s in np.unique(second)}
     found = worst_second(problem)
     assert found is not None

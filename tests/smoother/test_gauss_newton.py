@@ -13,8 +13,9 @@ from fgbaseline.data import HuberKernel
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
-from fgbaseline.smoother.batch.full_graph import full_graph, values_at
+from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gauss_newton import compact_graph, gauss_newton
+from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
 from fgbaseline.smoother.graph.keys import AUXILIARY_POSE
 from fgbaseline.smoother.initialization.initial_values import initial_landmarks
 from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
@@ -76,7 +77,7 @@ def test_steps_from_far_off_end_at_the_minimum_or_say_that_they_do_not() -> None
     batch = smoother.batch(problem)
     graph, path = full_graph(problem), dead_reckoned_path(problem.increment, problem.initial_pose)
     along = initial_landmarks(problem, path)
-    start = values_at(path, replace(along, position=path[-1, :3, 3] + 1.2 * (along.position - path[-1, :3, 3])))
+    start = values_from_state(path, replace(along, position=path[-1, :3, 3] + 1.2 * (along.position - path[-1, :3, 3])))
     lowest = cost(problem, batch, batch.used)
     assert graph.error(start) > 100.0 * lowest
     end = gauss_newton(graph, start)
