@@ -179,7 +179,7 @@ def test_a_missing_value_is_a_dash_whose_reason_stands_below() -> None:
     table = main_table(run, as_dict(run)["estimators"])
     (missing,) = [cell for row in table.rows for cell in row.cells if cell.note]
     assert missing.text == "–"
-    assert table.notes == [(missing.note, "it gives no covariance")]
+    assert list(table.notes) == [(missing.note, "it gives no covariance")]
     assert "it gives no covariance." in Elements(rendered(run)).text
 
 

@@ -8,7 +8,7 @@ from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.formatting import number
-from fgbaseline.reports.phrases import run as verdict
+from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.phrases.run_accuracy import departure
 
 from ..builders.reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
