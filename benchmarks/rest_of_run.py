@@ -49,8 +49,10 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
 
     with watch("imports"):
         from fgbaseline.data.forks import cores, shared
-        from fgbaseline.reports import job
-        from fgbaseline.reports.cli import progress  # noqa: F401
+        from fgbaseline.reports import (
+            job,
+            progress,  # noqa: F401
+        )
     settings = job.RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = job.read_sequence(settings)

@@ -32,7 +32,7 @@ def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_fi
 
     kept, held = job.split(sequence, settings)
 
-    from .progress import reporter
+    from ..progress import reporter
 
     told = reporter()
     told.say(

@@ -1,22 +1,17 @@
-"""The page of a reproduction: one file that opens offline."""
+"""The page of a reproduction, one file that opens offline, and the table of its claims."""
 
 from collections.abc import Mapping
 from collections.abc import Sequence as Several
 from dataclasses import replace
-from importlib.resources import files
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fgbaseline.data.plural import plural
-
-from ..formatting import number
-from ..html.environment import Picture, picture
-from .claim import Claim, Verdict
-from .measures import metres, per_cent
+from ..formatting import meters, number, per_cent
+from ..html.environment import environment, picture
+from ..phrases.reproduction import CAUSES, SWEEP, sentences
+from ..tables import Cell, Column, Row, Table
+from .claims import Claim, Verdict
 from .study import Study
-from .trial import Outcome
 
 BADGES: Mapping[str, str] = {
     Verdict.HOLDS: "trusted",
@@ -24,73 +19,61 @@ BADGES: Mapping[str, str] = {
     Verdict.FALSE: "untrusted",
     Verdict.CANNOT_TELL: "",
 }
-"""the house's colours for good, fair and poor"""
+"""the house's colors for good, fair and poor"""
+STAGES = (
+    Column("put right", words=True),
+    Column("from dead reckoning, RMS"),
+    Column("largest"),
+    Column("reprojection", unit="px"),
+    Column("behind the camera"),
+    Column("frames lost"),
+    Column("an update moves a frame by"),
+)
+FROM_TRUTH = Column("from the truth, RMS")
 
 
 def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str, Figure]) -> str:
     """`report.html`. All text that comes from files is escaped."""
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
     return (
-        _environment()
-        .get_template("reproduce.html")
+        environment()
+        .get_template("reproduction.html")
         .render(
-            css=Markup(files("fgbaseline.reports.html").joinpath("report.css").read_text(encoding="utf-8")),
             studies=studies,
             claims=claims,
             badges=BADGES,
-            sentences=[sentence for study in studies for sentence in verdict(study)],
+            verdict=[sentence for study in studies for sentence in sentences(study)],
             numbered=[p for name, p in pictures.items() if name.startswith("figure_")],
             others=[p for name, p in pictures.items() if not name.startswith(("figure_", "causes_", "sweep"))],
-            sweep=_told(pictures["sweep"], SWEEP),
-            causes=[_told(p, CAUSES) for name, p in pictures.items() if name.startswith("causes_")],
+            sweep=replace(pictures["sweep"], caption=SWEEP),
+            causes=[replace(p, caption=CAUSES) for name, p in pictures.items() if name.startswith("causes_")],
+            stages=[_stages(study) for study in studies],
         )
     )
 
 
-SWEEP = (
-    "Landmarks updated in turn with the pose, W as in the report. Numbers in the fields: RMS distance from dead "
-    "reckoning, and at how many frames the covariance as printed is lost; the darker, the farther. Below, the filter "
-    "of figure 9 with one cause after another put right; 'behind' are observations of points that end up behind the "
-    "camera."
-)
-CAUSES = "Each panel keeps the repairs of the one before. Distances are RMS from the dead reckoning beside it."
-
-
-def verdict(study: Study) -> list[str]:
-    """What was found on a recording, in two sentences."""
-    label, now, then = study.subject.label, study.recorded, study.repaired
-    first = (
-        f"{label}: the documented filter with {now.features} features and V = {now.settings.pixel_variance:g} I is "
-        f"{_state(now)}."
+def claims_table(claims: Several[Claim]) -> Table:
+    """The claims by recording, as the terminal shows them."""
+    rows = (
+        Row(
+            f"{claim.recording} (simulated)" if claim.simulated else claim.recording,
+            (Cell(claim.claim), Cell(claim.verdict), Cell(claim.measured)),
+        )
+        for claim in claims
     )
-    if not study.causes:
-        return [first, f"{label}: nothing was found that could be repaired."]
-    return [first, f"{label}, repaired ({'; '.join(study.causes)}): it is {_state(then)}."]
+    columns = tuple(Column(title, words=True) for title in ("the report says", "verdict", "measured"))
+    return Table(columns, tuple(rows), name="recording")
 
 
-def _state(outcome: Outcome) -> str:
-    lost = (
-        f", its covariance as printed lost at {plural(outcome.lost, 'frame')}"
-        if outcome.lost
-        else ", no covariance lost"
-    )
-    return (
-        f"{metres(outcome.apart_rmse)} (RMS) from dead reckoning with a median reprojection error of "
-        f"{outcome.reprojection:.3g} px{lost}"
-    )
-
-
-def _told(shown: Picture, caption: str) -> Picture:
-    return replace(shown, caption=caption)
-
-
-def _environment() -> Environment:
-    jinja = Environment(
-        loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    jinja.filters |= {"number": number, "metres": metres, "per_cent": per_cent}
-    return jinja
+def _stages(study: Study) -> Table:
+    """The documented filter after each repair of a recording."""
+    truth = study.subject.studied.truth is not None
+    rows = []
+    for staged in study.staged:
+        o = staged.outcome
+        texts = [staged.stage.cause or "–", meters(o.apart_rmse), meters(o.apart_max), number(o.reprojection)]
+        texts += [per_cent(o.behind), number(o.lost), meters(o.correction_m)]
+        texts += [meters(o.truth_rmse)] if truth else []
+        rows.append(Row(staged.stage.name, tuple(map(Cell, texts))))
+    columns = (*STAGES, FROM_TRUTH) if truth else STAGES
+    return Table(columns, tuple(rows), name="stage", title=study.subject.label)

@@ -7,7 +7,7 @@ from ..figures.lettering import plain
 from ..figures.style import WIDTH, head
 from ..figures.view import TopView
 from ..figures.window import common_window
-from .measures import metres
+from ..formatting import meters
 from .plots import ENDS, PATH
 from .study import Study
 from .trial import pose
@@ -41,7 +41,7 @@ def stages_figure(study: Study) -> Figure:
         axes.set_aspect("equal", adjustable="box")
         axes.set_xlim(middle[0] - 0.5 * width, middle[0] + 0.5 * width)
         axes.set_ylim(middle[1] - 0.5 * height, middle[1] + 0.5 * height)
-        axes.set_title(f"{staged.stage.name}: {metres(staged.outcome.apart_rmse)}", fontsize=9)
+        axes.set_title(f"{staged.stage.name}: {meters(staged.outcome.apart_rmse)}", fontsize=9)
         axes.tick_params(labelsize=7)
     for axes in panels[len(study.staged) :]:
         axes.set_visible(False)

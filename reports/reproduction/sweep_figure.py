@@ -14,9 +14,9 @@ from fgbaseline.data.plural import plural
 
 from ..figures.lettering import plain
 from ..figures.style import WIDTH, head
-from .measures import metres, path_length
+from ..formatting import meters
 from .study import Study
-from .trial import Outcome
+from .trial import Outcome, path_length
 
 BROKEN = "#b3261e"
 COLOURS = colormaps["cividis_r"]
@@ -86,7 +86,7 @@ def _map(axes: Axes, study: Study, outcomes: Several[Outcome]) -> None:
 def _told(outcome: Outcome) -> str:
     if outcome.status is Status.FAILED:
         return "stops"
-    return metres(outcome.apart_rmse) + (f"\n{plural(outcome.lost, 'frame')}" if outcome.lost else "")
+    return meters(outcome.apart_rmse) + (f"\n{plural(outcome.lost, 'frame')}" if outcome.lost else "")
 
 
 def _bars(axes: Axes, study: Study) -> None:
@@ -105,7 +105,7 @@ def _bars(axes: Axes, study: Study) -> None:
     for row, staged in zip(rows, study.staged, strict=True):
         o = staged.outcome
         lost = f", lost at {plural(o.lost, 'frame')}" if o.lost else ""
-        text = f" {metres(o.apart_rmse)}, {o.reprojection:.3g} px median, {100 * o.behind:.2g} % behind{lost}"
+        text = f" {meters(o.apart_rmse)}, {o.reprojection:.3g} px median, {100 * o.behind:.2g} % behind{lost}"
         x = o.apart_rmse if np.isfinite(o.apart_rmse) else min(finite) / 3.0
         axes.text(x, row, text, va="center", fontsize=8, color=BROKEN if o.breaks else "#222222")
     shown = study.recorded.settings

@@ -44,7 +44,7 @@ def test_a_recording_that_cannot_be_read_is_told_before_its_analysis_is_imported
 
 
 def test_a_run_imports_no_package_that_only_other_commands_need() -> None:
-    whole = "fgbaseline.ekf", "fgbaseline.smoother", "fgbaseline.reports.run_folder", "fgbaseline.reports.cli.progress"
+    whole = "fgbaseline.ekf", "fgbaseline.smoother", "fgbaseline.reports.run_folder", "fgbaseline.reports.progress"
     code = f"import sys, {', '.join(whole)}; print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True)
     modules = told.stdout.split()

@@ -1,0 +1,1 @@
+"""Sentences and captions, a module for each kind of result."""
