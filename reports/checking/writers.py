@@ -1,15 +1,99 @@
-"""A check as JUnit XML, which CI systems show as tests: one suite per run, one case per limit and estimator."""
+"""A check on the terminal, in Markdown for a pull request, as JSON and as JUnit XML, which CI systems show as tests."""
 
+import json
+import math
 import re
+from collections.abc import Mapping
+from typing import Any
 from xml.etree import ElementTree
+
+from rich.console import Console
 
 from fgbaseline.compare.limits import Outcome
 
-from .line import Checked, Line
-from .wording import bound, cells
+from ..formatting import md
+from ..phrases.check import bound, remarks, verdict
+from ..results.check import Checked, Line
+from ..tables import markdown as markdown_table
+from ..tables import print_table
+from ..tables.check import cells, check_table, unit_of
+from ..tables.writers import UNWRAPPED
 
+SCHEMA = "fgbaseline/check/1"
+STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.CANNOT_TELL: "yellow", Outcome.FALLS_SHORT: "bold red"}
+SIGNS: Mapping[Outcome, str] = {Outcome.HOLDS: "✅", Outcome.CANNOT_TELL: "❔", Outcome.FALLS_SHORT: "❌"}
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """characters that no XML document may hold"""
+
+
+def print_check(checked: Checked) -> None:
+    """Prints shortages and untrusted references, the table, the reasons, and the verdict."""
+    console = Console()
+    console = Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False)
+    for sentence in [*checked.shortages, *checked.references]:
+        console.print(sentence, markup=False, soft_wrap=True)
+    print_table(check_table(checked), styles=STYLES)
+    for sentence in [*remarks(checked), verdict(checked)]:
+        console.print(sentence, markup=False, soft_wrap=True)
+
+
+def markdown(checked: Checked) -> str:
+    """A heading with the verdict, shortages and untrusted references, the table, and the reasons."""
+    baseline = f"; baseline: {md(checked.baseline)}" if checked.baseline else ""
+    return "\n".join(
+        [
+            f"### Accuracy: {md(verdict(checked))}",
+            "",
+            *(f"> {md(sentence)}\n" for sentence in [*checked.shortages, *checked.references]),
+            markdown_table(check_table(checked, SIGNS)),
+            *(f"- {md(sentence)}" for sentence in remarks(checked)),
+            f"Limits: {md(checked.limits)}{baseline}",
+            "",
+        ]
+    )
+
+
+def as_json(checked: Checked) -> str:
+    """The document: the outcome, where everything came from, and every line with its numbers in full."""
+    document = {
+        "schema": SCHEMA,
+        "exit_code": checked.exit_code,
+        "verdict": verdict(checked),
+        "count": {outcome.value: n for outcome, n in checked.count.items()},
+        "summary": str(checked.measured.path),
+        "limits": checked.limits,
+        "baseline": checked.baseline,
+        "shortages": list(checked.shortages),
+        "references": list(checked.references),
+        "lines": [_line(line) for line in checked.lines],
+    }
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _line(line: Line) -> dict[str, Any]:
+    return {
+        "outcome": line.outcome.value,
+        "run": line.run,
+        "estimator": line.estimator,
+        "metric": line.metric,
+        "unit": unit_of(line.metric),
+        "value": line.value,
+        "at_least": None if line.bounds is None else _finite(line.bounds.at_least),
+        "at_most": None if line.bounds is None else _finite(line.bounds.at_most),
+        "tolerance": line.tolerance,
+        "margin": line.margin,
+        "baseline": line.before,
+        "change": line.change,
+        "reason": line.reason,
+        "missing": line.missing,
+        "sample": None if line.shortage is None else line.shortage.n,
+        "coverage": None if line.shortage is None else line.shortage.coverage,
+        "limit": line.limit,
+    }
+
+
+def _finite(bound: float) -> float | None:
+    return bound if math.isfinite(bound) else None
 
 
 def junit(checked: Checked) -> bytes:
@@ -20,8 +104,8 @@ def junit(checked: Checked) -> bytes:
         suite = ElementTree.SubElement(suites, "testsuite", {"name": _text(run or "trajectories"), **_counts(lines)})
         for line in lines:
             _case(suite, line, checked)
-        if said := [*checked.shortages, *checked.references]:
-            ElementTree.SubElement(suite, "system-out").text = _text("\n".join(said))
+        if sentences := [*checked.shortages, *checked.references]:
+            ElementTree.SubElement(suite, "system-out").text = _text("\n".join(sentences))
     if checked.undecided:
         _reference_suite(suites, checked)
     ElementTree.indent(suites)
@@ -37,10 +121,10 @@ def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
         return
     tag = "failure" if line.outcome is Outcome.FALLS_SHORT else "error"
     texts = cells(line)
-    said = line.reason or f"{texts['value']} is not {texts['bound']}"
-    problem = ElementTree.SubElement(case, tag, type=line.outcome.value, message=_text(f"{line.metric}: {said}"))
-    told = [f"{title}: {text}" for title, text in texts.items()]
-    problem.text = _text("\n".join([*told, f"{checked.limits}, line {line.limit_line}"]))
+    reason = line.reason or f"{texts['value']} is not {texts['bound']}"
+    problem = ElementTree.SubElement(case, tag, type=line.outcome.value, message=_text(f"{line.metric}: {reason}"))
+    texts_of = [f"{title}: {text}" for title, text in texts.items()]
+    problem.text = _text("\n".join([*texts_of, f"{checked.limits}, {line.limit}"]))
 
 
 def _reference_suite(suites: ElementTree.Element, checked: Checked) -> None:

@@ -9,8 +9,8 @@ from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.checking.wording import unit_of
 from fgbaseline.reports.cli import main
+from fgbaseline.reports.tables.check import unit_of
 
 from ..builders.commands import everything_in, fgbaseline
 from ..builders.summaries import estimator, summary, write
@@ -88,7 +88,7 @@ def test_the_junit_file_says_the_same_to_another_reader(document: Any, tmp_path:
     assert bool(everything) == (code != 0)  # a red check is never a green report
     for case, line in zip(cases, lines, strict=True):
         if line["outcome"] == "falls short":
-            assert f"line {line['limit_line']}" in case.result[0].text
+            assert line["limit"] in case.result[0].text
 
 
 def test_names_of_junit_cases_stay_when_the_baseline_moves(tmp_path: Path) -> None:

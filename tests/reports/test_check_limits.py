@@ -14,9 +14,9 @@ from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.evaluation import evaluate
 from fgbaseline.reports.checking.limits_file import Limits, read_limits
-from fgbaseline.reports.checking.line import Checked, Line
-from fgbaseline.reports.checking.measured import read_folder, read_measured
-from fgbaseline.reports.checking.wording import remarks
+from fgbaseline.reports.phrases.check import remarks
+from fgbaseline.reports.results.check import Checked, Line
+from fgbaseline.reports.results.reader import read_folder, read_measured
 
 from ..builders.summaries import estimator, summary, write
 
@@ -115,7 +115,7 @@ def test_errors_that_a_figure_leaves_out_are_counted_beside_it(tmp_path: Path) -
     values["ate"]["missing"] = 60
     result = checked(tmp_path, summary(ekf=values), ATE)
     assert only(result).missing == 60
-    assert remarks(result) == [f"ekf, ate.rmse: 60 errors are missing (NaN) and left out ({result.limits}, line 1)."]
+    assert remarks(result) == [f"ekf, ate.rmse: 60 errors are missing (NaN) and left out ({result.limits}, limit[0])."]
 
 
 def test_a_bound_and_a_baseline_are_two_lines_with_the_change_on_both(tmp_path: Path) -> None:
