@@ -18,8 +18,8 @@ from ..figures.layout import lay_out
 from ..figures.lettering import plain
 from ..figures.palette import colours_of
 from ..figures.style import LETTERS_IN_A_ROW, head, in_style, sheet, swatch
-from .results import METRICS, Metric, Results
-from .tables import cases, costs, records
+from ..results.bench import Results
+from ..tables.bench_statistics import cases, costs, judge, records
 
 MARKS = "osD^vP*Xh<>p"
 MOST_CASES = 12
@@ -44,12 +44,6 @@ def draw(results: Results) -> dict[str, Figure]:
         for figure in drawn.values():
             lay_out(figure)
     return drawn
-
-
-def judge(results: Results) -> Metric | None:
-    """The figure by which accuracy is told: error to truth, else that on held-out tracks, else none."""
-    ranked = (metric for metric in METRICS if metric.ranked)
-    return next((metric for metric in ranked if results.runs[metric.name].notna().any()), None)
 
 
 def accuracy(results: Results) -> Figure | None:

@@ -1,21 +1,32 @@
-"""How workers tell of their progress: through small files on this machine, through events on a Dask cluster."""
+"""Progress of workers, through small files here and through events on a Dask cluster, and its display on stderr."""
 
 import contextlib
 import json
 import os
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from .job import Planned
+from .worker import Outcome
 
 TOPIC = "fgbaseline-bench"
+WHOLE_BENCH = 1e9
+"""s over which the speed of the whole is averaged"""
 INTERVAL = 0.3
-"""s between two tidings of the same work"""
+"""s between two events of the same work"""
 
 
 @dataclass(frozen=True, slots=True)
-class Tiding:
-    """What a worker is doing."""
+class ProgressEvent:
+    """The step that a worker is at."""
 
     worker: str
     key: str
@@ -34,21 +45,21 @@ class FileChannel:
     folder: Path
 
     def __call__(self, key: str, doing: str, done: int, total: int) -> None:
-        """Tells of progress, at most every `INTERVAL`."""
+        """Reports progress, at most every `INTERVAL`."""
         if not _due(key, doing):
             return
         place = self.folder / str(os.getpid())
         partial = place.with_suffix(".partial")
-        with contextlib.suppress(OSError):  # nobody may be listening any more
+        with contextlib.suppress(OSError):  # the folder is gone when the bench has ended
             partial.write_text(json.dumps([key, doing, done, total]))
             partial.replace(place)
 
-    def tidings(self) -> Iterator[Tiding]:
+    def events(self) -> Iterator[ProgressEvent]:
         """The last of each worker."""
         for place in sorted(self.folder.iterdir()):
             if place.suffix == "":
                 with contextlib.suppress(OSError, ValueError):
-                    yield Tiding(place.name, *json.loads(place.read_text()))
+                    yield ProgressEvent(place.name, *json.loads(place.read_text()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +67,7 @@ class EventChannel:
     """Events of a Dask worker, which the scheduler hands on."""
 
     def __call__(self, key: str, doing: str, done: int, total: int) -> None:
-        """Tells of progress, at most every `INTERVAL`."""
+        """Reports progress, at most every `INTERVAL`."""
         if not _due(key, doing):
             return
         from distributed import get_worker
@@ -69,10 +80,108 @@ _last = ("", "", 0.0)
 
 
 def _due(key: str, doing: str) -> bool:
-    """Whether the work is another, or the last tiding of it old enough; then it counts as told."""
+    """Whether the work is another, or the last event of it old enough; then it counts as reported."""
     global _last
     now = time.monotonic()
     if _last[:2] == (key, doing) and now - _last[2] < INTERVAL:
         return False
     _last = (key, doing, now)
     return True
+
+
+class Board(Protocol):
+    """Where progress is shown."""
+
+    def look(self, events: Iterable[ProgressEvent], /) -> None:
+        """Takes the events of the workers."""
+        ...
+
+    def done(self, outcome: Outcome, /) -> None:
+        """A job has ended."""
+        ...
+
+
+class LineBoard:
+    """For a file or a pipe: a line for every job that has ended."""
+
+    def __init__(self, jobs: Mapping[str, Planned]) -> None:
+        self._jobs, self._start = jobs, time.monotonic()
+        self._work = sum(planned.work for planned in jobs.values())
+        self._worked, self._ended = 0.0, 0
+
+    def look(self, events: Iterable[ProgressEvent]) -> None:
+        """Shows nothing."""
+
+    def done(self, outcome: Outcome) -> None:
+        """A line, with the time left by the work that is done."""
+        planned = self._jobs[outcome.key]
+        self._worked, self._ended = self._worked + planned.work, self._ended + 1
+        left = (time.monotonic() - self._start) * (self._work / self._worked - 1.0) if self._worked else 0.0
+        about = f", about {duration(left)} left" if self._ended < len(self._jobs) else ""
+        print(
+            f"{self._ended} of {len(self._jobs)}{about}: {summary_line(planned, outcome)}", file=sys.stderr, flush=True
+        )
+
+
+class BarBoard:
+    """For a terminal: a bar for the whole, and one for each worker."""
+
+    def __init__(
+        self, jobs: Mapping[str, Planned], whole: Progress, each: Progress, say: Callable[[str], None]
+    ) -> None:
+        self._jobs, self._whole, self._each, self._say = jobs, whole, each, say
+        self._ended = 0
+        self._task = whole.add_task(self._count(), total=sum(planned.work for planned in jobs.values()))
+        self._rows: dict[str, tuple[TaskID, str]] = {}
+
+    def _count(self) -> str:
+        return f"{self._ended} of {len(self._jobs)} runs"
+
+    def look(self, events: Iterable[ProgressEvent]) -> None:
+        """Moves the bars of the workers."""
+        for event in events:
+            name = self._jobs[event.key].name if event.key in self._jobs else ""
+            text = f"  {name}: {event.doing}" if name else "  waiting"
+            row, before = self._rows.get(event.worker, (None, ""))
+            if row is None:
+                row = self._each.add_task(text, total=None)
+            elif before != text:
+                self._each.reset(row, total=None, description=text)
+            self._rows[event.worker] = (row, text)
+            self._each.update(row, completed=event.done, total=event.total or None)
+
+    def done(self, outcome: Outcome) -> None:
+        """A line above the bars for one that failed; moves the bar of the whole."""
+        planned = self._jobs[outcome.key]
+        self._ended += 1
+        self._whole.update(self._task, advance=planned.work, description=self._count())
+        if outcome.failure:
+            self._say(summary_line(planned, outcome))
+
+
+def summary_line(planned: Planned, outcome: Outcome) -> str:
+    """The outcome of a job in a line."""
+    return f"{planned.name}: " + (f"failed: {outcome.failure}" if outcome.failure else duration(outcome.seconds))
+
+
+def duration(seconds: float) -> str:
+    """Such as `3.2 s`, `12 min` or `3.4 h`."""
+    if seconds < 100.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.2g} min" if seconds < 6000.0 else f"{seconds / 3600.0:.2g} h"
+
+
+@contextmanager
+def board(jobs: Mapping[str, Planned]) -> Iterator[Board]:
+    """The one that fits standard error, for the jobs by key that are still to be done."""
+    if not sys.stderr.isatty():
+        yield LineBoard(jobs)
+        return
+    from rich.console import Group
+    from rich.live import Live
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    whole, each = Progress(*columns, console=console, speed_estimate_period=WHOLE_BENCH), Progress(*columns)
+    with Live(Group(whole, each), console=console, refresh_per_second=4):
+        yield BarBoard(jobs, whole, each, lambda text: console.print(text, markup=False, highlight=False))

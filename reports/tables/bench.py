@@ -1,133 +1,153 @@
-"""The main table as people read it: every case by estimator, the best of a case marked."""
+"""The tables of a bench: every case by estimator, rankings, mean ranks over cases, and the runs."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from itertools import groupby
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from ..formatting import interval, number
-from .results import METRICS, Results
-from .tables import cases, consistency, costs, records
+from fgbaseline.compare.limits import Better
+
+from ..formatting import counted, interval, number
+from ..results.bench import Results
+from .bench_statistics import METRICS, cases, consistency, costs, overall, rankings, records
+from .table import Cell, Column, Row, Table, Value, compared
 
 Key: TypeAlias = tuple[str, str]
 """case and estimator"""
-LESS_IS_BEST = ("ate", "held_out", "divergence", "reprojection", "reprojection_common", "seconds")
-MORE_IS_BEST = ("under_3px",)
+Rows: TypeAlias = Mapping[Key, Mapping[str, Any]]
 WITH_INTERVAL = ("ate", "held_out", "divergence")
-ELSEWHERE = ("nees", "nees_reference")
-"""metrics that only the files have: for the page there is the ANEES"""
+IN_FILES_ALONE = ("nees", "nees_reference")
+"""metrics that only the files have: the page has the ANEES"""
 ANEES = {"too sure": " ↑", "too cautious": " ↓"}
-COST_COLUMNS = (("seconds", "time, s"), ("memory_mb", "peak memory, MB"))
-CAPTION = (
-    "Means over the runs of a case; of errors in m and of held-out tracks with 95 % intervals where there are several "
-    "runs (Student's t). Error to truth after SE(3) alignment (RMSE); divergence from the reference of each run (RMSE);"
-    " both over the frames that all estimators of a run have; coverage is the share of the time in which an estimator "
-    "has poses. Reprojection is the median over all observations, 'of common' over those that every estimator used. "
-    "ANEES: 6 is consistent; ↑ marks estimators that are surer than they may be, ↓ those less sure, by chi-square at "
-    "95 %. Best of a case in bold."
-)
+COSTS = {
+    "seconds": Column("time", unit="s", better=Better.LOWER),
+    "memory_mb": Column("peak memory", unit="MB"),
+}
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """An estimator in a case."""
-
-    case: str
-    estimator: str
-    cells: tuple[str, ...]
-    best: tuple[bool, ...]
-    reason: str
-    """why there is no cell at all"""
-    reference: bool
-
-    @property
-    def name(self) -> str:
-        """The estimator, and whether it is the reference."""
-        return f"{self.estimator} (reference)" if self.reference else self.estimator
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """A table in words."""
-
-    headings: tuple[str, ...]
-    rows: tuple[Row, ...]
-    caption: str
-
-    @property
-    def by_case(self) -> list[tuple[str, list[Row]]]:
-        """The rows of each case."""
-        return [(case, list(rows)) for case, rows in groupby(self.rows, key=lambda row: row.case)]
-
-
-@dataclass(frozen=True, slots=True)
-class _Column:
-    heading: str
-    cells: Mapping[Key, str]
-    best: frozenset[Key] = frozenset()
-
-
-def main_grid(results: Results, *, with_costs: bool) -> Grid:
-    """Every case by estimator; what a run costs differs from time to time, and stands in it only where asked for."""
+def main_table(results: Results, *, with_costs: bool, caption: str = "") -> Table:
+    """Every case by estimator; costs, which differ from time to time, stand in it only where asked for."""
     table = _by_key(cases(results))
     columns = [*_metrics(table), *_anees(results), *(_costs(results) if with_costs else ())]
     if any(row["failed"] for row in table.values()):
-        columns.append(
-            _Column("answered", {k: f"{row['runs'] - row['failed']} of {row['runs']}" for k, row in table.items()})
-        )
-    references, rows = results.references, []
+        answered = {key: Cell(f"{row['runs'] - row['failed']} of {row['runs']}") for key, row in table.items()}
+        columns.append((Column("answered"), answered))
+    missing, references, rows = Cell(number(None)), results.references, []
     for key, row in table.items():
-        cells = tuple(column.cells.get(key, number(None)) for column in columns)
-        reason = _reason(results, key) if row["failed"] == row["runs"] else ""
-        best = tuple(key in column.best for column in columns)
-        rows.append(Row(*key, cells, best, reason, references.get(key[0]) == key[1]))
-    return Grid(tuple(column.heading for column in columns), tuple(rows), CAPTION)
+        case, name = key
+        failed = row["failed"] == row["runs"]
+        shown = () if failed else tuple(cells.get(key, missing) for _, cells in columns)
+        reason = f"failed: {_reason(results, key)}" if failed else ""
+        rows.append(Row(name, shown, group=case, reason=reason, reference=references.get(case) == name))
+    return Table(tuple(column for column, _ in columns), tuple(rows), caption=caption)
 
 
-def _metrics(table: Mapping[Key, Mapping[str, Any]]) -> Iterator[_Column]:
+def _metrics(table: Rows) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     known = next(iter(table.values()))
     for metric in METRICS:
-        if metric.name not in known or metric.name in ELSEWHERE:
+        if metric.name not in known or metric.name in IN_FILES_ALONE:
             continue
-        bounds = (f"{metric.name}_low", f"{metric.name}_high") if metric.name in WITH_INTERVAL else ("", "")
-        cells = {
-            key: interval(row[metric.name], *(row.get(bound, np.nan) for bound in bounds)) for key, row in table.items()
+        sides = [f"{metric.name}{side}" for side in ("_low", "_high")] if metric.name in WITH_INTERVAL else []
+        values = {
+            key: Value(row[metric.name], *(row.get(side, np.nan) for side in sides)) for key, row in table.items()
         }
-        yield _Column(metric.heading, cells, _best({key: row[metric.name] for key, row in table.items()}, metric.name))
+        yield metric, _cells(metric, values, above_zero=metric.name == "divergence")
 
 
-def _anees(results: Results) -> Iterator[_Column]:
+def _anees(results: Results) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     judged = _by_key(consistency(results))
     if judged:
-        cells = {key: number(row["anees"]) + ANEES.get(row["verdict"], "") for key, row in judged.items()}
-        yield _Column("ANEES", cells)
+        yield (
+            Column("ANEES"),
+            {key: Cell(number(row["anees"]) + ANEES.get(row["verdict"], "")) for key, row in judged.items()},
+        )
 
 
-def _costs(results: Results) -> Iterator[_Column]:
+def _costs(results: Results) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     spent = _by_key(costs(results))
-    for name, heading in COST_COLUMNS:
-        values = {key: float(row[name]) for key, row in spent.items()}
-        if any(np.isfinite(value) for value in values.values()):
-            yield _Column(heading, {key: number(value) for key, value in values.items()}, _best(values, name))
+    for name, column in COSTS.items():
+        values = {key: Value(float(row[name])) for key, row in spent.items()}
+        if any(values.values()):
+            yield column, _cells(column, values)
 
 
-def _best(values: Mapping[Key, float], metric: str) -> frozenset[Key]:
-    """Who is the best of each case; where all are alike or alone, nobody is, nor is the reference nearest to itself."""
-    if metric not in (*LESS_IS_BEST, *MORE_IS_BEST):
-        return frozenset()
-    sign = 1.0 if metric in LESS_IS_BEST else -1.0
-    best: set[Key] = set()
-    for case in {case for case, _ in values}:
-        own = {key: sign * value for key, value in values.items() if key[0] == case and np.isfinite(value)}
-        if metric == "divergence":
-            own = {key: value for key, value in own.items() if value > 0.0}
-        if len(set(own.values())) > 1:
-            least = min(own.values())
-            best |= {key for key, value in own.items() if value == least}
-    return frozenset(best)
+def _cells(column: Column, values: Mapping[Key, Value], *, above_zero: bool = False) -> dict[Key, Cell]:
+    """The cells, the best of each case marked unless all are alike; with `above_zero` the reference is no rival."""
+    cells: dict[Key, Cell] = {}
+    for case in dict.fromkeys(case for case, _ in values):
+        own = {name: value for (other, name), value in values.items() if other == case}
+        rivals = [name for name, value in own.items() if value and (value.value > 0.0 or not above_zero)]
+        alike = len({own[name].value for name in rivals}) < 2
+        cells |= {(case, name): cell for name, cell in compared(column, own, () if alike else rivals).items()}
+    return cells
+
+
+def ranking_tables(results: Results) -> Iterator[Table]:
+    """A ranking for each metric of accuracy, and the mean ranks over all cases."""
+    ranked = records(rankings(results))
+    for metric in METRICS:
+        columns = (
+            Column("rank"),
+            Column("estimator", words=True),
+            Column("runs"),
+            Column(metric.heading),
+            Column("behind the first"),
+            Column("", words=True),
+        )
+        rows = tuple(_ranked(row) for row in ranked if row["metric"] == metric.name)
+        if rows:
+            yield Table(columns, rows, name="case", title=f"Ranked by {metric.heading}")
+    headings = {metric.name: metric.heading for metric in METRICS}
+    rows = tuple(
+        _row(
+            row["estimator"],
+            headings[row["metric"]],
+            str(row["cases"]),
+            interval(row["mean_rank"], row["low"], row["high"]),
+            str(row["first"]),
+        )
+        for row in records(overall(results))
+    )
+    if rows:
+        means = (Column("by", words=True), Column("cases"), Column("mean rank"), Column("first in"))
+        yield Table(means, rows, title="Over all cases")
+
+
+def _ranked(row: Mapping[str, Any]) -> Row:
+    first = row["rank"] == 1
+    return _row(
+        row["case"],
+        str(row["rank"]),
+        row["estimator"],
+        str(row["runs"]),
+        interval(row["mean"], row["low"], row["high"]),
+        "" if first else interval(row["behind"], row["behind_low"], row["behind_high"]),
+        "cannot be told from it" if row["tied"] and not first else "",
+    )
+
+
+def runs_table(results: Results, pages: str) -> Table:
+    """Each run with its page below the folder `pages`, the trust in its reference, and the reason of a failure."""
+    by_run: Mapping[Any, pd.DataFrame] = dict(list(results.runs.groupby("run")))
+    rows = []
+    for one in results.planned:
+        frame = by_run[one.name]
+        first, failure = frame.iloc[0], results.failures.get(one.name, "")
+        if failure:
+            rows.append(_row(one.name, "", "", failure))
+            continue
+        failed = records(frame[frame["status"] == "failed"])
+        size = f"{counted(int(first['frames']), 'frame')}, {counted(int(first['observations']), 'match', 'matches')}"
+        reasons = "; ".join(f"{row['estimator']} failed: {row['reason']}" for row in failed)
+        link = "" if one.job.page == "none" else f"{pages}/{one.job.key}/report.html"
+        rows.append(_row(one.name, size, f"{first['reference']} {first['trust']}", reasons, link=link))
+    columns = (Column("size"), Column("reference", words=True), Column("what went wrong", words=True))
+    return Table(columns, tuple(rows), name="run", title=f"{len(rows)} {'run' if len(rows) == 1 else 'runs'}")
+
+
+def _row(name: str, *texts: str, link: str = "") -> Row:
+    return Row(name, tuple(map(Cell, texts)), link=link)
 
 
 def _by_key(table: pd.DataFrame) -> dict[Key, dict[str, Any]]:
