@@ -84,7 +84,7 @@ def environment() -> Environment:
         loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     jinja.filters |= {"number": number, "counted": counted, "flat": flat, "anchor": anchor}
-    jinja.globals |= {"css": Markup(asset("report.css")), "policy": NO_SCRIPT}
+    jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT)}
     return jinja
 
 
