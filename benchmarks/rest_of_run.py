@@ -49,6 +49,7 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
 
     with watch("imports"):
         from fgbaseline.data.parallel import cores, shared
+        from fgbaseline.reports import progress  # noqa: F401
         from fgbaseline.reports.run import job
     settings = job.RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):

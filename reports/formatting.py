@@ -74,6 +74,11 @@ def meters(value: float) -> str:
     return f"{value:.0f} m" if size >= 999.5 else f"{value:.3g} m"
 
 
+def pixels(value: float) -> str:
+    """`30.6 px`, or `no path` for what is not finite."""
+    return f"{value:.3g} px" if isfinite(value) else "no path"
+
+
 def quantity(value: float, unit: str) -> str:
     """A finding's figure: a share as per cent, a physical unit beside the number, and none beside a count."""
     if unit.startswith("share"):

@@ -8,15 +8,14 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.formats.named_file import shown
 
-from .crews import Cluster, Hire, Processes, cores
+from ..phrases.bench import sentences
+from ..results.bench import ANSWERED, Results
+from .executors import Cluster, Executors, Processes, cores, outcomes
 from .job import Planned
 from .plan import plan
-from .progress import board
-from .results import ANSWERED, Results, collected
-from .schedule import outcomes
-from .store import Store, opened
+from .progress_events import board
+from .run_cache import RunCache, opened
 from .suite import read_suite
-from .wording import sentences
 
 FAILED = 1
 
@@ -30,17 +29,16 @@ def bench(
     scheduler: str | None,
     force: bool,
 ) -> int:
-    """Runs what is not done yet, writes the report and tells of it; gives the exit code: 1 where anything failed."""
+    """Runs the jobs that are left, writes the report, prints its sentences; returns the exit code: 1 for a failure."""
     read = read_suite(suite)
     planned = plan(read, data)
     name = read.content.name
     place = out or Path("out") / "bench" / name
     with opened(place, force=force) as store:
-        hire = Processes(workers or cores(), store.folder) if scheduler is None else Cluster(scheduler)
-        _do(planned, hire, store)
+        executors = Processes(workers or cores(), store.folder) if scheduler is None else Cluster(scheduler)
+        _do(planned, executors, store)
         with threadpool_limits(limits=1):
-            results = collected(planned, store)
-            _report(name, results, store)
+            results = _report(name, planned, store)
         store.forget(but={one.job.key for one in planned})
     for sentence in sentences(results):
         click.echo(sentence)
@@ -48,7 +46,7 @@ def bench(
     return 0 if results.runs["status"].isin(ANSWERED).all() else FAILED
 
 
-def _do(planned: list[Planned], hire: Hire, store: Store) -> None:
+def _do(planned: list[Planned], executors: Executors, store: RunCache) -> None:
     """Every job that is not done; each is kept as it ends."""
     every: Mapping[str, Planned] = {one.job.key: one for one in planned}
     left = {key: one for key, one in every.items() if not store.done(key)}
@@ -58,7 +56,7 @@ def _do(planned: list[Planned], hire: Hire, store: Store) -> None:
         return
     try:
         with board(left) as shows:
-            for outcome in outcomes([one.job for one in left.values()], hire, shows.look):
+            for outcome in outcomes([one.job for one in left.values()], executors, shows.look):
                 store.keep(outcome)
                 shows.done(outcome)
     except KeyboardInterrupt:
@@ -67,7 +65,9 @@ def _do(planned: list[Planned], hire: Hire, store: Store) -> None:
         raise
 
 
-def _report(name: str, results: Results, store: Store) -> None:
-    from .report import write_report  # matplotlib, half a second: not before there is something to draw
+def _report(name: str, planned: list[Planned], store: RunCache) -> Results:
+    from .report import collected, write_report  # matplotlib, half a second: not before there is something to draw
 
+    results = collected(planned, store)
     write_report(name, results, store)
+    return results

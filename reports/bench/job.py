@@ -50,17 +50,17 @@ class Job:
     estimators: tuple[str, ...]
     page: Literal["none", "tables", "figures"]
     code: str
-    """of what the job runs: see `identity.code_of`"""
+    """of what the job runs: see `cache_key.code_of`"""
 
     @property
     def key(self) -> str:
         """What the job is known by: the same content, settings and code have the same key, wherever files lie."""
-        told = asdict(self)
-        for file in told["source"].values():
+        content = asdict(self)
+        for file in content["source"].values():
             if isinstance(file, dict):
                 file.pop("path", None)
-        told["kind"] = type(self.source).__name__
-        return hashlib.sha256(json.dumps(told, sort_keys=True, allow_nan=False).encode()).hexdigest()[:20]
+        content["kind"] = type(self.source).__name__
+        return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()[:20]
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` of the run has them."""
@@ -90,7 +90,7 @@ class Planned:
     settings: Mapping[str, str]
     """those that differ between the jobs of the suite, in words"""
     work: float
-    """how much there is to do, in observations, to foretell the time left"""
+    """how much there is to do, in observations, to predict the time left"""
     has_seed: bool
 
     @property

@@ -1,21 +1,22 @@
-"""From a suite to its jobs, with everything that can be known to be wrong told before any of them runs."""
+"""Jobs of a suite, with every fault that can be known reported before one of them runs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from glob import glob, has_magic
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.data import estimator_names
+from fgbaseline.data import estimator_names, read
 from fgbaseline.data.simulate import Simulation
 from fgbaseline.data.toml_file import Place, TomlFile, key_path
+from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.job import check_estimators
 
-from .drives import DriveError, drives
-from .identity import code_of
-from .job import Job, Planned, Recorded, Simulated
-from .recordings import recordings
+from .cache_key import code_of, content_of
+from .job import File, Job, Planned, Recorded, Simulated
+from .simulated_cases import DriveError, drives
 from .suite import Entry, Suite, several
 
 MOST_JOBS = 100_000
@@ -35,7 +36,7 @@ class Input:
 def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
     """Every job of a suite in order, `data` being the folder of relative paths (None: that of the suite).
 
-    Raises InputError naming the file and the key path of what cannot be.
+    Raises InputError naming the file and the place of what cannot be.
     """
     _check_estimators(suite)
     sweep = _settings(suite)
@@ -133,7 +134,7 @@ def _words(value: Any) -> str:
 def _inputs(suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None) -> Iterator[Input]:
     place: Place = ("sequence", index)
     if entry.simulate is None:
-        for name, source, observations in recordings(suite, index, entry, data):
+        for name, source, observations in _recordings(suite, index, entry, data):
             yield Input(name, source, (0,), observations, has_seed=False)
         return
     try:
@@ -162,3 +163,57 @@ def _check_repairs(suite: TomlFile[Suite], index: int, entry: Entry, sweep: list
             raise suite.wrong(
                 ("sequence", index, "repairs"), "noise is set by [sweep] as well; leave one of the two out"
             )
+
+
+def _recordings(
+    suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None
+) -> Iterator[tuple[str, Recorded, float]]:
+    """Name, source and number of observations of each. Raises InputError naming the place."""
+    folder = (data or Path(suite.path).parent).absolute()
+    found = _files(suite, index, entry, folder)
+    truth = None if entry.truth is None else folder / entry.truth
+    repairs = None if entry.repairs is None else folder / entry.repairs
+    for key in ("name", "truth", "repairs"):
+        if getattr(entry, key) is not None and len(found) > 1:
+            raise suite.wrong(
+                ("sequence", index, key),
+                f"{key} is for one recording, and files names {len(found)}; give each a [[sequence]] of its own",
+            )
+    for path, place in found:
+        try:
+            if repairs is not None:
+                read_repairs(repairs)
+            sequence = read(path, truth, entry.truth_frame)
+        except InputError as error:
+            raise suite.wrong(place, str(error)) from None
+        source = Recorded(_known(path), _file(truth), entry.truth_frame, _file(repairs))
+        yield entry.name or path.stem, source, float(len(sequence.observations))
+
+
+def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> list[tuple[Path, tuple[str | int, ...]]]:
+    """The files and where each is named, sorted within a pattern; none twice."""
+    left_out = {path for pattern in several(entry.leave_out) for path in _matching(folder, pattern)}
+    found: dict[Path, tuple[str | int, ...]] = {}
+    for number, pattern in enumerate(entry.patterns):
+        place = ("sequence", index, "files", number)
+        paths = [path for path in _matching(folder, pattern) if path.is_file() and path not in left_out]
+        if not paths:
+            what = "matches no file" if has_magic(pattern) else "is no file"
+            raise suite.wrong(place, f"files: '{pattern}' {what} in {folder}; correct it, or say where with --data")
+        for path in paths:
+            found.setdefault(path, place)
+    return list(found.items())
+
+
+def _matching(folder: Path, pattern: str) -> list[Path]:
+    if not has_magic(pattern):
+        return [folder / pattern]
+    return sorted(folder / name for name in glob(pattern, root_dir=folder, recursive=True))  # noqa: PTH207 - of any root
+
+
+def _file(path: Path | None) -> File | None:
+    return None if path is None else _known(path)
+
+
+def _known(path: Path) -> File:
+    return File(str(path), content_of(path))

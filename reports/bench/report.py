@@ -1,48 +1,164 @@
-"""The report of a bench: tables that are the same every time, what depends on the machine apart, figures and page."""
+"""The report of a bench: results collected from the runs, tables that repeat, costs apart, figures and page."""
 
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
 import pandas as pd
 
-from ..figures.bench import draw
+from fgbaseline.geometry import FloatArray
+from fgbaseline.reports.figures.bench import draw
+
 from ..figures.saving import encoded
-from . import tables
-from .grid import main_grid
+from ..phrases.bench import TABLE
+from ..results.bench import ANSWERED, COSTS, OF_THE_RUN, Results
+from ..results.reader import RunFolder
+from ..results.tree import INFINITE, at
+from ..tables import bench_statistics as statistics
+from ..tables import latex, markdown
+from ..tables.bench import main_table
+from ..tables.bench_statistics import METRICS
+from .job import Planned
 from .page import render
-from .results import Results
-from .store import Store
-from .summary import summarised
-from .text import latex, markdown
+from .run_cache import RunCache
+from .worker import COSTS as COSTS_FILE
 
-TABLES, COSTS, FIGURES = "tables", "costs", "figures"
+SCHEMA: Final = "fgbaseline/bench/1"
+OF_A_RUN = ("problem", "reference", "held_out", "estimators")
+NOT_THE_SAME = ("seconds", "frames_per_second")
+"""keys of an estimator's summary that differ between two runs of one job"""
 
 
-def write_report(name: str, results: Results, store: Store) -> None:
-    """Writes all of it, each file whole or as it was; `summary.json` last."""
+def write_report(name: str, results: Results, store: RunCache) -> None:
+    """Writes all of it, each file atomically; `summary.json` last."""
     same = {
-        "cases": tables.cases(results),
+        "cases": statistics.cases(results),
         "runs": results.runs,
-        "rankings": tables.rankings(results),
-        "overall": tables.overall(results),
-        "consistency": tables.consistency(results),
-        "nees_over_time": tables.nees_over_time(results),
+        "rankings": statistics.rankings(results),
+        "overall": statistics.overall(results),
+        "consistency": statistics.consistency(results),
+        "nees_over_time": statistics.nees_over_time(results),
     }
-    for title, table in same.items():
-        if len(table):
-            store.write(f"{TABLES}/{title}.csv", _csv(table))
-    grid = main_grid(results, with_costs=False)
-    store.write(f"{TABLES}/table.md", markdown(grid).encode())
-    store.write(f"{TABLES}/table.tex", latex(grid).encode())
-    store.write(f"{COSTS}/cases.csv", _csv(tables.costs(results)))
-    store.write(f"{COSTS}/runs.csv", _csv(results.costs))
-    with_costs = main_grid(results, with_costs=True)
-    store.write(f"{COSTS}/table.md", markdown(with_costs).encode())
-    store.write(f"{COSTS}/table.tex", latex(with_costs).encode())
-    figures = draw(results, tables.judge(results), tables.cases(results), tables.costs(results))
+    for title, frame in same.items():
+        if len(frame):
+            store.write(f"tables/{title}.csv", _csv(frame))
+    table = main_table(results, with_costs=False, caption=TABLE)
+    store.write("tables/table.md", markdown(table).encode())
+    store.write("tables/table.tex", latex(table).encode())
+    store.write("costs/cases.csv", _csv(statistics.costs(results)))
+    store.write("costs/runs.csv", _csv(results.costs))
+    with_costs = main_table(results, with_costs=True, caption=TABLE)
+    store.write("costs/table.md", markdown(with_costs).encode())
+    store.write("costs/table.tex", latex(with_costs).encode())
+    figures = draw(results, statistics.judge(results), statistics.cases(results), statistics.costs(results))
     for title, figure in figures.items():
         for form in ("png", "svg"):
-            store.write(f"{FIGURES}/{title}.{form}", encoded(figure, form))
+            store.write(f"figures/{title}.{form}", encoded(figure, form))
     store.write("report.html", render(name, results, figures).encode())
-    store.write("summary.json", summarised(name, results).encode())
+    store.write("summary.json", summarize(name, results).encode())
 
 
 def _csv(table: pd.DataFrame) -> bytes:
     return table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode()
+
+
+def summarize(name: str, results: Results) -> str:
+    """`summary.json` as `fgbaseline check` reads it: figures without timings, the same for the same jobs."""
+    runs: dict[str, Any] = {}
+    for one in results.planned:
+        record = {
+            "sequence": {"name": one.sequence},
+            "settings": {"seed": one.job.seed, **one.settings},
+            "key": one.job.key,
+        }
+        if one.name in results.failures:
+            failed = {"status": "failed", "reason": results.failures[one.name]}
+            no_reference: dict[str, Any] = {"name": None, "trust": None, "reasons": []}
+            runs[one.name] = {
+                **record,
+                "reference": no_reference,
+                "estimators": dict.fromkeys(one.job.estimators, failed),
+            }
+        else:
+            summary = results.summaries[one.name]
+            runs[one.name] = {**record, **{part: summary[part] for part in OF_A_RUN}}
+    document = {
+        "schema": SCHEMA,
+        "suite": name,
+        "versions": next((summary["versions"] for summary in results.summaries.values()), {}),
+        "runs": runs,
+    }
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def collected(planned: Sequence[Planned], store: RunCache) -> Results:
+    """The results of jobs, all of which are done."""
+    rows: list[dict[str, Any]] = []
+    costs: list[dict[str, Any]] = []
+    summaries, failures = {}, {}
+    nees: dict[tuple[str, str], list[FloatArray]] = {}
+    for one in planned:
+        failure = store.failure(one.job.key)
+        if failure:
+            failures[one.name] = failure
+            rows += _failed(one, failure)
+            continue
+        folder = RunFolder(store.run(one.job.key))
+        summary = folder.summary
+        of_run = _of_run(one, summary)
+        spent = json.loads((folder.folder / COSTS_FILE).read_text(encoding="utf-8"))["estimators"]
+        for name, estimator in summary["estimators"].items():
+            rows.append({**of_run, **_row(name, estimator)})
+            if estimator["status"] in ANSWERED:
+                costs.append({**of_run, "estimator": name, **spent[name]})
+            if estimator["nees"] is not None:
+                column = folder.series(name)["nees"].to_numpy(dtype=np.float64)
+                nees.setdefault((one.case, name), []).append(column)
+            for key in NOT_THE_SAME:
+                del estimator[key]
+        summaries[one.name] = summary
+    seconds = sum(store.record(key)["seconds"] for key in {one.job.key for one in planned})
+    table = pd.DataFrame(costs, columns=list(COSTS))
+    return Results(planned, pd.DataFrame(rows), table, summaries, failures, nees, seconds)
+
+
+def _of_run(one: Planned, summary: Mapping[str, Any]) -> dict[str, Any]:
+    offered = next(iter(summary["estimators"].values()))["observations"]["offered"]
+    values = (
+        one.name,
+        one.case,
+        one.sequence,
+        one.job.seed,
+        summary["reference"]["name"],
+        summary["reference"]["trust"],
+        summary["sequence"]["frames"],
+        summary["problem"]["features"],
+        offered,
+    )
+    return {**dict(zip(OF_THE_RUN, values, strict=True)), **_settings(one)}
+
+
+def _settings(one: Planned) -> dict[str, str]:
+    return {f"{name}_asked": words for name, words in one.settings.items()}
+
+
+def _row(name: str, estimator: Mapping[str, Any]) -> dict[str, Any]:
+    values = {metric.name: _at(estimator, metric.path) for metric in METRICS}
+    return {"estimator": name, "status": estimator["status"], "reason": estimator["reason"], **values}
+
+
+def _failed(one: Planned, failure: str) -> list[dict[str, Any]]:
+    of_run = dict(zip(OF_THE_RUN, (one.name, one.case, one.sequence, one.job.seed), strict=False))
+    nothing = {metric.name: np.nan for metric in METRICS}
+    return [
+        {**of_run, **_settings(one), "estimator": name, "status": "failed", "reason": failure, **nothing}
+        for name in one.job.estimators
+    ]
+
+
+def _at(estimator: Mapping[str, Any], path: tuple[str, ...]) -> float:
+    value = at(estimator, *path)
+    if value is None and estimator["notes"].get(".".join(path)) == INFINITE:
+        return float("inf")
+    return float(value) if isinstance(value, int | float) else float("nan")

@@ -10,7 +10,7 @@ from fgbaseline.data.toml_file import TomlFile, read_toml
 from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 from fgbaseline.reports.run.job import RunSettings
 
-from .drives import Drives
+from .simulated_cases import Drives
 
 Page: TypeAlias = Literal["none", "tables", "figures"]
 Preset: TypeAlias = Literal["calibrated", "documented"]
@@ -124,5 +124,5 @@ def several(value: Item | tuple[Item, ...]) -> tuple[Item, ...]:
 
 
 def read_suite(path: Path) -> TomlFile[Suite]:
-    """The suite in a file. Raises InputError naming file, line, key and what is allowed."""
+    """The suite in a file. Raises InputError naming file, place and what is allowed."""
     return read_toml(path, Suite)

@@ -25,7 +25,7 @@ from fgbaseline.data.formats import read_trajectory
 from fgbaseline.data.formats.named_file import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
-from .wording import bound, number
+from ..phrases.check import bound, number
 
 AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
 """a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""

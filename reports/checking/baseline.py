@@ -1,4 +1,4 @@
-"""The baseline: the guarded figures as they were when somebody last said that they are good."""
+"""The baseline: the guarded figures of the run that was last accepted."""
 
 import json
 from collections.abc import Iterable
@@ -10,8 +10,8 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
-from .line import Checked, Line
-from .measured import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, value_of
+from ..results.check import Checked, Line
+from ..results.reader import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, value_of
 
 TIMINGS = frozenset({"seconds", "frames_per_second", "memory", "peak_memory"})
 """parts of metrics that depend on the machine"""

@@ -11,15 +11,12 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import writing
 from fgbaseline.geometry import InputError
 
-from .as_json import as_json
+from ..results.check import Checked
+from ..results.reader import read_folder, read_measured
 from .baseline import refusal, require_replaceable, write_baseline
 from .evaluation import evaluate
-from .junit import junit
 from .limits_file import read_limits
-from .line import Checked
-from .markdown import markdown
-from .measured import read_folder, read_measured
-from .terminal import print_check
+from .writers import as_json, junit, markdown, print_check
 
 JOB_SUMMARY = "GITHUB_STEP_SUMMARY"
 """the environment variable by which GitHub names the file that its page of a job shows"""
@@ -43,7 +40,7 @@ def check(
     update: bool = False,
     accept_worse: bool = False,
 ) -> int:
-    """Holds a folder against its limits, tells of it everywhere it is wanted, and gives the exit code."""
+    """Holds a folder against its limits, writes every output that is asked for, and returns the exit code."""
     if update and baseline_file is None:
         raise InputError("update-baseline: name the file to write with --baseline FILE")
     if accept_worse and not update:

@@ -7,13 +7,10 @@ from typing import Any
 from fgbaseline.compare import MIN_STRETCHES, is_insufficient
 from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
-from fgbaseline.data.toml_file import TomlFile, key_path
+from fgbaseline.data.toml_file import TomlFile
 
-from ..results.tree import INFINITE
-from .baseline import before, is_timing
-from .limits_file import Limit, Limits, Needed
-from .line import NEW, Checked, Line, Shortage
-from .measured import (
+from ..results.check import NEW, Checked, Line, Shortage
+from ..results.reader import (
     DIGITS,
     NO_SUCH_METRIC,
     Measured,
@@ -26,6 +23,9 @@ from .measured import (
     sample_of,
     value_of,
 )
+from ..results.tree import INFINITE
+from .baseline import before, is_timing
+from .limits_file import Limit, Limits, Needed
 
 
 def evaluate(
@@ -33,8 +33,8 @@ def evaluate(
 ) -> Checked:
     """All limits against what was measured, and against a baseline.
 
-    `updating` takes what the baseline lacks as new instead of as something that cannot be told. Raises InputError,
-    naming the line, for a limit that matches nothing and for one that asks for a baseline where there can be none.
+    `updating` takes what the baseline lacks as new instead of as undecided. Raises InputError,
+    naming the key path, for a limit that matches nothing and for one that asks for a baseline where there can be none.
     """
     lines: list[Line] = []
     for index, limit in enumerate(limits.content.limit):
@@ -42,10 +42,10 @@ def evaluate(
         for name, estimator, values in matched(limits, index, measured):
             lines += _lines(limits, index, (name, measured.runs[name]), (estimator, values), baseline, updating)
     needed = limits.content.reference
-    told = [_reference(name, run, several=len(measured.runs) > 1) for name, run in measured.runs.items()]
+    sentences = [_reference(name, run, several=len(measured.runs) > 1) for name, run in measured.runs.items()]
     return Checked(
         lines=tuple(lines),
-        references=tuple(sentence for sentence in told if sentence),
+        references=tuple(sentence for sentence in sentences if sentence),
         shortages=_shortages(lines, several=len(measured.runs) > 1),
         undecided=needed is not Needed.NONE and any(below(run, needed) for run in measured.runs.values()),
         measured=measured,
@@ -80,7 +80,7 @@ def matched(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tu
 
 
 def below(run: MeasuredRun, needed: Needed) -> bool:
-    """Whether a run's reference is less trusted than needed; where nobody can say, it is the user's own."""
+    """Whether a run's reference is less trusted than needed; without a trust it is the user's own."""
     trust = run.reference.trust
     return trust == "untrusted" or (trust == "doubtful" and needed is Needed.TRUSTED)
 
@@ -104,9 +104,9 @@ def _lines(
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
         short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
         outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating, short)
-        at, left_out = key_path(("limit", index)), missing_in(values, limit.metric)
+        left_out, place = missing_in(values, limit.metric), f"limit[{index}]"
         return Line(
-            name, estimator, limit.metric, at, outcome, value, bounds, tolerance, old, reason, left_out, shortage
+            name, estimator, limit.metric, place, outcome, value, bounds, tolerance, old, reason, left_out, shortage
         )
 
     if limit.bounds is not None:
@@ -114,7 +114,7 @@ def _lines(
     if limit.baseline is not None:
         by = limit.baseline
         bounds = None if old is None else around(old, by.better, relative=by.relative, absolute=by.absolute)
-        yield line(None if value is None else rounded(value, DIGITS), bounds, by.told)
+        yield line(None if value is None else rounded(value, DIGITS), bounds, by.text)
 
 
 def _outcome(
@@ -174,7 +174,7 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
 
 
 def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:
-    """What is to be said of a reference that is not trusted."""
+    """The sentence on a reference that is not trusted; empty for one that is."""
     reference = run.reference
     if reference.trust in (None, "trusted"):
         return ""

@@ -25,7 +25,7 @@ class Needed(StrEnum):
 
     TRUSTED = "trusted"
     DOUBTFUL = "doubtful"
-    """a doubtful one will do, and is told"""
+    """a doubtful one will do, and is reported"""
     NONE = "none"
     """limits on what does not rest on the reference are judged whatever it is; the others need a doubtful one"""
 
@@ -40,7 +40,7 @@ class Tolerance(_Part):
     """in the figure's unit"""
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """What is allowed, such as '5 % or 0.01'."""
         parts = [f"{100 * self.relative:.4g} %"] if self.relative else []
         parts += [f"{self.absolute:.4g}"] if self.absolute else []

@@ -66,7 +66,7 @@ def command(
 
     Exits 0 when the reproduction is written, whatever comes of the claims, 2 on bad input.
     """
-    from ..reproducing.study import SweepSettings
-    from ..reproducing.telling import reproduce
+    from ..reproduction.command import reproduce
+    from ..reproduction.study import SweepSettings
 
     return reproduce(sequence, out, SweepSettings(sweep_features, sweep_noise), force=force)

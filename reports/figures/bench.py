@@ -19,7 +19,8 @@ from .style import BAND, GRAY, GREEN, SCREEN, head, in_style, plain, sheet, swat
 from .style import colors as colors_of
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.bench.results import Metric, Results
+    from fgbaseline.reports.results.bench import Results
+    from fgbaseline.reports.tables.bench_statistics import Metric
 
 MARKS = "osD^vP*Xh<>p"
 MOST_CASES = 12

@@ -13,19 +13,20 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from fgbaseline.compare import distance_traveled
 from fgbaseline.data import Status
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from ..reproducing.measures import metres, path_length
+from ..formatting import meters
 from .layout import lay_out
 from .paths import from_above
 from .style import SCREEN, head, in_style, note, plain, swatch
 from .view import TopView, Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.reproducing.study import Study
-    from fgbaseline.reports.reproducing.trial import Outcome
+    from fgbaseline.reports.reproduction.study import Study
+    from fgbaseline.reports.reproduction.trial import Outcome
 
 PATH, ENDS, ARROW, LANDMARK = "#d62728", "#1f4e9c", "#1f4e9c", "#2ca02c"
 DEAD_RECKONING, BROKEN = "#444444", "#b3261e"
@@ -167,7 +168,7 @@ def stages_figure(study: "Study") -> Figure:
         handles += axes.plot(*predicted[:1].T, "s", color=ENDS, markersize=5, zorder=5, label="start")
         half = 0.5 * np.array([width, height])
         from_above(axes, Window(middle - half, middle + half))
-        axes.set_title(f"{staged.stage.name}: {metres(staged.outcome.apart_rmse)}", fontsize=9)
+        axes.set_title(f"{staged.stage.name}: {meters(staged.outcome.apart_rmse)}", fontsize=9)
         axes.tick_params(labelsize=7)
     for axes in panels[len(study.staged) :]:
         axes.set_visible(False)
@@ -211,7 +212,7 @@ def _map(axes: Axes, study: "Study", outcomes: Several["Outcome"]) -> None:
     broken = []
     for o in outcomes:
         x, y = features.index(o.settings.features or 0), noises.index(o.settings.pixel_variance)
-        share = o.apart_rmse / path_length(study.predicted)
+        share = o.apart_rmse / float(distance_traveled(study.predicted[:, :3, 3])[-1])
         level = 1.0 if not np.isfinite(share) else float(np.log(max(share, 1e-9) / LEAST) / np.log(MOST / LEAST))
         color = COLORS(np.clip(level, 0.0, 1.0))
         axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=color, edgecolor="white", linewidth=0.6))
@@ -226,7 +227,7 @@ def _map(axes: Axes, study: "Study", outcomes: Several["Outcome"]) -> None:
 def _text(outcome: "Outcome") -> str:
     if outcome.status is Status.FAILED:
         return "stops"
-    return metres(outcome.apart_rmse) + (f"\n{plural(outcome.lost, 'frame')}" if outcome.lost else "")
+    return meters(outcome.apart_rmse) + (f"\n{plural(outcome.lost, 'frame')}" if outcome.lost else "")
 
 
 def _bars(axes: Axes, study: "Study") -> None:
@@ -245,7 +246,7 @@ def _bars(axes: Axes, study: "Study") -> None:
     for row, staged in zip(rows, study.staged, strict=True):
         o = staged.outcome
         lost = f", lost at {plural(o.lost, 'frame')}" if o.lost else ""
-        text = f" {metres(o.apart_rmse)}, {o.reprojection:.3g} px median, {100 * o.behind:.2g} % behind{lost}"
+        text = f" {meters(o.apart_rmse)}, {o.reprojection:.3g} px median, {100 * o.behind:.2g} % behind{lost}"
         x = o.apart_rmse if np.isfinite(o.apart_rmse) else min(finite) / 3.0
         axes.text(x, row, text, va="center", fontsize=8, color=BROKEN if o.breaks else "#222222")
     shown = study.recorded.settings

@@ -1,1 +1,1 @@
-"""Sentences on results, a module for each kind of result."""
+"""Sentences and captions, a module for each kind of result."""

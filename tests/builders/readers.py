@@ -19,8 +19,8 @@ from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read
 from fgbaseline.data.formats.trajectory_file import read_pose_covariances
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.limits_file import read_limits
-from fgbaseline.reports.checking.measured import read_folder, read_measured
 from fgbaseline.reports.comparing.run_folder import read_run_folder
+from fgbaseline.reports.results.reader import read_folder, read_measured
 
 from .summaries import estimator, summary
 from .synthetic import Scene, drive, plain_problem

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.bench.results import METRICS
-from fgbaseline.reports.bench.wording import _winner
 from fgbaseline.reports.formatting import number
+from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, truth_sentences
+from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.reported import FRAMES, answer, as_dict, run_of, scene
@@ -142,7 +142,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
     table = pd.DataFrame(1.0 + 0.1 * random.random((runs, 3)), columns=["a", "b", "c"])
     table["b"] += apart
     table["c"] = table["c"].where(random.random(runs) < 0.8)
-    sentence = _winner("drive", compare.monte_carlo_ranking(table).reset_index(), ATE, frozenset())
+    sentence = winner("drive", compare.monte_carlo_ranking(table).reset_index(), ATE, frozenset())
     whole = [name for name in table if table[name].notna().all()]
     means = table[whole].mean()
     first = str(means.idxmin())
@@ -160,11 +160,11 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
 
 
 def test_one_run_ranks_nobody_and_missing_answers_are_named() -> None:
-    assert "one run does not rank them" in _winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
-    said = _winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
+    assert "one run does not rank them" in winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
+    said = winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
     assert "a has the least" in said
     assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a there)" in said
-    same = _winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
+    same = winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
     assert "batch" not in same
 
 

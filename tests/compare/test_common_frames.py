@@ -15,12 +15,12 @@ from fgbaseline import data
 from fgbaseline.compare.trajectory_comparison.ranking import ranking_of
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.reports.bench.results import METRICS
-from fgbaseline.reports.bench.wording import _winner
 from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.comparison import order_in_words
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.tables import latex, markdown
+from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.reported import answer, as_dict, run_of, scene
@@ -185,7 +185,7 @@ def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_
 
 def test_a_bench_says_of_the_best_that_others_with_fewer_answers_are_below_it() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2]})
-    said = _winner("town", figures.monte_carlo_ranking(errors).reset_index(), METRICS[0], frozenset())
+    said = winner("town", figures.monte_carlo_ranking(errors).reset_index(), METRICS[0], frozenset())
     assert said.startswith("town: the error to truth of sound is")
     assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound there)" in said
 

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from fgbaseline import data, diagnosis
 from fgbaseline.data.exchange import read_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.measured import read_measured, value_of
 from fgbaseline.reports.comparing.run_folder import read_run_folder
+from fgbaseline.reports.results.reader import read_measured, value_of
 
 from ..builders.readers import Reader, archive, course_arrays, npy, npz, problem_words, readers
 

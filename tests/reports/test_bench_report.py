@@ -14,22 +14,21 @@ from rich.progress import Progress
 
 from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.reports.bench import tables
-from fgbaseline.reports.bench.channels import FileChannel, Tiding
-from fgbaseline.reports.bench.crews import Processes
-from fgbaseline.reports.bench.grid import main_grid
+from fgbaseline.reports.bench.executors import Processes, outcomes
 from fgbaseline.reports.bench.job import Planned
 from fgbaseline.reports.bench.page import render
 from fgbaseline.reports.bench.plan import plan
-from fgbaseline.reports.bench.progress import BarBoard, duration
-from fgbaseline.reports.bench.results import Results, collected
-from fgbaseline.reports.bench.schedule import outcomes
-from fgbaseline.reports.bench.store import opened
+from fgbaseline.reports.bench.progress_events import BarBoard, FileChannel, ProgressEvent, duration
+from fgbaseline.reports.bench.report import collected
+from fgbaseline.reports.bench.run_cache import opened
 from fgbaseline.reports.bench.suite import read_suite
-from fgbaseline.reports.bench.text import latex, markdown
-from fgbaseline.reports.bench.wording import sentences
-from fgbaseline.reports.bench.work import Outcome, work
+from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
+from fgbaseline.reports.phrases.bench import sentences
+from fgbaseline.reports.results.bench import Results
+from fgbaseline.reports.tables import bench_statistics as tables
+from fgbaseline.reports.tables import latex, markdown
+from fgbaseline.reports.tables.bench import main_table
 
 from ..builders.benches import written
 from ..builders.commands import fgbaseline
@@ -143,20 +142,21 @@ def test_the_case_table_is_the_mean_of_its_runs(results: Results) -> None:
 
 
 def test_the_best_is_marked_once_in_every_form(results: Results) -> None:
-    grid = main_grid(results, with_costs=False)
-    column = grid.headings.index("error to truth, m")
-    for _, rows in grid.by_case:
-        best = [row for row in rows if row.best[column]]
-        assert len(best) == 1
-        assert best[0].cells[column] == min((row.cells[column] for row in rows), key=lambda c: float(c.split()[0]))
-        assert f"**{best[0].cells[column].split()[0]}" in markdown(grid)
-        assert rf"\textbf{{{best[0].cells[column].split()[0]}" in latex(grid)
-    assert "time, s" not in grid.headings
-    assert "time, s" in main_grid(results, with_costs=True).headings
+    grid = main_table(results, with_costs=False)
+    headings = [column.heading for column in grid.columns]
+    column = headings.index("error to truth, m")
+    for _, rows in grid.by_group:
+        cells = [row.cells[column] for row in rows]
+        (best,) = (cell.text for cell in cells if cell.best)
+        assert best == min((cell.text for cell in cells), key=lambda text: float(text.split()[0]))
+        assert f"**{best.split()[0]}" in markdown(grid)
+        assert rf"\textbf{{{best.split()[0]}" in latex(grid)
+    assert "time, s" not in headings
+    assert "time, s" in [column.heading for column in main_table(results, with_costs=True).columns]
     text = latex(grid)
     assert text.count(r"\begin{") == text.count(r"\end{")
     widths = {line.count(" & ") for line in text.splitlines() if line.endswith(r"\\") and "multicolumn" not in line}
-    assert widths == {len(grid.headings)}
+    assert widths == {len(headings)}
 
 
 class Page(HTMLParser):
@@ -198,18 +198,18 @@ def test_the_page_is_whole_escaped_and_leads_to_every_run(results: Results) -> N
 def test_every_job_is_told_of_and_the_bars_move(results: Results, tmp_path: Path) -> None:
     one: Planned = results.planned[0]
     with opened(tmp_path / "out", force=False) as store:
-        seen: list[Tiding] = []
+        seen: list[ProgressEvent] = []
         (outcome,) = outcomes([one.job], Processes(1, store.folder), seen.extend)
     assert outcome.failure == ""
     assert any(
-        tiding.key == one.job.key and tiding.doing in ("reading", "posing the problem", "writing", *results.estimators)
-        for tiding in seen
+        event.key == one.job.key and event.doing in ("reading", "posing the problem", "writing", *results.estimators)
+        for event in seen
     )
     console = Console(file=StringIO(), force_terminal=True, width=120)
     whole, each = Progress(console=console), Progress(console=console)
     said: list[str] = []
     bars = BarBoard({one.job.key: one}, whole, each, said.append)
-    bars.look([Tiding("1", one.job.key, "isam2", 5, 20), Tiding("2", "", "", 0, 0)])
+    bars.look([ProgressEvent("1", one.job.key, "isam2", 5, 20), ProgressEvent("2", "", "", 0, 0)])
     assert [task.description for task in each.tasks] == [f"  {one.name}: isam2", "  waiting"]
     assert (each.tasks[0].completed, each.tasks[0].total) == (5, 20)
     bars.done(Outcome(one.job.key, {}, "no luck", 1.0))
@@ -217,16 +217,16 @@ def test_every_job_is_told_of_and_the_bars_move(results: Results, tmp_path: Path
     assert said == [f"{one.name}: failed: no luck"]
 
 
-def test_tidings_are_the_last_of_each_worker_and_none_too_often(tmp_path: Path) -> None:
+def test_events_are_the_last_of_each_worker_and_none_too_often(tmp_path: Path) -> None:
     channel = FileChannel(tmp_path)
     for frame in range(50):
         channel("key", "isam2", frame, 50)
-    (tiding,) = channel.tidings()
-    assert (tiding.key, tiding.doing, tiding.total) == ("key", "isam2", 50)
-    assert tiding.done < 49
+    (event,) = channel.events()
+    assert (event.key, event.doing, event.total) == ("key", "isam2", 50)
+    assert event.done < 49
     time.sleep(0.4)
     channel("key", "isam2", 50, 50)
-    assert next(channel.tidings()).done == 50
+    assert next(channel.events()).done == 50
 
 
 @pytest.mark.parametrize(("seconds", "told"), [(3.21, "3.2 s"), (250.0, "4.2 min"), (8000.0, "2.2 h")])

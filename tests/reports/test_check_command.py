@@ -9,8 +9,8 @@ from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.checking.wording import unit_of
 from fgbaseline.reports.cli import main
+from fgbaseline.reports.tables.check import unit_of
 
 from ..builders.commands import everything_in, fgbaseline
 from ..builders.summaries import estimator, summary, write

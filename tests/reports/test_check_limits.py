@@ -15,9 +15,9 @@ from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.evaluation import evaluate
 from fgbaseline.reports.checking.limits_file import Limits, read_limits
-from fgbaseline.reports.checking.line import Checked, Line
-from fgbaseline.reports.checking.measured import read_folder, read_measured
-from fgbaseline.reports.checking.wording import remarks
+from fgbaseline.reports.phrases.check import remarks
+from fgbaseline.reports.results.check import Checked, Line
+from fgbaseline.reports.results.reader import read_folder, read_measured
 
 from ..builders.summaries import estimator, summary, write
 

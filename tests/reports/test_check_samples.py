@@ -16,9 +16,9 @@ from fgbaseline.reports.checking import assert_accuracy
 from fgbaseline.reports.checking.command import Outputs, check
 from fgbaseline.reports.checking.evaluation import evaluate
 from fgbaseline.reports.checking.limits_file import read_limits
-from fgbaseline.reports.checking.measured import metrics_of, read_folder, sample_of
 from fgbaseline.reports.comparing import compare
 from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of
 
 from ..builders.commands import fgbaseline
 from ..builders.reported import answer, as_dict, partly_known, run_of, scene, standard_run

@@ -14,11 +14,10 @@ from fgbaseline.data import Observations, Sequence, Status, write_npz
 from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.reproducing.stages import diagnosed_stages, simulated_stages
-from fgbaseline.reports.reproducing.stand_in import stand_in
-from fgbaseline.reports.reproducing.subjects import read_subjects
-from fgbaseline.reports.reproducing.the_report import TRACKS_PER_FRAME, reported
-from fgbaseline.reports.reproducing.trial import Settings, run
+from fgbaseline.reports.reproduction.recordings import read_subjects, reported
+from fgbaseline.reports.reproduction.stages import diagnosed_stages, simulated_stages
+from fgbaseline.reports.reproduction.stand_in import TRACKS_PER_FRAME, stand_in
+from fgbaseline.reports.reproduction.trial import Settings, run
 
 from ..builders.commands import everything_in, fgbaseline
 

@@ -1,11 +1,11 @@
-"""One line of a check, and all of them."""
+"""A folder held against its limits: a line for each limit and estimator, and the exit code."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fgbaseline.compare.limits import Bounds, Outcome, rounded
 
-from .measured import DIGITS, Measured
+from .reader import DIGITS, Measured
 
 HOLDS, FALLS_SHORT, CANNOT_TELL = 0, 1, 2
 """exit codes"""
@@ -42,7 +42,7 @@ class Line:
     estimator: str
     metric: str
     limit: str
-    """key path in the limits file, such as `limit[0]`"""
+    """key path in the limits file: `limit[3]`"""
     outcome: Outcome
     value: float | None
     bounds: Bounds | None

@@ -1,19 +1,22 @@
-"""What the report claims, each claim tested: the measured figure, what lies behind it, and the repaired recording."""
+"""Claims of the report, each tested: verdict, measured figure, cause, and the same filter on the repaired recording."""
 
 from collections.abc import Callable
 from collections.abc import Sequence as Several
+from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
 from fgbaseline.data import Status
 from fgbaseline.data.plural import plural
 
-from .claim import Claim, Verdict, causes, claim_on
-from .measures import metres, path_length, per_cent, px
+from ..formatting import meters, per_cent, pixels
+from .recordings import REPORTED, Reported
 from .study import Staged, Study
-from .the_report import REPORTED, Reported
-from .trial import Outcome
+from .trial import Outcome, path_length
 
+SIGNIFICANT = 1.5
+"""a cause is named where its repair changes the figure at least by this factor"""
 LEVEL = 0.03
 """of the path's length: a climb beyond it is no town's"""
 ALIKE = 0.02
@@ -24,21 +27,69 @@ WELL = 3.0
 """px, median error below which a filter may be said to work"""
 
 
+class Verdict(StrEnum):
+    """Result of the test of a claim."""
+
+    HOLDS = "holds"
+    IN_PART = "holds in part"
+    FALSE = "does not hold"
+    CANNOT_TELL = "cannot tell"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A claim of the report on one recording, tested."""
+
+    code: str
+    recording: str
+    claim: str
+    verdict: Verdict
+    measured: str
+    cause: str
+    """cause of the figure, as the diagnosis finds it"""
+    repaired: str
+    """the same filter on the repaired recording; empty where that has no bearing"""
+    simulated: bool
+    """whether the filter saw simulated features"""
+
+
+def claim_on(
+    study: Study, code: str, claim: str, verdict: Verdict, measured: str, cause: str, repaired: str = ""
+) -> Claim:
+    """A claim on the recording of a study, with its verdict."""
+    simulated = study.subject.stand_in is not None and code not in ("samples", "prediction")
+    return Claim(code, study.subject.name, claim, verdict, measured, cause, repaired, simulated)
+
+
+def causes(study: Study, figure: Callable[[Staged], float], text: Callable[[float], str]) -> str:
+    """The causes whose repair changes a figure, each with the figure before and after."""
+    before, parts = figure(study.staged[0]), []
+    for staged in study.staged[1:]:
+        after = figure(staged)
+        alike = before / SIGNIFICANT < after < before * SIGNIFICANT
+        if not alike and text(before) != text(after):
+            parts.append(f"{staged.stage.cause}: {text(before)} → {text(after)}")
+        before = after
+    if not study.causes:
+        return "nothing that the diagnosis finds"
+    return "; ".join(parts) or "none of what was repaired changes it"
+
+
 def claims_of(study: Study) -> list[Claim]:
     """All claims that bear on a recording."""
-    told = study.subject.reported
+    reported = study.subject.reported
     tests: list[Callable[[Study], Claim]] = [_predicted, _mapped]
-    if told is None or told.slam is not None:
+    if reported is None or reported.slam is not None:
         tests += [_works, _like_dead_reckoning]
     tests.append(_low_noise)
-    if told is None or told.slam is None:
+    if reported is None or reported.slam is None:
         tests.append(_every_noise)
-    counts = [] if told is None else [_samples(study, told), _features(study, told)]
+    counts = [] if reported is None else [_samples(study, reported), _features(study, reported)]
     return [*counts, *(test(study) for test in tests)]
 
 
 def missing_claims(studies: Several[Study]) -> list[Claim]:
-    """The report's recordings that were not given: nothing of them is tested."""
+    """Claims on the report's recordings that are not given: none of them is tested."""
     given = {study.subject.name for study in studies}
     return [
         Claim(
@@ -56,21 +107,21 @@ def missing_claims(studies: Several[Study]) -> list[Claim]:
     ]
 
 
-def _samples(study: Study, told: Reported) -> Claim:
+def _samples(study: Study, reported: Reported) -> Claim:
     sequence = study.subject.recorded
     seconds = float(sequence.t[-1] - sequence.t[0])
     return claim_on(
         study,
         "samples",
-        f"the data is given over {told.frames} seconds",
+        f"the data is given over {reported.frames} seconds",
         Verdict.FALSE,
         f"{plural(sequence.n_frames, 'frame')} in {seconds:.1f} s",
-        f"{told.frames} is the number of samples, taken {1 / np.median(sequence.dt):.1f} times a second",
+        f"{reported.frames} is the number of samples, taken {1 / np.median(sequence.dt):.1f} times a second",
     )
 
 
-def _features(study: Study, told: Reported) -> Claim:
-    claim = f"it has {told.tracks} features"
+def _features(study: Study, reported: Reported) -> Claim:
+    claim = f"it has {reported.tracks} features"
     if study.subject.stand_in is not None:
         return claim_on(
             study,
@@ -86,7 +137,7 @@ def _features(study: Study, told: Reported) -> Claim:
         study,
         "features",
         claim,
-        Verdict.HOLDS if tracks == told.tracks else Verdict.FALSE,
+        Verdict.HOLDS if tracks == reported.tracks else Verdict.FALSE,
         f"{plural(tracks, 'track')}, {plural(len(o), 'observation')}",
         f"on average {len(o) / max(1, tracks):.0f} frames a track and "
         f"{len(o) / study.subject.recorded.n_frames:.0f} tracks a frame",
@@ -104,9 +155,9 @@ def _predicted(study: Study) -> Claim:
         "prediction",
         "the predicted trajectory may be assumed to be correct",
         Verdict.FALSE if abs(end) > LEVEL * road else Verdict.HOLDS,
-        f"it ends {metres(abs(end))} {way} the start after {metres(road)} on the road, which a view from above hides",
-        causes(study, climb, metres),
-        f"{metres(climb(study.staged[-1]))} in height",
+        f"it ends {meters(abs(end))} {way} the start after {meters(road)} on the road, which a view from above hides",
+        causes(study, climb, meters),
+        f"{meters(climb(study.staged[-1]))} in height",
     )
 
 
@@ -142,10 +193,10 @@ def _works(study: Study) -> Claim:
         "works",
         f"SLAM worked perfectly with {features} features",
         Verdict.HOLDS if good else Verdict.FALSE,
-        f"median reprojection error {px(now.reprojection)}, {per_cent(now.behind)} of the observations of points "
+        f"median reprojection error {pixels(now.reprojection)}, {per_cent(now.behind)} of the observations of points "
         f"behind the camera{lost}",
-        causes(study, lambda s: s.outcome.reprojection, px),
-        f"{px(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} behind, {_lost(study.repaired)}",
+        causes(study, lambda s: s.outcome.reprojection, pixels),
+        f"{pixels(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} behind, {_lost(study.repaired)}",
     )
 
 
@@ -159,10 +210,10 @@ def _like_dead_reckoning(study: Study) -> Claim:
         "like dead reckoning",
         "SLAM looks like dead reckoning, but noisy",
         verdict,
-        f"{metres(now.apart_rmse)} (RMS) and up to {metres(now.apart_max)} from dead reckoning, of a path of "
-        f"{metres(road)}; an update moves a frame by {_moved(now)}",
-        causes(study, lambda s: s.outcome.apart_rmse, metres),
-        f"{metres(study.repaired.apart_rmse)}, up to {metres(study.repaired.apart_max)}; {_moved(study.repaired)}",
+        f"{meters(now.apart_rmse)} (RMS) and up to {meters(now.apart_max)} from dead reckoning, of a path of "
+        f"{meters(road)}; an update moves a frame by {_moved(now)}",
+        causes(study, lambda s: s.outcome.apart_rmse, meters),
+        f"{meters(study.repaired.apart_rmse)}, up to {meters(study.repaired.apart_max)}; {_moved(study.repaired)}",
     )
 
 
@@ -198,7 +249,7 @@ def _every_noise(study: Study) -> Claim:
         verdict,
         f"the printed equations break in {broken} of {len(runs)} settings, and in {off} more the path is over "
         f"{per_cent(ALIKE)} of its length from dead reckoning",
-        "landmarks that pass through the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, metres),
+        "landmarks that pass through the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"they break in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
     )
 
@@ -208,7 +259,7 @@ def _apart(difference: float) -> str:
 
 
 def _moved(outcome: Outcome) -> str:
-    return f"{metres(outcome.correction_m)} and {outcome.correction_deg:.2g}° (RMS)"
+    return f"{meters(outcome.correction_m)} and {outcome.correction_deg:.2g}° (RMS)"
 
 
 def _lost(outcome: Outcome) -> str:

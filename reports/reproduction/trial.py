@@ -26,7 +26,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of it. NaN where the filter gave no path."""
+    """Figures of a run. NaN where the filter gave no path."""
 
     settings: Settings
     features: int
@@ -106,6 +106,11 @@ def judged(problem: Problem, settings: Settings, estimate: Estimate) -> Outcome:
         height=float(estimate.world_T_imu[-1, :3, 3] @ problem.sequence.up),
         truth_rmse=_from_truth(problem.sequence, estimate.world_T_imu) if complete else np.nan,
     )
+
+
+def path_length(path: FloatArray) -> float:
+    """Length of a path (T, 4, 4), m."""
+    return float(np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1).sum())
 
 
 def _corrections(path: FloatArray, predicted: FloatArray) -> FloatArray:

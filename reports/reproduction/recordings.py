@@ -1,14 +1,45 @@
-"""What is reproduced: the recordings that were given, and what stands in for one without features."""
+"""Recordings of a reproduction: the report's two and what it shows of each, those given, and their stand-ins."""
 
+from collections.abc import Mapping
 from collections.abc import Sequence as Several
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from fgbaseline.data import Sequence, read
 from fgbaseline.geometry import InputError
 
 from .stand_in import StandIn, stand_in
-from .the_report import Reported, reported
+
+MAPPED = (700, 1000)
+"""numbers of features of figures 5 to 8"""
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """A recording of the report: its size there, and the numbers of the figures that show it."""
+
+    name: str
+    frames: int
+    tracks: int
+    path: int
+    """number of the figure with the predicted path"""
+    arrows: int
+    """the same with orientations"""
+    mapped: Mapping[int, int] = field(default_factory=dict)
+    """number of features -> number of the figure after landmark mapping"""
+    slam: int | None = None
+    """the figure after SLAM; None where the report has none, its filter having failed"""
+
+
+REPORTED = (
+    Reported("03.npz", 1010, 5105, path=1, arrows=4, mapped={700: 7, 1000: 8}, slam=9),
+    Reported("10.npz", 3026, 13_289, path=2, arrows=3, mapped={700: 5, 1000: 6}),
+)
+
+
+def reported(frames: int) -> Reported | None:
+    """The recording of the report that has so many frames; its files are known by that and not by their names."""
+    return next((recording for recording in REPORTED if recording.frames == frames), None)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,10 +88,10 @@ def read_subjects(paths: Several[Path]) -> list[Subject]:
 def _require_different_names(paths: Several[Path], every: Several[Sequence]) -> None:
     taken: dict[str, Path] = {}
     for path, sequence in zip(paths, every, strict=True):
-        told = reported(sequence.n_frames)
-        name = sequence.name if told is None else told.name
+        known = reported(sequence.n_frames)
+        name = sequence.name if known is None else known.name
         if name in taken:
-            as_what = f"is called {name}" if told is None else f"has the {told.frames} frames of the report's {name}"
+            as_what = f"is called {name}" if known is None else f"has the {known.frames} frames of the report's {name}"
             raise InputError(f"{path}: it {as_what}, as {taken[name]} does; give one of them at a time")
         taken[name] = path
 

@@ -1,19 +1,18 @@
-"""What a reproduction leaves behind: the figures, the claims and the sweep as tables, and the page."""
+"""The folder of a reproduction: figures, claims and sweep as tables, and the page."""
 
 import csv
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+
+from fgbaseline.reports.figures.reproduction import draw
 
 from ..figures import save
-from ..figures.reproduction import draw
-from .claim import Claim
+from .claims import Claim
 from .page import render
 from .study import Study
 from .trial import Outcome
@@ -24,7 +23,7 @@ MARK = "claims.json"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reproduction:
-    """Everything that was found, recording by recording."""
+    """Studies and claims of all recordings."""
 
     studies: list[Study]
     claims: list[Claim]
@@ -36,13 +35,10 @@ def write(reproduction: Reproduction, folder: Path) -> None:
     (folder / "figures").mkdir()
     save(figures, folder / "figures", forms=("png", "svg", "pdf"))
     _tables(reproduction, folder)
-    (folder / "report.html").write_text(_page(reproduction, figures), encoding="utf-8")
+    page = render(reproduction.studies, reproduction.claims, figures)
+    (folder / "report.html").write_text(page, encoding="utf-8")
     text = json.dumps(as_dict(reproduction), indent=2, allow_nan=False, ensure_ascii=False)
     (folder / MARK).write_text(text + "\n", encoding="utf-8")
-
-
-def _page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
-    return render(reproduction.studies, reproduction.claims, figures)
 
 
 def as_dict(reproduction: Reproduction) -> dict[str, Any]:

@@ -1,8 +1,9 @@
-"""What a worker does: a job in, the files of its run out as bytes. Objects of GTSAM live and die in here."""
+"""The work of a worker: a job in, the files of its run out as bytes. Objects of GTSAM live and die in here."""
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +12,7 @@ from threading import Lock
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all
-from fgbaseline.data import LandmarkMode, Problem, Sequence, documented, read
+from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.solving import solve_all, told
@@ -20,20 +21,23 @@ from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
 from fgbaseline.reports.run.folder import write_numbers, write_page, write_run
 
-from .costs import CostWatch, Tell
-from .identity import code_of, content_of
+from .cache_key import code_of, content_of
 from .job import File, Job, Recorded
 
 COSTS = "costs.json"
+RESET_PEAK = "5"
+"""makes Linux forget the peak so far (man 5 proc, clear_refs)"""
 Channel = Callable[[str, str, int, int], None]
-"""told of progress: job's key, what is being done, frames done, frames there are"""
+"""takes progress: the job's key, its step, frames done, frames there are"""
+Report = Callable[[str, int, int], None]
+"""takes progress of a job: step or estimator, frames done, frames there are"""
 _one_at_a_time = Lock()
 """memory and BLAS threads are the process's, and GTSAM holds the interpreter: threads would only spoil the figures"""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came out of a job."""
+    """The outcome of a job."""
 
     key: str
     files: Mapping[str, bytes]
@@ -47,13 +51,13 @@ def work(job: Job, channel: Channel) -> Outcome:
     """Runs a job; whatever goes wrong is its outcome, and never raised."""
     key = job.key
 
-    def tell(doing: str, done: int, total: int) -> None:
+    def report(doing: str, done: int, total: int) -> None:
         channel(key, doing, done, total)
 
     with _one_at_a_time, threadpool_limits(limits=1):
         start = time.perf_counter()
         try:
-            files, failure = _files(job, tell), ""
+            files, failure = _files(job, report), ""
         except Exception as error:  # a job never stops the others
             files, failure = {}, told(error)
         seconds = time.perf_counter() - start
@@ -61,17 +65,17 @@ def work(job: Job, channel: Channel) -> Outcome:
     return Outcome(key, files, failure, seconds)
 
 
-def _files(job: Job, tell: Tell) -> dict[str, bytes]:
+def _files(job: Job, report: Report) -> dict[str, bytes]:
     if code_of(job.estimators, job.page != "none") != job.code:
         raise FgbaselineError("this worker has another version of fgbaseline or of its libraries; install the same")
-    tell("reading", 0, 0)
+    report("reading", 0, 0)
     sequence = _sequence(job)
     kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
-    tell("posing the problem", 0, 0)
+    report("posing the problem", 0, 0)
     problem = _problem(kept, job)
-    watch = CostWatch(tell)
+    watch = CostWatch(report)
     run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
-    tell("writing", 0, 0)
+    report("writing", 0, 0)
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
         _write(run, folder, job)
@@ -130,3 +134,36 @@ def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
             for name, r in run.results.items()
         }
     }
+
+
+class CostWatch:
+    """Around the work of estimators, one at a time: notes the peak memory of each, and reports progress."""
+
+    def __init__(self, report: Report) -> None:
+        self.peak_mb: dict[str, float] = {}
+        """peak resident memory of the process, MB, by estimator; missing where the system has no measure of it"""
+        self._report = report
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[Progress]:
+        """The `Watch` of `solve_all`."""
+        self._report(name, 0, 0)
+        forgotten = _forget_peak()
+        yield lambda done, total, /: self._report(name, done, total)
+        if forgotten and (peak := _peak_mb()) is not None:
+            self.peak_mb[name] = peak
+
+
+def _forget_peak() -> bool:
+    try:
+        Path("/proc/self/clear_refs").write_text(RESET_PEAK)
+    except OSError:
+        return False
+    return True
+
+
+def _peak_mb() -> float | None:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024 / 1e6
+    return None

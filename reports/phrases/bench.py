@@ -1,4 +1,4 @@
-"""What a bench says, in sentences: what failed first, then who is best and how sure that is, then consistency."""
+"""Sentences and captions of a bench: failures first, then accuracy with its uncertainty, then consistency."""
 
 from math import isfinite
 from typing import Any
@@ -8,11 +8,29 @@ import pandas as pd
 from fgbaseline.reports.phrases.run_accuracy import SAME_GRAPH
 
 from ..formatting import interval, listed, number
-from .results import ANSWERED, METRICS, Metric, Results
-from .tables import consistency, judge, overall, rankings, records
+from ..results.bench import ANSWERED, Results
+from ..tables.bench_statistics import METRICS, Metric, consistency, judge, overall, rankings, records
 
 MOST_CASES = 10
-"""that are told one by one"""
+"""that have a sentence each"""
+TABLE = (
+    "Means over the runs of a case; of errors in m and of held-out tracks with 95 % intervals where there are several "
+    "runs (Student's t). Error to truth after SE(3) alignment (RMSE); divergence from the reference of each run (RMSE);"
+    " both over the frames that all estimators of a run have; coverage is the share of the time in which an estimator "
+    "has poses. Reprojection is the median over all observations, 'of common' over those that every estimator used. "
+    "ANEES: 6 is consistent; ↑ marks estimators that are surer than they may be, ↓ those less sure, by chi-square at "
+    "95 %. Best of a case in bold."
+)
+FIGURES = {
+    "accuracy": "One mark an estimator; where there are several seeds, the line is the 95 % interval of the mean.",
+    "accuracy_against_time": "The time an estimator took for a frame, on this machine and beside the other workers.",
+    "scaling": "One mark a run; dashed the power of n that fits best, where sizes differ enough. Memory is that of the "
+    "whole process while an estimator worked, some 200 MB of libraries among it.",
+}
+NEES = (
+    "Each frame's NEES averaged over the runs. Inside the band it is what covariances that tell the truth would give; "
+    "errors of neighbouring frames are nearly the same, so a curve stays where it has strayed to for a while."
+)
 
 
 def sentences(results: Results) -> list[str]:
@@ -22,14 +40,14 @@ def sentences(results: Results) -> list[str]:
 
 def _failures(results: Results) -> list[str]:
     n = len(results.planned)
-    said = []
+    text = []
     if results.failures:
-        said.append(f"{len(results.failures)} of {n} runs failed altogether; why is said below.")
+        text.append(f"{len(results.failures)} of {n} runs failed altogether; why is said below.")
     failed = results.runs[
         ~results.runs["status"].isin(ANSWERED) & ~results.runs["run"].isin(list(results.failures))
     ].groupby("estimator", sort=False)
-    said += [f"{name} gave no answer in {len(rows)} of {n} runs." for name, rows in failed]
-    return said
+    text += [f"{name} gave no answer in {len(rows)} of {n} runs." for name, rows in failed]
+    return text
 
 
 def _trust(results: Results) -> list[str]:
@@ -45,24 +63,24 @@ def _trust(results: Results) -> list[str]:
 
 
 def _best(results: Results) -> list[str]:
-    """Of each case, by what it has: truth, else held-out tracks."""
+    """The most accurate estimator of each case, by truth, else by held-out tracks."""
     ranked = rankings(results)
     if ranked.empty:
         return ["No run has a truth or held-out tracks, so nothing says which estimator is the most accurate."]
     of_case = {str(case): table for case, table in ranked.groupby("case", sort=False)}
     if len(of_case) > MOST_CASES:
         return []
-    said = []
+    text = []
     for case, table in of_case.items():
         metric = next(metric for metric in METRICS if (table["metric"] == metric.name).any())
         reference = results.references.get(case)
         unranked = frozenset(SAME_GRAPH) - {reference} if reference in SAME_GRAPH else frozenset()
-        said.append(_winner(case, table[table["metric"] == metric.name], metric, unranked))
+        text.append(winner(case, table[table["metric"] == metric.name], metric, unranked))
     without = [case for case in results.cases if case not in of_case]
-    return [*said, f"Nothing says who is most accurate in {listed(without)}."] if without else said
+    return [*text, f"Nothing says who is most accurate in {listed(without)}."] if without else text
 
 
-def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[str]) -> str:
+def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[str]) -> str:
     """The least mean error among those that answered in every run, where the paired interval separates it.
 
     Other minima of the reference's graph are no competitors of it.
@@ -84,16 +102,16 @@ def _winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset
     tied = [row["estimator"] for row in others if row["tied"] or number(row["mean"]) == best]
     least = f"{figures[first['estimator']]} over {most} runs"
     if tied:
-        said = f"{case}: {metric.title} {first['estimator']} {least}; these do not separate {listed(tied)} from it"
+        text = f"{case}: {metric.title} {first['estimator']} {least}; these do not separate {listed(tied)} from it"
     else:
-        said = f"{case}: {first['estimator']} has the least {metric.title}, {least}"
+        text = f"{case}: {first['estimator']} has the least {metric.title}, {least}"
     apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if row["estimator"] not in tied]
     larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
-    return f"{said}{larger}{left_out}."
+    return f"{text}{larger}{left_out}."
 
 
 def _answers(row: dict[str, Any], first: dict[str, Any], most: int, metric: Metric) -> str:
-    """How many runs an estimator answered, and how it is beside the first one where both did."""
+    """Number of runs that an estimator answered, and its difference from the first one where both did."""
     answered = f"{row['runs']} of {most} runs"
     if first["rank"] != 1 or not isfinite(row["behind"]):
         return answered
@@ -116,9 +134,9 @@ def _consistency(results: Results) -> list[str]:
     table = consistency(results)
     if table.empty:
         return []
-    said = []
+    text = []
     for case, of_case in table[table["runs"] > 1].groupby("case", sort=False):
-        told = [f"{row['estimator']} {number(row['anees'])} ({row['verdict']})" for row in records(of_case)]
+        figures = [f"{row['estimator']} {number(row['anees'])} ({row['verdict']})" for row in records(of_case)]
         low, high = (number(float(of_case[side].iloc[0])) for side in ("low", "high"))
-        said.append(f"{case}: ANEES {listed(told)}; 95 % bounds {low} to {high}.")
-    return said if len(said) <= MOST_CASES else []
+        text.append(f"{case}: ANEES {listed(figures)}; 95 % bounds {low} to {high}.")
+    return text if len(text) <= MOST_CASES else []

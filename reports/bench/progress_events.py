@@ -1,27 +1,99 @@
-"""Progress of a bench on standard error: the whole, every worker, and the time left."""
+"""Progress of workers, through small files here and through events on a Dask cluster, and its display on stderr."""
 
+import contextlib
+import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from .channels import Tiding
 from .job import Planned
-from .work import Outcome
+from .worker import Outcome
 
+TOPIC = "fgbaseline-bench"
 WHOLE_BENCH = 1e9
 """s over which the speed of the whole is averaged"""
+INTERVAL = 0.3
+"""s between two events of the same work"""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgressEvent:
+    """The step that a worker is at."""
+
+    worker: str
+    key: str
+    """of its job; empty while it has none"""
+    doing: str
+    """an estimator's name, or `reading` and `writing`"""
+    done: int
+    total: int
+    """frames; 0 where they are not counted"""
+
+
+@dataclass(frozen=True, slots=True)
+class FileChannel:
+    """A file for each process in a folder."""
+
+    folder: Path
+
+    def __call__(self, key: str, doing: str, done: int, total: int) -> None:
+        """Reports progress, at most every `INTERVAL`."""
+        if not _due(key, doing):
+            return
+        place = self.folder / str(os.getpid())
+        partial = place.with_suffix(".partial")
+        with contextlib.suppress(OSError):  # the folder is gone when the bench has ended
+            partial.write_text(json.dumps([key, doing, done, total]))
+            partial.replace(place)
+
+    def events(self) -> Iterator[ProgressEvent]:
+        """The last of each worker."""
+        for place in sorted(self.folder.iterdir()):
+            if place.suffix == "":
+                with contextlib.suppress(OSError, ValueError):
+                    yield ProgressEvent(place.name, *json.loads(place.read_text()))
+
+
+@dataclass(frozen=True, slots=True)
+class EventChannel:
+    """Events of a Dask worker, which the scheduler hands on."""
+
+    def __call__(self, key: str, doing: str, done: int, total: int) -> None:
+        """Reports progress, at most every `INTERVAL`."""
+        if not _due(key, doing):
+            return
+        from distributed import get_worker
+
+        worker = get_worker()
+        worker.log_event(TOPIC, [worker.name, key, doing, done, total])
+
+
+_last = ("", "", 0.0)
+
+
+def _due(key: str, doing: str) -> bool:
+    """Whether the work is another, or the last event of it old enough; then it counts as reported."""
+    global _last
+    now = time.monotonic()
+    if _last[:2] == (key, doing) and now - _last[2] < INTERVAL:
+        return False
+    _last = (key, doing, now)
+    return True
 
 
 class Board(Protocol):
     """Where progress is shown."""
 
-    def look(self, tidings: Iterable[Tiding], /) -> None:
-        """What workers are doing."""
+    def look(self, events: Iterable[ProgressEvent], /) -> None:
+        """Takes the events of the workers."""
         ...
 
     def done(self, outcome: Outcome, /) -> None:
@@ -37,8 +109,8 @@ class LineBoard:
         self._work = sum(planned.work for planned in jobs.values())
         self._worked, self._ended = 0.0, 0
 
-    def look(self, tidings: Iterable[Tiding]) -> None:
-        """Says nothing."""
+    def look(self, events: Iterable[ProgressEvent]) -> None:
+        """Shows nothing."""
 
     def done(self, outcome: Outcome) -> None:
         """A line, with the time left by the work that is done."""
@@ -46,7 +118,9 @@ class LineBoard:
         self._worked, self._ended = self._worked + planned.work, self._ended + 1
         left = (time.monotonic() - self._start) * (self._work / self._worked - 1.0) if self._worked else 0.0
         about = f", about {duration(left)} left" if self._ended < len(self._jobs) else ""
-        print(f"{self._ended} of {len(self._jobs)}{about}: {told(planned, outcome)}", file=sys.stderr, flush=True)
+        print(
+            f"{self._ended} of {len(self._jobs)}{about}: {summary_line(planned, outcome)}", file=sys.stderr, flush=True
+        )
 
 
 class BarBoard:
@@ -63,18 +137,18 @@ class BarBoard:
     def _count(self) -> str:
         return f"{self._ended} of {len(self._jobs)} runs"
 
-    def look(self, tidings: Iterable[Tiding]) -> None:
+    def look(self, events: Iterable[ProgressEvent]) -> None:
         """Moves the bars of the workers."""
-        for tiding in tidings:
-            name = self._jobs[tiding.key].name if tiding.key in self._jobs else ""
-            text = f"  {name}: {tiding.doing}" if name else "  waiting"
-            row, before = self._rows.get(tiding.worker, (None, ""))
+        for event in events:
+            name = self._jobs[event.key].name if event.key in self._jobs else ""
+            text = f"  {name}: {event.doing}" if name else "  waiting"
+            row, before = self._rows.get(event.worker, (None, ""))
             if row is None:
                 row = self._each.add_task(text, total=None)
             elif before != text:
                 self._each.reset(row, total=None, description=text)
-            self._rows[tiding.worker] = (row, text)
-            self._each.update(row, completed=tiding.done, total=tiding.total or None)
+            self._rows[event.worker] = (row, text)
+            self._each.update(row, completed=event.done, total=event.total or None)
 
     def done(self, outcome: Outcome) -> None:
         """A line above the bars for one that failed; moves the bar of the whole."""
@@ -82,11 +156,11 @@ class BarBoard:
         self._ended += 1
         self._whole.update(self._task, advance=planned.work, description=self._count())
         if outcome.failure:
-            self._say(told(planned, outcome))
+            self._say(summary_line(planned, outcome))
 
 
-def told(planned: Planned, outcome: Outcome) -> str:
-    """How a job ended, in a line."""
+def summary_line(planned: Planned, outcome: Outcome) -> str:
+    """The outcome of a job in a line."""
     return f"{planned.name}: " + (f"failed: {outcome.failure}" if outcome.failure else duration(outcome.seconds))
 
 

@@ -1,14 +1,50 @@
-"""The tables of a bench: cases (sequence and settings) by estimators, averaged over seeds."""
+"""Statistics of a bench: cases (sequence and settings) by estimators, averaged over seeds; rankings; consistency."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
+from fgbaseline.compare.limits import Better
 
-from .results import ANSWERED, METRICS, Metric, Results
+from ..results.bench import ANSWERED, Results
+from .table import Column
+
+
+@dataclass(frozen=True, slots=True)
+class Metric(Column):
+    """A figure of a run's summary, and its column."""
+
+    name: str = ""
+    """in the CSV tables"""
+    ranked: bool = False
+    """whether it measures accuracy"""
+    most: float = np.inf
+
+
+METRICS = (
+    Metric("error to truth", unit="m", path=("ate_common", "rmse"), name="ate", ranked=True, better=Better.LOWER),
+    Metric("held-out error", unit="px", path=("held_out", "median"), name="held_out", ranked=True, better=Better.LOWER),
+    Metric("from the reference", unit="m", path=("divergence_common", "rmse"), name="divergence", better=Better.LOWER),
+    Metric("reprojection", unit="px", path=("reprojection", "median"), name="reprojection", better=Better.LOWER),
+    Metric(
+        "reprojection of common",
+        unit="px",
+        path=("reprojection_common", "median"),
+        name="reprojection_common",
+        better=Better.LOWER,
+    ),
+    Metric(
+        "under 3 px", unit="share", path=("reprojection", "under_3px"), name="under_3px", most=1.0, better=Better.HIGHER
+    ),
+    Metric("NEES", unit="", path=("nees", "mean"), name="nees"),
+    Metric("NEES from the reference", unit="", path=("nees_reference", "median"), name="nees_reference"),
+    Metric("coverage", unit="share", path=("coverage",), name="coverage", most=1.0),
+    Metric("matches used", unit="share", path=("observations", "share"), name="used", most=1.0),
+)
 
 
 def cases(results: Results) -> pd.DataFrame:
@@ -36,7 +72,7 @@ def cases(results: Results) -> pd.DataFrame:
 
 
 def rankings(results: Results) -> pd.DataFrame:
-    """Estimators ranked in every case by each metric that stands for accuracy: see `compare.monte_carlo_ranking`."""
+    """Estimators ranked in every case by each metric of accuracy: see `compare.monte_carlo_ranking`."""
     parts = []
     for case in results.cases:
         for metric in (metric for metric in METRICS if metric.ranked):
@@ -80,7 +116,7 @@ def overall(results: Results) -> pd.DataFrame:
 
 
 def consistency(results: Results) -> pd.DataFrame:
-    """ANEES of each estimator over the runs of a case that has truth, with chi-square bounds, and what follows."""
+    """ANEES of each estimator over the runs of a case that has truth, with chi-square bounds and verdict."""
     rows = []
     for case in results.cases:
         for name in results.estimators:
@@ -101,12 +137,6 @@ def nees_over_time(results: Results) -> pd.DataFrame:
         table.insert(0, "case", case)
         parts.append(table)
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
-
-
-def judge(results: Results) -> Metric | None:
-    """Metric by which accuracy is judged: error to truth, else that on held-out tracks, else none."""
-    ranked = (metric for metric in METRICS if metric.ranked)
-    return next((metric for metric in ranked if results.runs[metric.name].notna().any()), None)
 
 
 def costs(results: Results) -> pd.DataFrame:
@@ -131,6 +161,12 @@ def costs(results: Results) -> pd.DataFrame:
     )
 
 
+def judge(results: Results) -> Metric | None:
+    """The metric of accuracy: error to truth, else that on held-out tracks, else none."""
+    ranked = (metric for metric in METRICS if metric.ranked)
+    return next((metric for metric in ranked if results.runs[metric.name].notna().any()), None)
+
+
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """The rows, by column."""
     return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
@@ -150,7 +186,7 @@ def _wide(runs: pd.DataFrame, metric: str, estimators: list[str]) -> pd.DataFram
 
 
 def _least(trust: pd.Series) -> str:
-    """The worst that the references of several runs were judged."""
+    """The worst trust in the references of several runs."""
     found = set(trust.dropna())
     return next((word for word in ("untrusted", "doubtful", "trusted") if word in found), "")
 

@@ -13,7 +13,7 @@ from typing import Any
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
-from .work import Outcome
+from .worker import Outcome
 
 MARK = "bench.json"
 """the file by which a bench's folder is known"""
@@ -23,8 +23,8 @@ PARTIAL = ".partial"
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
-    """The folder, while nobody else writes into it: see `opened`."""
+class RunCache:
+    """The folder, locked against other benches: see `opened`."""
 
     folder: Path
 
@@ -38,19 +38,19 @@ class Store:
 
     def failure(self, key: str) -> str:
         """Why a job that is done has no run; empty where it has one."""
-        return str(self.told(key)["failure"])
+        return str(self.record(key)["failure"])
 
-    def told(self, key: str) -> dict[str, Any]:
+    def record(self, key: str) -> dict[str, Any]:
         """Failure and seconds of a job that is done."""
-        told: dict[str, Any] = json.loads((self.run(key) / JOB).read_text(encoding="utf-8"))
-        return told
+        record: dict[str, Any] = json.loads((self.run(key) / JOB).read_text(encoding="utf-8"))
+        return record
 
     def keep(self, outcome: Outcome) -> None:
         """Writes the outcome of a job, all of it or nothing."""
         building = self.run(outcome.key).with_name(outcome.key + PARTIAL)
         shutil.rmtree(building, ignore_errors=True)
-        told = {"failure": outcome.failure, "seconds": outcome.seconds}
-        files = {**outcome.files, JOB: json.dumps(told).encode()}
+        record = {"failure": outcome.failure, "seconds": outcome.seconds}
+        files = {**outcome.files, JOB: json.dumps(record).encode()}
         for name, content in files.items():
             path = building / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,7 +73,7 @@ class Store:
 
 
 @contextmanager
-def opened(folder: Path, *, force: bool) -> Iterator[Store]:
+def opened(folder: Path, *, force: bool) -> Iterator[RunCache]:
     """The folder of a bench, made or found, until the block ends; with `force` without the runs it held.
 
     Raises InputError for a folder that is none of ours, cannot be written, or that another bench is writing to.
@@ -95,7 +95,7 @@ def opened(folder: Path, *, force: bool) -> Iterator[Store]:
                 mark.write('{"schema": "fgbaseline/bench-folder/1"}\n')
                 mark.flush()
             (folder / RUNS).mkdir(exist_ok=True)
-            store = Store(folder)
+            store = RunCache(folder)
             keep = () if force else [path.name for path in (folder / RUNS).iterdir() if (path / JOB).is_file()]
             store.forget(but=[name for name in keep if not name.endswith(PARTIAL)])
             yield store

@@ -1,4 +1,4 @@
-"""What decides a result beside its settings: the content of files, and the code that runs."""
+"""The parts of a cache key that are not settings: the content of files, and the code that runs."""
 
 import hashlib
 import platform
@@ -26,12 +26,12 @@ def code_of(estimators: tuple[str, ...], pages: bool) -> str:
 
     So a change to our source, released or not, runs every job anew; one to the report of a bench does not.
     """
-    told = hashlib.sha256(platform.python_version().encode())
+    digest = hashlib.sha256(platform.python_version().encode())
     for library in LIBRARIES:
-        told.update(f"{library} {version(library)}\n".encode())
+        digest.update(f"{library} {version(library)}\n".encode())
     for file in sorted({*_ours(pages), *_others(estimators)}):
-        told.update(f"{file.parent.name}/{file.name}\n".encode() + file.read_bytes())
-    return told.hexdigest()
+        digest.update(f"{file.parent.name}/{file.name}\n".encode() + file.read_bytes())
+    return digest.hexdigest()
 
 
 def _ours(pages: bool) -> Iterator[Path]:
@@ -39,9 +39,9 @@ def _ours(pages: bool) -> Iterator[Path]:
         yield from _folder(f"fgbaseline.{room}").rglob("*.py")
     reports = _folder("fgbaseline.reports")
     yield from reports.glob("*.py")
-    yield from (reports / "bench" / name for name in ("work.py", "costs.py"))
+    yield from (reports / "bench" / name for name in ("worker.py", "job.py", "cache_key.py"))
     if pages:
-        for part in ("figures", "html", "results", "tables"):
+        for part in ("figures", "html", "phrases", "results", "tables"):
             yield from (file for file in (reports / part).rglob("*") if file.suffix in (".py", ".html", ".css", ".js"))
 
 

@@ -12,8 +12,8 @@ from fgbaseline.data.simulate import Simulation, Velocities, simulate_with_label
 from fgbaseline.data.simulate.rig import rig_of
 from fgbaseline.geometry import FloatArray
 
-from .the_report import TRACKS_PER_FRAME
-
+TRACKS_PER_FRAME = 13_289 / 3_026
+"""new tracks a frame of 10.npz, which a recording simulated in its place has too"""
 ANGULAR_AXES = "x,-y,-z"
 """in which the rates are recorded: what the diagnosis finds in 03.npz, which came from the same car and course"""
 STANDSTILL = 0.2
@@ -26,7 +26,7 @@ FIRST_TRY, MORE, TRIES = 14.0, 1.3, 6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StandIn:
-    """The simulated recording, what was put into it, and how that is told."""
+    """The simulated recording, its faults, and a sentence about them."""
 
     sequence: Sequence
     angular_axes: str
@@ -55,13 +55,13 @@ def stand_in(recorded: Sequence, seed: int = 0) -> StandIn:
     )
     wanted = round(TRACKS_PER_FRAME * recorded.n_frames)
     sequence, wrong = _of_size(simulation, wanted, seed)
-    told = (
+    remark_on_all = (
         f"Simulated: {recorded.name} has no features here, so "
         f"{plural(sequence.n_landmarks, 'track was', 'tracks were')} simulated "
         f"along its real velocities, the rates recorded in other axes ({ANGULAR_AXES}, as found in 03.npz), {remark}, "
         f"{wrong.mean():.0%} of the matches wrong."
     )
-    return StandIn(replace(sequence, name=f"{recorded.name} (simulated)"), ANGULAR_AXES, bias, wrong, told)
+    return StandIn(replace(sequence, name=f"{recorded.name} (simulated)"), ANGULAR_AXES, bias, wrong, remark_on_all)
 
 
 def _bias(recorded: Sequence) -> tuple[FloatArray, str]:

@@ -1,31 +1,37 @@
-"""What was measured: the summary that `run`, `compare` and `bench` leave behind, or a baseline made from one."""
+"""The reader of summary.json (run, bench), comparison.json and baselines, and of the other files of a run's folder."""
 
 import difflib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from fgbaseline.data import Landmarks, Trajectory
+from fgbaseline.data.formats import read_landmarks, read_trajectory
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
-from ..results.tree import INFINITE
+from .tree import INFINITE, leaves
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SUMMARY = "summary.json"
 COMPARISON = "comparison.json"
+TRUTH = "truth.tum"
 BASELINE = "fgbaseline/baseline/1"
 NO_SUCH_METRIC = "it has no such metric"
 DIGITS = 5
 """significant ones, of a baseline: what lies beyond differs between processors and libraries"""
 NO_METRICS = frozenset({"status", "reason", "notes", "events"})
-"""what a summary says of an estimator beside its metrics (a kind of event that did not occur is not even a zero)"""
+"""keys of an estimator beside its metrics (a kind of event that did not occur is not even a zero)"""
 ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"})
-"""what is measured from the reference"""
+"""metrics that are measured from the reference"""
 
 
 class _Part(BaseModel):
@@ -33,16 +39,16 @@ class _Part(BaseModel):
 
 
 class Reference(_Part):
-    """What divergence is measured from, and how far it can be leaned on."""
+    """The reference that divergence is measured from, and the trust in it."""
 
     name: str | None = None
     trust: Literal["trusted", "doubtful", "untrusted"] | None = None
-    """None where nobody can say: a trajectory that the user gave"""
+    """None where it is unknown: a trajectory that the user gave"""
     reasons: tuple[str, ...] = ()
 
 
 class Sequence(_Part):
-    """What was recorded."""
+    """The recording."""
 
     name: str = ""
 
@@ -77,15 +83,54 @@ class _Several(_Part):
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One run or several, by name."""
+    """The content of a summary: one run or several, by name."""
 
     path: Path
     runs: Mapping[str, MeasuredRun]
     schema: str
 
 
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """The files of a run beside its summary; each method raises InputError where its file is missing or damaged."""
+
+    folder: Path
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """`summary.json` as it is."""
+        path = self.folder / SUMMARY
+        with reading(path):
+            return _document(path)
+
+    def trajectory(self, name: str) -> Trajectory:
+        """The path of an estimator."""
+        return read_trajectory(self.folder / "trajectories" / f"{name}.tum", "tum", name=name)
+
+    @property
+    def truth(self) -> Trajectory | None:
+        """The ground truth; None where the recording has none."""
+        path = self.folder / TRUTH
+        return read_trajectory(path, "tum", name="truth") if path.is_file() else None
+
+    def landmarks(self, name: str) -> Landmarks:
+        """The landmarks of an estimator."""
+        return read_landmarks(self.folder / "landmarks" / f"{name}.csv")
+
+    def series(self, name: str) -> "pd.DataFrame":
+        """One row per frame of an estimator."""
+        import pandas as pd  # half a second, which a check does without
+
+        path = self.folder / "series" / f"{name}.csv"
+        with reading(path):
+            try:
+                return pd.read_csv(regular_file(path))
+            except ValueError as error:
+                raise InputError(f"it is not the table that a run writes ({error}); run it again") from error
+
+
 def read_folder(folder: Path) -> Measured:
-    """What a folder's summary.json or comparison.json holds. Raises InputError."""
+    """The content of a folder's summary.json or comparison.json. Raises InputError."""
     wanted = "give one that fgbaseline run, compare or bench wrote"
     if not folder.is_dir():
         raise InputError(f"{shown(folder)}: there is no such folder; {wanted}")
@@ -96,15 +141,9 @@ def read_folder(folder: Path) -> Measured:
 
 
 def read_measured(path: Path) -> Measured:
-    """What a summary.json, a comparison.json or a baseline holds. Raises InputError naming file and place."""
+    """The content of a summary.json, a comparison.json or a baseline. Raises InputError naming file and place."""
     with reading(path):
-        text = regular_file(path).read_bytes()
-        try:
-            document = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"this is not JSON ({error}); give a {SUMMARY} or a baseline") from None
-        if not isinstance(document, dict) or not str(document.get("schema", "")).startswith("fgbaseline/"):
-            raise InputError(f'it has no "schema" of fgbaseline\'s; give a {SUMMARY} or a baseline')
+        document = _document(path)
         try:
             if "runs" in document:
                 runs = dict(_Several.model_validate(document).runs)
@@ -118,6 +157,16 @@ def read_measured(path: Path) -> Measured:
     return Measured(path, runs, str(document["schema"]))
 
 
+def _document(path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(regular_file(path).read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"this is not JSON ({error}); give a {SUMMARY} or a baseline") from None
+    if not isinstance(document, dict) or not str(document.get("schema", "")).startswith("fgbaseline/"):
+        raise InputError(f'it has no "schema" of fgbaseline\'s; give a {SUMMARY} or a baseline')
+    return document
+
+
 def failure(estimator: Mapping[str, Any]) -> str | None:
     """Why an estimator has no answer; None where it has one."""
     if estimator.get("status", "ok") != "failed":
@@ -126,7 +175,7 @@ def failure(estimator: Mapping[str, Any]) -> str | None:
 
 
 def missing_in(estimator: Mapping[str, Any], metric: str) -> int:
-    """How many errors the figure at a path leaves out since they are missing (NaN)."""
+    """Number of errors that the figure at a path leaves out because they are missing (NaN)."""
     found = _at(estimator, f"{metric.rpartition('.')[0]}.missing") if "." in metric else 0
     return found if isinstance(found, int) else 0
 
@@ -154,7 +203,7 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
 
 
 def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] | None:
-    """What a metric is taken over: the `n` and the `coverage` under `samples` with the longest beginning of its path.
+    """The sample of a metric: the `n` and the `coverage` under `samples` with the longest beginning of its path.
 
     None for what is no statistic, such as a count or a time, and for the summaries of versions without samples.
     """
@@ -165,11 +214,15 @@ def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] 
 
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:
     """The paths of all numbers of an estimator."""
-    return [path for path, _ in _numbers(estimator, "") if path.partition(".")[0] not in NO_METRICS]
+    return [
+        path
+        for path, value in leaves(estimator)
+        if path.partition(".")[0] not in NO_METRICS and isinstance(value, int | float) and not isinstance(value, bool)
+    ]
 
 
 def nearest(metric: str, known: list[str]) -> str:
-    """What somebody may have meant who wrote `metric`, as the end of a sentence."""
+    """Known metrics that resemble `metric`, as the end of a sentence."""
     below = [path for path in known if path.startswith(f"{metric}.")]
     near = below or difflib.get_close_matches(metric, known, n=3) or known
     return ", ".join(near[:8]) + (", ..." if len(near) > 8 else "")
@@ -179,12 +232,12 @@ _ABSENT = object()
 
 
 def _at(estimator: Mapping[str, Any], metric: str) -> Any:
-    """What stands at a path; None where a null stands on the way, _ABSENT where there is nothing."""
+    """The value at a path; None where a null stands on the way, _ABSENT where there is nothing."""
     return _ABSENT if metric.partition(".")[0] in NO_METRICS else _below(estimator, metric)
 
 
 def _below(found: Any, path: str) -> Any:
-    """The same from anywhere; keys may have dots in them, such as the '0.5 s' of a relative error."""
+    """The value below any node; keys may have dots in them, such as the '0.5 s' of a relative error."""
     if found is None:
         return None
     if not isinstance(found, Mapping):
@@ -193,11 +246,3 @@ def _below(found: Any, path: str) -> Any:
         return found[path]
     inner = (_below(found[key], path[len(key) + 1 :]) for key in found if path.startswith(f"{key}."))
     return next((each for each in inner if each is not _ABSENT), _ABSENT)
-
-
-def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _numbers(inner, f"{path}.{key}" if path else key)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield path, float(value)

@@ -10,9 +10,8 @@ from fgbaseline.data.problem.documented import SLAM_PIXEL_VARIANCE
 from fgbaseline.diagnosis import Diagnosis, diagnose
 from fgbaseline.geometry import FloatArray
 
+from .recordings import MAPPED, Subject
 from .stages import Stage, diagnosed_stages, simulated_stages
-from .subjects import Subject
-from .the_report import MAPPED
 from .trial import Outcome, Settings, judged, pose, run
 
 LOW_PIXEL_VARIANCE = 0.01
@@ -102,7 +101,7 @@ def study(
     found: tuple[Diagnosis | None, list[Stage]],
     progress: Progress,
 ) -> Study:
-    """Runs the documented filter on a recording in every way that the report tells of."""
+    """Runs the documented filter on a recording with every setting that the report names."""
     diagnosis, stages = found
     sequence, last = subject.studied, stages[-1].sequence
     grid = [Settings(n, v) for v in sweep.pixel_variances for n in sweep.features]
@@ -154,7 +153,7 @@ def _one(sequence: Sequence, settings: Settings, tick: Iterator[None]) -> Outcom
 
 
 def _ticks(runs: int, frames: int, progress: Progress) -> Iterator[None]:
-    """Tells of one more run over all frames each time it is asked."""
+    """Reports one more run over all frames at each step."""
     for done in range(1, runs + 1):
         progress(done * frames, runs * frames)
         yield

@@ -1,0 +1,64 @@
+"""The table of a check: a row for each limit and estimator."""
+
+from collections.abc import Mapping
+
+from fgbaseline.compare.limits import Outcome
+
+from ..phrases.check import bound, change, number
+from ..results.check import Checked, Line
+from .table import Cell, Column, Row, Table
+
+COLUMNS = (
+    Column("estimator", words=True),
+    Column("metric", words=True),
+    Column("value"),
+    Column("bound"),
+    Column("margin"),
+    Column("baseline"),
+    Column("change"),
+)
+_METERS = ("ate", "ate_unaligned", "divergence")
+_PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
+_NO_UNIT = ("behind_camera", "n", "under_3px", "rank", "block", "sse")
+
+
+def check_table(checked: Checked, signs: Mapping[Outcome, str] | None = None) -> Table:
+    """The lines of a check, `signs` before their outcomes; several runs have a column of their names."""
+    several = len(checked.measured.runs) > 1
+    rows = []
+    for line in checked.lines:
+        texts = cells(line)
+        outcome = f"{signs[line.outcome]} {line.outcome}" if signs else line.outcome.value
+        shown = [text for title, text in texts.items() if title != "limit" and (several or title != "run")]
+        rows.append(Row(outcome, tuple(map(Cell, shown)), status=line.outcome.value))
+    columns = (Column("run", words=True), *COLUMNS) if several else COLUMNS
+    return Table(columns, tuple(rows), name="limit")
+
+
+def cells(line: Line) -> dict[str, str]:
+    """The texts of a line, by column."""
+    return {
+        "limit": line.outcome.value,
+        "run": line.run,
+        "estimator": line.estimator,
+        "metric": f"{line.metric}{f' ({unit})' if (unit := unit_of(line.metric)) else ''}",
+        "value": number(line.value),
+        "bound": bound(line.bounds, line.tolerance),
+        "margin": number(line.margin, sign=True),
+        "baseline": number(line.before),
+        "change": change(line),
+    }
+
+
+def unit_of(metric: str) -> str:
+    """The unit of a metric of summary.json or comparison.json; empty for counts, shares and what is not known."""
+    parts = metric.split(".")
+    if parts[-1] in _NO_UNIT:
+        return ""
+    if any(part.endswith("_deg") for part in parts):
+        return "deg"
+    if parts[0] in _PIXELS:
+        return "px"
+    if parts[0] in _METERS or "translation" in parts or metric in ("map.median", "map.median_seen", "final_m"):
+        return "m"
+    return {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
