@@ -48,22 +48,28 @@ def monte_carlo_ranking(errors: pd.DataFrame) -> pd.DataFrame:
     `behind`, `behind_low`, `behind_high` over the runs that both answered. `tied` where that interval is not above
     zero, as for a single run, which has no interval. An estimator with fewer answers ranks behind all with more,
     whatever its mean, since failures are more frequent on hard runs; its `behind` can be negative. Estimators with
-    equally many answers are averaged over the runs that all of them answered, so that order and `behind` agree.
+    equally many answers are averaged over the runs that all of them answered, so that order and `behind` agree; where
+    there is no such run, `behind` of those with as many answers as the first is NaN, and they are tied.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
     answers = {name: int((~np.isnan(value)).sum()) for name, value in values.items()}
+    unpaired = set[int]()
     for n in set(answers.values()) - {0}:
         alike = [name for name in values if answers[name] == n]
         common = ~np.isnan([values[name] for name in alike]).any(axis=0)
         if common.any():
             values |= {name: np.where(common, values[name], np.nan) for name in alike}
+        else:
+            unpaired.add(n)
     means = {name: mean_interval(value) for name, value in values.items()}
     order = sorted((name for name in values if answers[name]), key=lambda name: (-answers[name], means[name].value))
     rows = []
     for rank, name in enumerate(order, 1):
         with np.errstate(invalid="ignore"):
             apart = np.where(values[name] == values[order[0]], 0.0, values[name] - values[order[0]])
+        if answers[name] == answers[order[0]] and answers[name] in unpaired and rank > 1:
+            apart = np.full_like(apart, np.nan)
         behind = mean_interval(apart)
         infinite = behind.value == np.inf and behind.n > 1
         tied = rank == 1 or not (behind.low > 0.0 or infinite)

@@ -51,7 +51,7 @@ def test_nees_knows_no_rigid_motion_of_the_world_that_the_alignment_undoes(
     folder = tmp_path_factory.mktemp("world")
     truth, poses, covariance = dead_reckoned(seed)
     expected = nees(folder, truth, poses, covariance, align="none")
-    assert 2.0 < expected < 15.0
+    assert 0.3 < expected < 30.0  # errors of one path are correlated: its mean scatters as a single pose's
     assert nees(folder, truth, se3.exp(twist) @ poses, covariance, align=kind) == pytest.approx(expected, rel=1e-6)
 
 
