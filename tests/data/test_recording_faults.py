@@ -311,3 +311,11 @@ def test_case_49_a_truth_of_one_orientation_throughout_is_refused(recordings: Re
     truth = recordings("cases/49-truth-one-frame/truth_ns.tum")
     with pytest.raises(InputError, match="positions without orientations"):
         data.read(recordings("cases/49-truth-one-frame/drive.npz"), truth, "imu")
+
+
+@pytest.mark.parametrize("key", ["linear_velocity", "angular_velocity", "time_stamps", "b", "imu_T_cam"])
+def test_numbers_that_no_sensor_measures_are_refused_by_name(tmp_path: Path, key: str) -> None:
+    array = np.array(arrays_of()[key], dtype=np.float64)
+    array[(0, -1) if array.ndim > 1 else ()] = 1e300
+    with pytest.raises(InputError, match=rf"drive\.npz: {key}: .*1e\+?300|drive\.npz: {key}: .*beyond 1e\+60"):
+        data.read(written(tmp_path, **{key: array}))
