@@ -4,17 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fgbaseline.data.formats.quaternion_order import CLEARLY, STEP, fits_clearly_better
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from .alignment import Align, align
 from .association import Matched
 
-STEP = 20
-"""poses between two whose rotation is compared"""
-CLEARLY = 3.0
-"""times: a convention is recognized where it fits so much better than the one assumed"""
-NOTICED = 0.5
-"""deg; a misfit below it is no reason to look for another convention"""
 LEAST_ROTATION = 5.0
 """deg; two bodies that differ by less are taken for one"""
 ROUNDS = 20
@@ -85,11 +80,6 @@ def travel_misfit(position: FloatArray, rotation: FloatArray) -> float:
     usual = np.median(direction, axis=0)
     usual = usual / max(float(np.linalg.norm(usual)), np.finfo(np.float64).tiny)
     return float(np.rad2deg(np.median(np.arccos(np.clip(direction @ usual, -1.0, 1.0)))))
-
-
-def fits_clearly_better(other: float, assumed: float, least: float = NOTICED) -> bool:
-    """Whether a convention fits CLEARLY better than the one assumed, by their misfits; those below `least` do not."""
-    return assumed > least and CLEARLY * other <= assumed
 
 
 def body_rotation(matched: Matched) -> BodyRotation | None:

@@ -73,7 +73,9 @@ class _Numbers:
             expected = tuple("n" if n is None else n for n in shape)
             raise InputError(f"{key}: expected shape {expected}, got {array.shape}; export the problem again")
         if finite and not measurable(array).all():
-            raise InputError(f"{key}: it has entries that are not finite or beyond {LARGEST:g}; export the problem again")
+            raise InputError(
+                f"{key}: it has entries that are not finite or beyond {LARGEST:g}; export the problem again"
+            )
         return array
 
     def whole(self, key: str, *shape: int | None) -> IntArray:

@@ -49,7 +49,9 @@ def vectors(key: str, array: FloatArray) -> FloatArray:
 def extrinsic(key: str, imu_R_cam: FloatArray, position: FloatArray) -> FloatArray:
     """`imu_T_cam` (4, 4) of rotation (3, 3) and position (3,), m. Raises InputError when it is no rigid motion."""
     if not (measurable(imu_R_cam).all() and measurable(position).all()):
-        raise InputError(f"{key}: it has entries that are not finite or beyond {LARGEST:g}; write the extrinsic as a rigid motion")
+        raise InputError(
+            f"{key}: it has entries that are not finite or beyond {LARGEST:g}; write the extrinsic as a rigid motion"
+        )
     defect = float(so3.rotation_defect(imu_R_cam))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(

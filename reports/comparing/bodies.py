@@ -6,6 +6,7 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.data import Trajectory
+from fgbaseline.data.formats.quaternion_order import fits_clearly_better
 from fgbaseline.geometry import FloatArray, InputError
 
 from .entry import Entry
@@ -49,7 +50,7 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     if matched is None or len(matched) < 2:
         return entry
     rmse, inverted = compare.rmse_of_inverses(matched)
-    if compare.fits_clearly_better(inverted, rmse, least=0.0) and rmse > LEAST_MISFIT * _extent(matched.reference):
+    if fits_clearly_better(inverted, rmse, least=0.0) and rmse > LEAST_MISFIT * _extent(matched.reference):
         return _remarked(
             entry,
             f"the inverses of its poses fit {reference.name} to {inverted:.3g} m after SE(3) alignment, and they "
@@ -58,8 +59,8 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     if compare.are_conjugated(matched):
         return _remarked(
             entry,
-            "its orientations fit once transposed: its quaternions are conjugated, as in JPL's convention; write "
-            "Hamilton's, with the signs of x, y and z changed",
+            "its orientations fit once transposed: its quaternions are conjugated, as in JPL's convention and in "
+            "ORB-SLAM3's keyframe files; write Hamilton's, with the signs of x, y and z changed",
         )
     found = compare.body_rotation(matched)
     if found is None or not (compare.is_constant(found) or settings.align_body):

@@ -31,6 +31,7 @@ TITLES = {
     "across": "to the left, m",
     "up": "up, m",
 }
+GROWTH = {"position": "distance, m", "heading_deg": "heading, °"}
 LETTERS = 58
 """that a headline has room for"""
 SLIMMEST = (0.35, 1.1)
@@ -91,13 +92,14 @@ def paths(comparison: Comparison) -> Figure:
 
 def errors(comparison: Comparison) -> Figure:
     """Distance, angle and the three components of the way from the reference, over time."""
-    figure, axes = sheet(8.6, rows=len(TITLES), height_ratios=[1.7, 1.0, 1.0, 1.0, 1.0])
+    every = _known(comparison, TITLES)
+    ratios = [1.7, *[1.0] * (len(every) - 1)]
+    figure, axes = sheet(8.6 * sum(ratios) / 5.7, rows=len(every), height_ratios=ratios)
     handles: list[Line2D] = []
-    for panel, (column, title) in zip(axes, TITLES.items(), strict=True):
-        series = {n: r.departure[column].to_numpy(dtype=np.float64) for n, r in comparison.results.items()}
+    for panel, (column, series) in zip(axes, every.items(), strict=True):
         for name, values in series.items():
             handles += panel.plot(_seconds(comparison, comparison.results[name]), values, **line(comparison, name))
-        panel.set_ylabel(title)
+        panel.set_ylabel(TITLES[column])
         _fit(panel, column, series)
     axes[-1].set_xlabel("time, s" if comparison.reference.trajectory.stamped else "frame")
     rivals = [r for r in comparison.ranked if not r.entry.by_product] or comparison.ranked
@@ -110,20 +112,27 @@ def errors(comparison: Comparison) -> Figure:
 
 def growth(comparison: Comparison) -> Figure:
     """Distance and heading over the length of the path."""
-    figure, axes = sheet(4.6, rows=2)
+    every = _known(comparison, GROWTH)
+    figure, axes = sheet(0.8 + 1.9 * len(every), rows=len(every))
     handles: list[Line2D] = []
-    for panel, (column, title) in zip(
-        axes, {"position": "distance, m", "heading_deg": "heading, °"}.items(), strict=True
-    ):
-        series = {n: r.departure[column].to_numpy(dtype=np.float64) for n, r in comparison.results.items()}
+    for panel, (column, series) in zip(axes, every.items(), strict=True):
         for name, values in series.items():
             travelled = comparison.results[name].departure["travelled"]
             handles += panel.plot(travelled, values, **line(comparison, name))
-        panel.set_ylabel(title)
+        panel.set_ylabel(GROWTH[column])
         _fit(panel, column, series)
     axes[-1].set_xlabel("length of the reference's path so far, m")
     head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure
+
+
+def _known(comparison: Comparison, columns: Mapping[str, str]) -> dict[str, dict[str, FloatArray]]:
+    """The columns of the difference, by estimate, that some estimate has: positions without orientations lack two."""
+    every = {
+        column: {n: r.departure[column].to_numpy(dtype=np.float64) for n, r in comparison.results.items()}
+        for column in columns
+    }
+    return {c: series for c, series in every.items() if any(np.isfinite(values).any() for values in series.values())}
 
 
 def _maps(comparison: Comparison) -> Figure | None:
