@@ -51,9 +51,9 @@ def as_given(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     """The diagnosis of the recording in the units, and with the extrinsic, that are given."""
     units, inverted = repairs.units.given(), repairs.extrinsic_inverted
     same = not diagnosis.units.doubt and all(getattr(diagnosis.units, name) == units[name] for name in units)
-    if same and inverted in (None, diagnosis.inverted):
-        return diagnosis
-    return diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
+    if not (same and inverted in (None, diagnosis.inverted)):
+        diagnosis = diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
+    return replace(diagnosis, units=replace(diagnosis.units, given=frozenset(units)))
 
 
 def _shift(diagnosis: Diagnosis, repairs: Repairs) -> float | None:
