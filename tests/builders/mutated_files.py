@@ -111,8 +111,9 @@ def _trajectory(mutation: Mutation, base: int, random: np.random.Generator, fold
     (folder / "mine.tum").write_text("".join(" ".join(row) + "\n" for row in changed))
     ended = Ended(mutation.name, {})
     code = _called(ended, folder, drawing, "compare", "truth.tum", "mine.tum", "--out", "compared")
-    if code == 0 and not _is_in_doubt(folder / "compared"):
-        return _judged(ended, _compared_errors(folder / "compared"), good_distance(base))
+    if code == 0:
+        judged = slice(1 if _is_in_doubt(folder / "compared") else None)  # positions alone where an order is in doubt
+        return _judged(ended, _compared_errors(folder / "compared")[judged], good_distance(base)[judged])
     return ended
 
 
