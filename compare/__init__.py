@@ -70,7 +70,6 @@ from .trajectory.error_decomposition import ErrorDecomposition, decomposition_in
 from .trajectory.frame_conventions import (
     BodyRotation,
     body_rotation,
-    fits_clearly_better,
     has_conjugated_orientations,
     rmse_of_inverse_poses,
     rotation_misfit,
@@ -137,7 +136,6 @@ __all__ = [
     "error_statistics",
     "evaluated_rows",
     "first_exceedance",
-    "fits_clearly_better",
     "has_conjugated_orientations",
     "held_out_errors",
     "held_out_ranking",

@@ -2,19 +2,21 @@
 
 from dataclasses import dataclass
 
+UNITS = frozenset({"time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"})
+"""codes of values in other units than those of SI"""
 OF_THE_FILE = frozenset(
     {
         "repeated_stamps",
         "stamps_rounded",
         "zero_for_unobserved",
-        "time_unit",
-        "angular_velocity_unit",
-        "linear_velocity_unit",
-        "baseline_unit",
         "extrinsic_inverse",
+        *UNITS,
     }
 )
 """codes of faults of the file itself, which a run prints with every preset"""
+
+AS_GIVEN = "as given"
+"""the certainty of a finding that the user states"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
 
 from .finding import Finding
+from .finite import LARGEST, measurable
 from .observations import BoolArray, Observations
 
 ROTATION_TOLERANCE = 1e-6
@@ -125,7 +126,7 @@ def check_sequence(s: Sequence) -> None:
             f"time_stamps: stamps must rise, but frame {k + 1} ({s.t[k + 1]!r} s) is not after frame {k} ({s.t[k]!r} s)"
         )
     defect = float(so3.rotation_defect(s.imu_T_cam[:3, :3])) if s.imu_T_cam.shape == (4, 4) else np.inf
-    if not (defect <= ROTATION_TOLERANCE and np.isfinite(s.imu_T_cam).all()):
+    if not (defect <= ROTATION_TOLERANCE and measurable(s.imu_T_cam).all()):
         raise InputError(
             f"imu_T_cam: its upper left 3x3 is no rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
             "write the extrinsic as a rigid motion"
@@ -134,7 +135,7 @@ def check_sequence(s: Sequence) -> None:
         raise InputError(f"imu_T_cam: its last row is {s.imu_T_cam[3].tolist()}, expected [0, 0, 0, 1]")
     camera = s.camera
     for name, value in (("K[0, 0]", camera.fu), ("K[1, 1]", camera.fv), ("b", camera.baseline)):
-        if not (np.isfinite(value) and value > 0):
+        if not 0 < value <= LARGEST:
             raise InputError(f"{name}: expected a positive number, got {value!r}")
     _require_finite("features", s.observations.pixel)
     if len(s.observations) and (
@@ -159,7 +160,7 @@ def _check_truth(truth: Truth, n_landmarks: int) -> None:
 
 
 def _require_finite(name: str, array: FloatArray) -> None:
-    finite = np.isfinite(array).all(axis=1)
+    finite = measurable(array).all(axis=1)
     if not finite.all():
         k = int(np.argmin(finite))
-        raise InputError(f"{name}: row {k} is not finite: {array[k].tolist()}")
+        raise InputError(f"{name}: row {k} is not finite, or beyond {LARGEST:g}: {array[k].tolist()}")

@@ -1,7 +1,9 @@
-"""The unit of time stamps, and that of a recording's: as it is given, or as the stamps alone show it.
+"""The unit of time stamps, by their size and their interval; and why stamps that should differ are equal.
 
 A clock that counts from 1970 shows its unit by its size. So does an interval between two images of hours or years.
-Anything else, as slow keyframes, takes a look at the motion (`diagnose.units`).
+Anything else, as slow keyframes, takes a look at the motion (`diagnose.units`). A float32 holds seven significant
+digits, a float64 whole numbers up to 2^53: the stamps of a long clock that went through a narrower type, or a `%g`,
+repeat each other.
 """
 
 from dataclasses import replace
@@ -12,6 +14,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from .finding import Finding
+from .plural import plural
 from .sequence import Sequence
 
 
@@ -39,12 +42,18 @@ class TimeUnit(StrEnum):
         return {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}[self.value]
 
 
-EPOCH = (9e8, 2.6e9)
-"""s since 1970: the years 1998 to 2052"""
+EPOCH = (6e8, 4e9)
+"""s since 1970: the years 1989 to 2096"""
 USUAL_INTERVAL = (1e-3, 20.0)
 """s between frames, from 1000 frames a second to slow keyframes"""
 LONGEST_INTERVAL = 3600.0
 """s between frames of one recording, however slow its keyframes are"""
+EXACT_INTEGER = 2**53
+"""a float64 holds every whole number up to here"""
+SINGLE = 7
+"""significant digits of a float32; `%g` and `std::cout` write one less"""
+COARSE = 0.02
+"""of the median interval: rounding from which on the intervals are noticeably wrong"""
 
 
 def usual(interval: float) -> bool:
@@ -52,19 +61,66 @@ def usual(interval: float) -> bool:
     return USUAL_INTERVAL[0] <= interval <= USUAL_INTERVAL[1]
 
 
+def since_1970(stamp: float, interval: float, slowest: float) -> TimeUnit | None:
+    """The unit in which a stamp is a time since 1970, and stamps `interval` apart are at most `slowest` s apart."""
+    for unit in TimeUnit:
+        if EPOCH[0] <= stamp / unit.per_second < EPOCH[1] and interval / unit.per_second <= slowest:
+            return unit
+    return None
+
+
 def unit_of_stamps(t: FloatArray) -> tuple[TimeUnit, str] | None:
     """The unit of stamps (T,) that can be no seconds, and how they show it; None where they can, or say nothing."""
     first, interval = float(t[0]), float(np.median(np.diff(t)))
-    if EPOCH[0] <= first <= EPOCH[1] and interval <= LONGEST_INTERVAL:
+    unit = since_1970(first, interval, LONGEST_INTERVAL)
+    if unit is TimeUnit.S:
         return None
-    for unit in (TimeUnit.MS, TimeUnit.US, TimeUnit.NS):
-        if EPOCH[0] <= first * unit.seconds <= EPOCH[1] and usual(interval * unit.seconds):
-            year = np.datetime64(int(first * unit.seconds), "s").astype("datetime64[Y]")
-            return unit, f"the first is {first:.6g}, which in {unit.noun} is a time of the year {year}"
+    if unit is not None and usual(interval * unit.seconds):
+        year = np.datetime64(int(first * unit.seconds), "s").astype("datetime64[Y]")
+        return unit, f"the first is {first:.6g}, which in {unit.noun} is a time of the year {year}"
     fitting = [unit for unit in TimeUnit if usual(interval * unit.seconds)]
     if interval > LONGEST_INTERVAL and len(fitting) == 1:
         return fitting[0], f"their median interval is {interval:.6g}, which only in {fitting[0].noun} is one of images"
     return None
+
+
+def lost_digits(t: FloatArray, longest: str | None = None) -> str:
+    """Why stamps (T,) that should differ are equal, with the remedy; empty where they do not show it.
+
+    `longest` is the one with the most digits as a text file has it.
+    """
+    largest = float(np.abs(t).max())
+    if longest is not None and significant_digits(longest) <= SINGLE:
+        return (
+            f"{longest} has {plural(significant_digits(longest), 'significant figure')}; write them in full "
+            "(C++: std::fixed and std::setprecision(9))"
+        )
+    if (t == t.astype(np.float32)).all():
+        step = float(np.spacing(np.float32(largest)))
+        if step > COARSE * abs(float(t[-1] - t[0])) / (len(t) - 1):
+            return (
+                f"they went through a float32, which has steps of {step:g} at {largest:g}; write them as float64 from "
+                "the source"
+            )
+    if largest > EXACT_INTEGER and (t == np.round(t)).all():
+        return (
+            f"they are whole numbers beyond 2^53, which a float64 holds in steps of {float(np.spacing(largest)):g}; "
+            "subtract the first one as integers, or write seconds"
+        )
+    if longest is not None:
+        return ""
+    digits = SINGLE - 1
+    if all(value == float(f"{value:.{digits}g}") for value in t.tolist()) and largest >= 10.0**digits:
+        return f"they have {digits} significant figures, as %g writes; write all digits"
+    if (t == np.round(t)).all():
+        return "they are whole numbers, cut off or rounded; write the fraction of a second as well"
+    return ""
+
+
+def significant_digits(word: str) -> int:
+    """The significant figures of a number as written."""
+    mantissa = word.lower().partition("e")[0].lstrip("+-").replace(".", "")
+    return len(mantissa.lstrip("0"))
 
 
 def in_seconds(sequence: Sequence, unit: TimeUnit | None = None) -> Sequence:

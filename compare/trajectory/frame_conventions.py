@@ -4,18 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fgbaseline.data.formats.quaternion_order import CLEARLY, STEP, fits_clearly_better
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..statistics.descriptive import rms_norm
 from .alignment import Align, align
 from .association import MatchedTrajectories
 
-STEP = 20
-"""poses over which relative rotations are taken"""
-CLEARLY = 3.0
-"""factor by which a convention must fit better than the assumed one to be detected"""
-NEGLIGIBLE = 0.5
-"""deg; misfit up to which the assumed convention is kept"""
 LEAST_ROTATION = 5.0
 """deg; smaller rotations between bodies are ignored"""
 ITERATIONS = 20
@@ -91,11 +86,6 @@ def travel_direction_misfit(position: FloatArray, rotation: FloatArray) -> float
     usual = np.median(direction, axis=0)
     usual = usual / max(float(np.linalg.norm(usual)), np.finfo(np.float64).tiny)
     return float(np.rad2deg(np.median(np.arccos(np.clip(direction @ usual, -1.0, 1.0)))))
-
-
-def fits_clearly_better(other: float, assumed: float, least: float = NEGLIGIBLE) -> bool:
-    """Whether the misfit of another convention is CLEARLY below the assumed one's, if that exceeds `least`."""
-    return assumed > least and CLEARLY * other <= assumed
 
 
 def body_rotation(matched: MatchedTrajectories) -> BodyRotation | None:

@@ -9,6 +9,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import paired
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Trajectory
+from fgbaseline.data.formats.quaternion_order import fits_clearly_better
 from fgbaseline.geometry import FloatArray, InputError
 
 LEAST_MISFIT = 1e-3
@@ -50,15 +51,15 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     if matched is None or len(matched) < 2:
         return entry
     rmse, inverted = compare.rmse_of_inverse_poses(matched)
-    if compare.fits_clearly_better(inverted, rmse, least=0.0) and rmse > LEAST_MISFIT * _extent(matched.reference):
+    if fits_clearly_better(inverted, rmse, least=0.0) and rmse > LEAST_MISFIT * _extent(matched.reference):
         return entry.remarked(
             f"the inverses of its poses fit {reference.name} to {inverted:.3g} m after SE(3) alignment, and they "
             f"themselves to {rmse:.3g} m: it has body_T_world (camera) poses; write their inverses",
         )
     if compare.has_conjugated_orientations(matched):
         return entry.remarked(
-            "its orientations fit once transposed: its quaternions are conjugated, as in JPL's convention; write "
-            "Hamilton's, with the signs of x, y and z changed",
+            "its orientations fit once transposed: its quaternions are conjugated, as in JPL's convention and in "
+            "ORB-SLAM3's keyframe files; write Hamilton's, with the signs of x, y and z changed",
         )
     found = compare.body_rotation(matched)
     if found is None or not (found.is_significant or settings.align_body):

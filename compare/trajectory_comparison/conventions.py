@@ -10,6 +10,7 @@ from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import TimeUnit, Trajectory
 from fgbaseline.data.formats import Order, TrajectoryFile
+from fgbaseline.data.formats.quaternion_order import fits_clearly_better, in_words
 from fgbaseline.data.formats.shared_clock import Spans, units_in_common
 from fgbaseline.data.formats.trajectory_file import bends, in_doubt
 from fgbaseline.geometry import FloatArray, InputError, so3
@@ -31,6 +32,8 @@ class Resolved:
     unit: TimeUnit = TimeUnit.S
     order: Order = "xyzw"
     oriented: bool = True
+    order_in_doubt: bool = False
+    """whether another order of the quaternions fits as well, and neither header nor option settles it"""
     remarks: tuple[str, ...] = ()
     """findings: each completes a sentence that begins with the trajectory's name"""
 
@@ -140,7 +143,11 @@ def _with_orders(
     decided_estimates = []
     for each, matrix in zip(estimates, matrices, strict=True):
         misfits = _travel_misfits(each, times) if matrix is None else matrix[row]
-        decided_estimates.append(_decided(each, *misfits)[0])
+        chosen, other = _decided(each, *misfits)
+        matched = paired(reference.trajectory(times), each.trajectory(times), settings)
+        if len(misfits) > 1 and not other and matched is not None and len(matched) >= FEWEST:
+            chosen = _with_doubt(chosen, *misfits)
+        decided_estimates.append(chosen)
     return [reference, *decided_estimates]
 
 
@@ -187,14 +194,26 @@ def _travel_misfits(each: Resolved, times: Times) -> tuple[float, ...]:
 
 def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[Resolved, int]:
     """The input with the order that fits clearly better, and 1 where that is not the usual one."""
-    if len(each.orders) == 1 or not compare.fits_clearly_better(other, assumed):
+    if len(each.orders) == 1 or not fits_clearly_better(other, assumed):
         return each, 0
     order = each.orders[1]
     remark = (
-        f"its quaternions are read as {' '.join(order)}: so its rotations fit to {other:.2g}° in the median, and to "
-        f"{assumed:.2g}° as {' '.join(each.orders[0])}"
+        f"its quaternions are read as {in_words(order)}: so its rotations fit to {other:.2g}° in the median, and to "
+        f"{assumed:.2g}° as {in_words(each.orders[0])}"
     )
     return replace(each, order=order).remarked(remark), 1
+
+
+def _with_doubt(each: Resolved, assumed: float, other: float) -> Resolved:
+    """With a remark where the usual order fits hardly better than the other, as along straight paths."""
+    if fits_clearly_better(assumed, other):
+        return each
+    orders = [in_words(order) for order in each.orders]
+    fits = f"its rotations fit to {assumed:.2g}° in the median as {orders[0]}, to {other:.2g}° as {orders[1]}"
+    if np.isnan(assumed):
+        fits = "its body hardly moves"
+    said = f"no header names the order of its quaternions, and {fits}: {orders[0]} is assumed; --quaternion settles it"
+    return replace(each.remarked(said), order_in_doubt=True)
 
 
 def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> MatchedTrajectories | None:

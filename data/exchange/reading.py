@@ -8,6 +8,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError, StereoCamera
 
+from ..finite import LARGEST, measurable
 from ..formats.fields import extrinsic, positive, time_stamps
 from ..formats.named_file import FilePath, reading, regular_file
 from ..formats.npz_archive import NpzArchive
@@ -71,8 +72,10 @@ class _Numbers:
         if not fits:
             expected = tuple("n" if n is None else n for n in shape)
             raise InputError(f"{key}: expected shape {expected}, got {array.shape}; export the problem again")
-        if finite and not np.isfinite(array).all():
-            raise InputError(f"{key}: it has entries that are not finite; export the problem again")
+        if finite and not measurable(array).all():
+            raise InputError(
+                f"{key}: it has entries that are not finite or beyond {LARGEST:g}; export the problem again"
+            )
         return array
 
     def whole(self, key: str, *shape: int | None) -> IntArray:

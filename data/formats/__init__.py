@@ -7,8 +7,9 @@ from .kitti import read_times, write_kitti
 from .landmark_file import read_landmarks
 from .npz_writer import write_npz
 from .recording import read
-from .trajectory_file import (
-    TrajectoryFile,
+from .trajectory_file import TrajectoryFile
+from .trajectory_npz import write_trajectory_npz
+from .trajectory_reader import (
     TrajectoryFormat,
     read_euroc,
     read_kitti,
@@ -17,7 +18,6 @@ from .trajectory_file import (
     read_trajectory_file,
     read_tum,
 )
-from .trajectory_npz import write_trajectory_npz
 from .tum import write_tum
 
 __all__ = [

@@ -4,6 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from ..finite import LARGEST, measurable
 from ..sequence import ROTATION_TOLERANCE
 
 
@@ -14,7 +15,7 @@ def finite_stamps(key: str, array: FloatArray) -> FloatArray:
     t = array.reshape(-1)
     if t.size < 2:
         raise InputError(f"{key}: a recording needs at least 2 frames, this one has {t.size}")
-    broken = np.flatnonzero(~np.isfinite(t))
+    broken = np.flatnonzero(~measurable(t))
     if len(broken):
         raise InputError(f"{key}: the stamp of frame {broken[0]} is {t[broken[0]]}; write seconds")
     return t
@@ -34,18 +35,23 @@ def time_stamps(key: str, array: FloatArray) -> FloatArray:
 
 
 def vectors(key: str, array: FloatArray) -> FloatArray:
-    """Vectors (T, 3) of an array (3, T). Raises InputError where one is not finite."""
-    broken = np.flatnonzero(~np.isfinite(array).all(axis=0))
+    """Vectors (T, 3) of an array (3, T). Raises InputError where one is not finite or beyond LARGEST."""
+    broken = np.flatnonzero(~measurable(array).all(axis=0))
     if len(broken):
         k = broken[0]
-        raise InputError(f"{key}: frame {k} has {array[:, k].tolist()}; every frame needs three finite numbers")
+        needed = "three finite numbers"
+        if np.isfinite(array[:, k]).all():
+            needed = f"three numbers that a sensor can measure, at most {LARGEST:g}"
+        raise InputError(f"{key}: frame {k} has {array[:, k].tolist()}; every frame needs {needed}")
     return np.ascontiguousarray(array.T)
 
 
 def extrinsic(key: str, imu_R_cam: FloatArray, position: FloatArray) -> FloatArray:
     """`imu_T_cam` (4, 4) of rotation (3, 3) and position (3,), m. Raises InputError when it is no rigid motion."""
-    if not (np.isfinite(imu_R_cam).all() and np.isfinite(position).all()):
-        raise InputError(f"{key}: it has entries that are not finite; write the extrinsic as a rigid motion")
+    if not (measurable(imu_R_cam).all() and measurable(position).all()):
+        raise InputError(
+            f"{key}: it has entries that are not finite or beyond {LARGEST:g}; write the extrinsic as a rigid motion"
+        )
     defect = float(so3.rotation_defect(imu_R_cam))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(
@@ -59,10 +65,10 @@ def extrinsic(key: str, imu_R_cam: FloatArray, position: FloatArray) -> FloatArr
 
 
 def positive(key: str, value: FloatArray, what: str) -> float:
-    """The one number in an array of any shape. Raises InputError unless it is finite and above 0."""
+    """The one number in an array of any shape. Raises InputError unless it is above 0 and at most LARGEST."""
     if value.size != 1:
         raise InputError(f"{key}: expected one number, {what}, got shape {value.shape}")
     number = float(value.reshape(-1)[0])
-    if not (np.isfinite(number) and number > 0):
+    if not 0 < number <= LARGEST:
         raise InputError(f"{key}: expected a positive number, {what}, got {number!r}")
     return number

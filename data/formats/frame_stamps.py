@@ -1,7 +1,6 @@
 """Time stamps of a recording's frames: repeated ones are left out, and what cannot be mended is refused with its cause.
 
-A float32 holds seven significant digits, a float64 whole numbers up to 2^53; the stamps of a long clock that went
-through a narrower type, a `%g` or an integer division repeat each other, or jump by the rounding.
+The stamps of a long clock that lost their digits repeat each other (`time_unit.lost_digits`), or jump by the rounding.
 """
 
 from typing import NamedTuple
@@ -13,19 +12,16 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Truth
+from ..time_unit import COARSE, lost_digits
 from .fields import finite_stamps
 
 MOST_REPEATED = 0.05
 """share of the frames that may repeat the stamp before (one always may); with more, the stamps lost their digits"""
 STRAY = 1000.0
 """median intervals from a first stamp of exactly 0 to the next, from which on it is a stray value"""
-SIGNIFICANT = 6
-"""digits that `%g` and `std::cout` write"""
-COARSE = 0.02
-"""of the median interval: rounding from which on the intervals are noticeably wrong"""
 
 
-class Stamps(NamedTuple):
+class FrameStamps(NamedTuple):
     """The frames of a file that have a stamp of their own."""
 
     t: FloatArray
@@ -52,7 +48,7 @@ class Stamps(NamedTuple):
         return truth if truth is None else Truth(truth.world_T_imu[self.kept], truth.landmarks, truth.source)
 
 
-def read_stamps(key: str, array: FloatArray) -> Stamps:
+def read_stamps(key: str, array: FloatArray) -> FrameStamps:
     """The stamps of an array (1, T) or (T,).
 
     A frame whose stamp repeats that of the frame before is left out and counted. Raises InputError unless the others
@@ -64,7 +60,9 @@ def read_stamps(key: str, array: FloatArray) -> Stamps:
     if repeated > max(1, MOST_REPEATED * len(t)):
         cause = lost_digits(t)
         if cause:
-            raise InputError(f"{key}: {repeated} of {len(t)} stamps repeat the one before: {cause}")
+            raise InputError(
+                f"{key}: {repeated} of {len(t)} stamps repeat the one before, so their digits are lost: {cause}"
+            )
         raise InputError(
             f"{key}: {repeated} of {len(t)} stamps repeat the one before; write the time of each frame, with all digits"
         )
@@ -78,7 +76,7 @@ def read_stamps(key: str, array: FloatArray) -> Stamps:
             f"{key}: the stamp of frame 0 is 0, while the next is {float(t[1])!r} and the median interval {usual:.6g}: "
             "a value that was never set; write its time, or remove the frame"
         )
-    return Stamps(t, np.asarray(kept, dtype=np.bool_), (*_repeats(key, np.flatnonzero(~kept)), *_rounding(key, t)))
+    return FrameStamps(t, np.asarray(kept, dtype=np.bool_), (*_repeats(key, np.flatnonzero(~kept)), *_rounding(key, t)))
 
 
 def _require_rising(key: str, t: FloatArray, frame: IntArray) -> None:
@@ -98,30 +96,6 @@ def _stray(t: FloatArray, before: int, k: int) -> str:
     for stray in (k, before):
         if (np.diff(np.delete(t, stray)) >= 0).all():
             return f"the stamp of frame {stray} alone is out of place: write its time, or remove the frame"
-    return ""
-
-
-def lost_digits(t: FloatArray) -> str:
-    """Why values (T,) that should differ are equal, with the remedy; empty where they do not show it."""
-    largest = float(np.abs(t).max())
-    if (t == t.astype(np.float32)).all():
-        step = float(np.spacing(np.float32(largest)))
-        if step > COARSE * abs(float(t[-1] - t[0])) / (len(t) - 1):
-            return (
-                f"they went through a float32, which has steps of {step:g} at {largest:g}: their digits are lost; "
-                "write them as float64 from the source"
-            )
-    if largest > 2.0**53 and (t == np.round(t)).all():
-        return (
-            f"they are whole numbers beyond 2^53, which a float64 holds in steps of {float(np.spacing(largest)):g}: "
-            "their digits are lost; subtract the first one as integers, or write seconds"
-        )
-    if all(value == float(f"{value:.{SIGNIFICANT}g}") for value in t.tolist()) and largest >= 10.0**SIGNIFICANT:
-        return f"they have {SIGNIFICANT} significant figures, as %g writes: their digits are lost; write all digits"
-    if (t == np.round(t)).all():
-        return (
-            "they are whole numbers, cut off or rounded: their digits are lost; write the fraction of a second as well"
-        )
     return ""
 
 

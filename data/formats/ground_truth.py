@@ -12,14 +12,12 @@ from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
 from .columns import Order
 from .named_file import FilePath, reading, shown
+from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
-from .trajectory_file import TrajectoryFile, read_trajectory_file, settled
+from .trajectory_file import TrajectoryFile, settled
+from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]
-STEP = 20
-"""frames between two whose rotation is compared"""
-CLEARLY, LEAST_MISFIT = 3.0, np.deg2rad(0.5)
-"""by how many times, and from which misfit on, another order of quaternions has to fit better"""
 FASTER = 3.0
 """times the recording's: lines that are so much farther apart are not one for each frame"""
 
@@ -72,7 +70,7 @@ def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None
     order = _order(sequence, file, frame, frames, nearest)
     if order != file.orders[0]:
         remarks.append(
-            f"The quaternions of {shown(path)} are read as {' '.join(order)}: so they turn as the gyroscope."
+            f"The quaternions of {shown(path)} are read as {in_words(order)}: so they turn as the gyroscope."
         )
         read = file.trajectory(unit, order)
     if not len(frames):
@@ -108,8 +106,8 @@ def _order(
         rotation = file.rotation_in(order)
         assert rotation is not None
         true = over_steps(rotation[nearest] @ body_R_imu)
-        misfits.append(float(np.median(so3.rotation_angle(np.swapaxes(measured, 1, 2) @ true))))
-    return file.orders[1 if misfits[0] > LEAST_MISFIT and CLEARLY * misfits[1] <= misfits[0] else 0]
+        misfits.append(float(np.rad2deg(np.median(so3.rotation_angle(np.swapaxes(measured, 1, 2) @ true)))))
+    return file.orders[int(fits_clearly_better(misfits[1], misfits[0]))]
 
 
 def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArray]:

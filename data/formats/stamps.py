@@ -8,10 +8,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
-from ..time_unit import TimeUnit
+from ..plural import plural
+from ..time_unit import TimeUnit, lost_digits, significant_digits, since_1970
 
-EPOCH = (6e8, 4e9)
-"""s since 1970: 1989 to 2096"""
 FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
 """s between two poses: of no recorder, of a recorder, of keyframes at most"""
 CERTAIN_BELOW = 5.0
@@ -20,7 +19,6 @@ EPOCH_INTERVAL = 1e3
 """s between two poses at most, where the size of stamps alone shows that they count from 1970"""
 REPEATED = 0.1
 """of the stamps: with more repeats than that, between poses that differ, the stamps have lost digits"""
-EXACT_INTEGER = 2**53
 SYMBOL = 56
 """bits of a GTSAM key below its letter"""
 
@@ -84,7 +82,7 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
     elif (value == np.floor(value)).all():
         whole = tuple(_exactly(word, number) for word, number in zip(words, value.tolist(), strict=True))
     known = next((u for u in TimeUnit if u == unit), None)
-    return Stamps(value, whole, known, max(words, key=_digits, default=""))
+    return Stamps(value, whole, known, max(words, key=significant_digits, default=""))
 
 
 def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
@@ -94,13 +92,13 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
     no unit makes their rate a recorder's; both where header and size contradict each other.
     """
     interval = stamps.interval
-    since_1970 = _since_1970(stamps.value, interval)
+    by_size = since_1970(float(np.median(np.abs(stamps.value))), interval or 0.0, EPOCH_INTERVAL)
     if stamps.unit is not None:
-        if since_1970 not in (None, stamps.unit):
-            return (stamps.unit, since_1970), False
+        if by_size not in (None, stamps.unit):
+            return (stamps.unit, by_size), False
         return (stamps.unit,), True
-    if since_1970 is not None:
-        return (since_1970,), True
+    if by_size is not None:
+        return (by_size,), True
     if interval is None or (FASTEST <= interval < CERTAIN_BELOW):
         return (TimeUnit.S,), False
     units = [TimeUnit.S] if interval <= SLOWEST and interval >= FASTEST else []
@@ -108,15 +106,7 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
     return tuple(units), False
 
 
-def _since_1970(value: FloatArray, interval: float | None) -> TimeUnit | None:
-    size = float(np.median(np.abs(value)))
-    for unit in TimeUnit:
-        if EPOCH[0] <= size / unit.per_second < EPOCH[1] and (interval or 0.0) / unit.per_second <= EPOCH_INTERVAL:
-            return unit
-    return None
-
-
-def lost_digits(stamps: Stamps, moved: BoolArray) -> str | None:
+def equal_stamps(stamps: Stamps, moved: BoolArray) -> str | None:
     """Why so many of the stamps are equal between poses that `moved` (n - 1,): they have lost digits. None otherwise.
 
     GTSAM's keys in place of stamps are recognized too.
@@ -131,18 +121,9 @@ def lost_digits(stamps: Stamps, moved: BoolArray) -> str | None:
     repeats = int((stamps.equal() & moved).sum())
     if repeats == 0 or repeats <= REPEATED * (n - 1):
         return None
-    share = f"{n} poses share {n - repeats} time stamps"
-    digits = _digits(stamps.longest)
-    if digits <= 7:
-        return (
-            f"its time stamps have lost digits: {stamps.longest} has {digits} significant figures, and {share}; write "
-            "them in full (C++: std::fixed and std::setprecision(9))"
-        )
-    if (stamps.value == stamps.value.astype(np.float32)).all() and np.abs(stamps.value).max() >= 2**24:
-        return f"its time stamps have lost digits: they are float32, and {share}; write them as float64"
-    if stamps.whole is not None and max(map(abs, stamps.whole)) > EXACT_INTEGER:
-        return f"its time stamps have lost digits: integers beyond 2^53 became doubles, and {share}; write them whole"
-    return f"its time stamps have lost digits: {share}; write them in full"
+    share = f"{n} poses share {plural(n - repeats, 'time stamp')}"
+    cause = lost_digits(stamps.value, stamps.longest) or "write them in full"
+    return f"its time stamps have lost digits: {share}: {cause}"
 
 
 def _letter(stamps: Stamps) -> str:
@@ -153,12 +134,6 @@ def _letter(stamps: Stamps) -> str:
     index = stamps.whole[-1] & ((1 << SYMBOL) - 1)
     letter = chr(min(letters)) if len(letters) == 1 and max(letters) < 128 else ""
     return letter if letter.isalpha() and index < 2**40 else ""
-
-
-def _digits(word: str) -> int:
-    """The significant figures of a number as written."""
-    mantissa = word.lower().partition("e")[0].lstrip("+-").replace(".", "")
-    return len(mantissa.lstrip("0"))
 
 
 def _exactly(word: str, number: float) -> int:

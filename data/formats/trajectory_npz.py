@@ -13,7 +13,7 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import BoolArray
 from .atomic_write import atomic_write
-from .fields import time_stamps
+from .frame_stamps import read_stamps
 from .kitti import EXACT, ROTATION_TOLERANCE, nearest_rotations
 from .named_file import FilePath
 from .npz_archive import NpzArchive
@@ -25,24 +25,30 @@ KEYS = {"t": "world_T_body", "time_stamps": "ground_truth"}
 COVARIANCE = "covariance"
 
 
-def read_trajectory_npz(file: Path) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Stamps (n,), s, poses (n, 4, 4) and, if the file has them, covariances (n, 6, 6), NaN where there is none.
+def read_trajectory_npz(file: Path) -> tuple[FloatArray, FloatArray, FloatArray | None, list[str]]:
+    """Stamps (n,), s, poses (n, 4, 4), covariances (n, 6, 6) if the file has them, NaN where there is none; remarks.
 
-    All-NaN poses are left out. Raises InputError naming the key and the pose.
+    All-NaN poses are left out, repeated stamps too and with a remark. Raises InputError naming the key and the pose.
     """
     with NpzArchive(file) as archive:
         name, key = next(((t, poses) for t, poses in KEYS.items() if poses in archive.keys), ("t", "world_T_body"))
-        t = time_stamps(name, archive.array(name))
-        poses = archive.array(key)
-        if poses.shape != (len(t), 4, 4):
-            raise InputError(f"{key}: expected shape ({len(t)}, 4, 4) for the {len(t)} time stamps, got {poses.shape}")
-        known: BoolArray = np.asarray(~np.isnan(poses).all(axis=(1, 2)))
+        stamps = read_stamps(name, archive.array(name))
+        n, poses = len(stamps.kept), archive.array(key)
+        if poses.shape != (n, 4, 4):
+            raise InputError(f"{key}: expected shape ({n}, 4, 4) for the {n} time stamps, got {poses.shape}")
+        known: BoolArray = stamps.kept & ~np.isnan(poses).all(axis=(1, 2))
         covariance = archive.array(COVARIANCE) if COVARIANCE in archive.keys else None
-        if covariance is not None and covariance.shape != (len(t), 6, 6):
-            raise InputError(f"{COVARIANCE}: expected shape ({len(t)}, 6, 6), got {covariance.shape}")
+        if covariance is not None and covariance.shape != (n, 6, 6):
+            raise InputError(f"{COVARIANCE}: expected shape ({n}, 6, 6), got {covariance.shape}")
     if not known.any():
         raise InputError(f"{key}: every pose is NaN, so there is no trajectory; write the poses")
-    return t[known], _rigid(key, poses, known), None if covariance is None else covariance[known]
+    repeated = [found.sentence.rstrip(".") for found in stamps.findings if found.code == "repeated_stamps"]
+    return (
+        stamps.t[known[stamps.kept]],
+        _rigid(key, poses, known),
+        None if covariance is None else covariance[known],
+        repeated,
+    )
 
 
 def write_trajectory_npz(

@@ -16,7 +16,7 @@ from itertools import product
 
 import numpy as np
 
-from fgbaseline.data.finding import Finding
+from fgbaseline.data.finding import AS_GIVEN, Finding
 from fgbaseline.data.motion import held_twist
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.time_unit import TimeUnit, rescaled_time, usual
@@ -66,6 +66,8 @@ class Units:
     doubt: str = ""
     scale_ratios: tuple[ScaleRatio, ScaleRatio] | None = None
     """of angular and linear velocity"""
+    given: frozenset[str] = frozenset()
+    """names of those that the user states"""
 
     @property
     def wrong(self) -> int:
@@ -211,7 +213,8 @@ def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
             if factor > 1.0:
                 text = f"{texts[name]}: {factor:.6g} times too small; multiplied by {factor:.6g}."
             code = codes.get(name, "baseline_unit")
-            found.append(Finding(code, text, 1.0 / factor, 1.0, "recorded over true", evidence(units)))
+            certainty = AS_GIVEN if name in units.given else evidence(units)
+            found.append(Finding(code, text, 1.0 / factor, 1.0, "recorded over true", certainty))
     return tuple(found)
 
 

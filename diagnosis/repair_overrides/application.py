@@ -52,9 +52,9 @@ def with_given_units(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     """The diagnosis with the units and the direction of the extrinsic of `repairs`, computed anew where they differ."""
     units, inverted = repairs.units.given(), repairs.extrinsic_inverted
     same = not diagnosis.units.doubt and all(getattr(diagnosis.units, name) == units[name] for name in units)
-    if same and inverted in (None, diagnosis.inverted):
-        return diagnosis
-    return diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
+    if not (same and inverted in (None, diagnosis.inverted)):
+        diagnosis = diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
+    return replace(diagnosis, units=replace(diagnosis.units, given=frozenset(units)))
 
 
 def _shift(diagnosis: Diagnosis, repairs: Repairs) -> float | None:

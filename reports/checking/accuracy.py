@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -20,8 +20,10 @@ from fgbaseline.compare import (
     time_coverage,
 )
 from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
-from fgbaseline.data.formats import read_trajectory
+from fgbaseline.data.formats import Order, read_trajectory_file
 from fgbaseline.data.formats.named_file import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -61,6 +63,8 @@ def assert_accuracy(
     smallest_sample: int = MIN_SAMPLE_SIZE,
     align: Align | str = Align.SE3,
     tolerance: float | None = None,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    quaternion: Order | None = None,
     figure: FilePath | None = None,
 ) -> dict[str, float]:
     """Raises AssertionError, with the table and where the figure is, unless an estimate is as accurate as asked.
@@ -72,7 +76,11 @@ def assert_accuracy(
     drawn where a limit falls short, into the PNG `figure`, by default into a folder of its own among the temporary
     files.
 
-    Gives the figures by name, such as "ate.rmse". Raises InputError where nothing is asked, or a trajectory is none.
+    What files leave open is settled as `fgbaseline compare` does, by each other, or by `time_unit` and `quaternion`.
+    Positions without orientations are compared in positions only.
+
+    Gives the figures by name, such as "ate.rmse". Raises InputError where nothing is asked, a trajectory is none, its
+    units stay in doubt, or a limit needs orientations that are missing or whose order stays in doubt.
     """
     __tracebackhide__ = True
     asked = {
@@ -87,16 +95,28 @@ def assert_accuracy(
     _require_bounds(asked)
     if isinstance(estimate, Estimate) and estimate.status is Status.FAILED:
         raise AssertionError(f"{estimate.name} failed: {estimate.reason}")
-    matched = _paired(estimate, reference, tolerance)
-    aligned = matched.aligned(align)
+    _require_one_clock(estimate, reference)
+    settings = Settings(tolerance=tolerance, time_unit=time_unit, quaternion=quaternion)
+    resolved = resolve([_source(reference, "reference"), _source(estimate, "estimate")], (), settings)
+    there, here = (each.trajectory(()) for each in resolved)
+    is_oriented = there.oriented and here.oriented
+    if rotation_deg is not None or Align(align) is Align.FIRST_POSE:
+        _require_orientations(resolved, [there, here])
+    matched = associate(there, here, tolerance=tolerance)
+    up = resolved[0].up
+    aligned = matched.aligned(align) if up is None else matched.aligned(align, up=up)
     tables = {"divergence": absolute_errors(matched), "ate": absolute_errors(aligned)}
-    span = _trajectory(reference, "reference").t
-    values = _values(tables, time_coverage(matched.reference.t, span)) | {"pairs": float(len(matched))}
+    values = _values(tables, time_coverage(matched.reference.t, there.t)) | {"pairs": float(len(matched))}
+    if not is_oriented:
+        del values["rotation.rmse"]
     figures = [_figure(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
     figures = [each for each in figures if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
     if all(each.outcome is Outcome.HOLDS for each in figures):
         return values
-    raise AssertionError(_message(figures, aligned, _drawn(aligned, tables, asked, figure)))
+    recognized = [
+        f"{path.name}: {remark}." for path, each in zip((there, here), resolved, strict=True) for remark in each.remarks
+    ]
+    raise AssertionError(_message(figures, aligned, recognized, _drawn(aligned, tables, asked, figure)))
 
 
 def _require_bounds(asked: dict[str, float | None]) -> None:
@@ -107,7 +127,8 @@ def _require_bounds(asked: dict[str, float | None]) -> None:
             raise InputError(f"accuracy: the limit on {metric} is {limit!r}; give a number of at least 0")
 
 
-def _paired(estimate: AnyTrajectory, reference: AnyTrajectory, tolerance: float | None) -> MatchedTrajectories:
+def _require_one_clock(estimate: AnyTrajectory, reference: AnyTrajectory) -> None:
+    """Raises InputError where one of both counts frames and the other time, or frames are of different problems."""
     by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
     if any(by_frame) and not all(by_frame):
         raise InputError(
@@ -120,10 +141,19 @@ def _paired(estimate: AnyTrajectory, reference: AnyTrajectory, tolerance: float 
             raise InputError(
                 f"accuracy: the estimate has {n} frames and the reference {n_reference}; give one problem's"
             )
-    return associate(_trajectory(reference, "reference"), _trajectory(estimate, "estimate"), tolerance=tolerance)
 
 
-def _trajectory(path: AnyTrajectory, name: str) -> Trajectory:
+def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> None:
+    """Raises InputError where orientations are missing, or an order of quaternions is in doubt."""
+    for each, path in zip(resolved, paths, strict=True):
+        file = path.source or path.name
+        if not path.oriented:
+            raise InputError(f"{file}: it has no orientations; leave out rotation_deg and first-pose")
+        if each.order_in_doubt:
+            raise InputError(f"{file}: {each.remarks[-1]}".replace("--quaternion", "quaternion"))
+
+
+def _source(path: AnyTrajectory, name: str) -> Source:
     if isinstance(path, Trajectory):
         return path
     if isinstance(path, Estimate | Truth):
@@ -133,7 +163,7 @@ def _trajectory(path: AnyTrajectory, name: str) -> Trajectory:
     if isinstance(path, tuple):
         t, poses = path
         return Trajectory.of_frames(t, poses, name)
-    return read_trajectory(path)
+    return read_trajectory_file(path)
 
 
 def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:
@@ -164,7 +194,7 @@ def _drawn(
     return path
 
 
-def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, drawn: Path) -> str:
+def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
     rows = [("limit", "metric", "value", "bound", "margin")]
     for each in figures:
         unit = f" ({each.unit})" if each.unit else ""
@@ -177,6 +207,7 @@ def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, drawn: Pat
             f"{aligned.estimate.name} is not as accurate as asked, against {aligned.reference.name}:",
             *table,
             aligned.caption,
+            *recognized,
             f"The figure is in {drawn}",
         ]
     )

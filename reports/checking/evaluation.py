@@ -130,7 +130,12 @@ def _outcome(
 
 
 def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
-    """Why the reference keeps a metric from being judged; empty where it does not."""
+    """Why guessed units, or the reference, keep a metric from being judged; empty where they do not."""
+    if run.guessed_units:
+        return (
+            f"the recording is in other units ({', '.join(run.guessed_units)}), which were repaired by a guess; state "
+            "them with run --time-unit, or with a table [units] in --repairs"
+        )
     if not run.rests_on_reference(metric) or not below(run, needed):
         return ""
     return f"the reference is {run.reference.trust}"

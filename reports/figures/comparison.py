@@ -95,17 +95,19 @@ def errors(comparison: "Comparison") -> Figure:
 
 def growth(comparison: "Comparison") -> Figure:
     """Distance and heading over the length of the path."""
-    figure, axes = sheet(4.6, rows=2)
     tables, line = _departures(comparison), _lines(comparison)
+    has_heading = any(np.isfinite(table["heading_deg"]).any() for table in tables.values())
+    figure, axes = sheet(4.6 if has_heading else 2.7, rows=1 + has_heading)
     handles: list[Any] = []
-    for panel, column in zip(axes, ("position", "heading_deg"), strict=True):
+    for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
         for name, table in tables.items():
             handles += panel.plot(table["travelled"], table[column].to_numpy(dtype=np.float64), **line(name))
     axes[0].set_ylabel("distance, m")
     fit_log_or_linear(axes[0], columns(tables, "position"))
-    axes[1].set_ylabel("heading, °")
-    axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
-    axes[1].set_xlabel("length of the reference's path so far, m")
+    if has_heading:
+        axes[1].set_ylabel("heading, °")
+        axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
+    axes[-1].set_xlabel("length of the reference's path so far, m")
     head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure
 

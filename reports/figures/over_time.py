@@ -113,13 +113,15 @@ def component_panels(
     tables: Mapping[str, pd.DataFrame], t: Mapping[str, FloatArray], line: Line
 ) -> tuple[Figure, list[Axes], list[Any]]:
     """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles."""
-    figure, axes = sheet(8.6, len(COMPONENTS), height_ratios=[1.7, 1.0, 1.0, 1.0, 1.0])
+    every = {column: columns(tables, column) for column in COMPONENTS}
+    shown = {c: series for c, series in every.items() if any(np.isfinite(v).any() for v in series.values())} or every
+    ratios = [1.7, *[1.0] * (len(shown) - 1)]
+    figure, axes = sheet(8.6 * sum(ratios) / 5.7, len(shown), height_ratios=ratios)
     handles: list[Any] = []
-    for panel, (column, text) in zip(axes, COMPONENTS.items(), strict=True):
-        series = columns(tables, column)
+    for panel, (column, series) in zip(axes, shown.items(), strict=True):
         for name, values in series.items():
             handles += panel.plot(t[name], values, **line(name))
-        panel.set_ylabel(text)
+        panel.set_ylabel(COMPONENTS[column])
         if column in SIGNED:
             panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
         else:

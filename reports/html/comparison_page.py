@@ -18,7 +18,7 @@ from .environment import environment, picture
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as said above, seen along the direction that points up.",
     "errors": "Of each pair of poses, along the reference's direction of travel, to its left and up.",
-    "growth": "The same over the length of the path, with the heading: seen from above, to the left positive.",
+    "growth": "The same distance over the length of the path; a heading is seen from above, to the left positive.",
     "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. No alignment and no early "
     "mistake can hide in these.",
     "segments": "Mean over all segments of a length, per metre.",

@@ -14,8 +14,9 @@ def remarks(comparison: Comparison) -> list[str]:
     bare = [entry.name for entry in entries if not entry.trajectory.oriented]
     if bare:
         sentences.append(
-            f"Without the orientations of {listed(bare)} positions are compared; rotation errors, relative errors, "
-            "segments, drift, heading and NEES need orientations and are left out."
+            f"{listed(bare)} {'has' if len(bare) == 1 else 'have'} no orientations, so positions alone are compared: "
+            "rotation errors, relative errors, segments, drift, the body's heading and NEES need orientations and are "
+            "left out."
         )
     return sentences
 

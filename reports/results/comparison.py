@@ -178,6 +178,7 @@ class EstimateSummary(Part):
         Field(description="1 for the nearest over the common moments; null for by-products and for too few moments"),
     ]
     caption: Annotated[str, Field(description="association and alignment, in words")]
+    remarks: Annotated[list[str], Field(description="what was recognized in its file; the subject is its name")]
     pairing: Pairing
     alignment: AlignmentSummary
     translation: Annotated[Statistics, Field(description="m; its RMSE is the absolute trajectory error")]
@@ -220,10 +221,18 @@ class ReferenceSummary(Part):
         Literal["trusted", "doubtful", "untrusted"] | None, Field(description="of a run's reference; null for files")
     ]
     reasons: list[str]
+    remarks: Annotated[list[str], Field(description="what was recognized in its file; the subject is its name")]
     reprojection: Reprojection | None
     reprojection_common: Reprojection | None
     reprojection_along: Reprojection | None
     held_out: HeldOutFigures | None
+
+
+class Up(Part):
+    """The direction that points up in the world of the reference."""
+
+    direction: tuple[float, float, float]
+    source: Annotated[str, Field(description="from where it is known: an option, a format, a run, a recording")]
 
 
 class Summary(Part):
@@ -233,6 +242,7 @@ class Summary(Part):
     caption: str
     reference: ReferenceSummary
     estimates: dict[str, EstimateSummary]
+    up: Up
     sequence: Annotated[str | None, Field(description="the recording that the reprojection is of")]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]

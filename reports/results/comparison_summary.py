@@ -32,6 +32,7 @@ def summarize(comparison: Comparison, caption: str) -> Summary:
                 "caption": caption,
                 "reference": _reference(comparison),
                 "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
+                "up": {"direction": comparison.up.tolist(), "source": comparison.up_from},
                 "sequence": comparison.sequence,
                 "settings": comparison.settings.record(),
                 "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
@@ -50,6 +51,7 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
         "path_m": float(distance_traveled(path.position)[-1]),
         "trust": None if trust is None else trust.verdict.name.lower(),
         "reasons": [] if trust is None else list(trust.reasons),
+        "remarks": list(comparison.reference.remarks),
         **_pixels(comparison.reference_pixels),
         "held_out": _held_out(comparison, path.name),
     }
@@ -64,6 +66,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         "coverage": coverage(comparison, result),
         "rank": comparison.ranking.rank(result.name),
         "caption": matched.caption,
+        "remarks": list(result.entry.remarks),
         "pairing": {
             "pairs": len(matched),
             "association": str(matched.association),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from fgbaseline.data import Landmarks, Trajectory
+from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.formats import read_landmarks, read_trajectory
 from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.data.toml_file import is_finite_number
@@ -53,10 +54,24 @@ class Sequence(_Part):
     name: str = ""
 
 
+class Found(_Part):
+    """A fault of the recording."""
+
+    code: str = ""
+    certainty: str = ""
+
+
+class Posed(_Part):
+    """How the problem was posed."""
+
+    findings: tuple[Found, ...] = ()
+
+
 class MeasuredRun(_Part):
     """The estimators of one sequence."""
 
     reference: Reference = Reference()
+    problem: Posed = Posed()
     sequence: Sequence = Sequence()
     estimators: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     compared: bool = False
@@ -70,6 +85,11 @@ class MeasuredRun(_Part):
             return document
         sequence = {"name": document.get("sequence") or ""}
         return {**document, "estimators": document["estimates"], "sequence": sequence, "compared": True}
+
+    @property
+    def guessed_units(self) -> list[str]:
+        """Codes of the units of the recording that were repaired from the data alone."""
+        return [each.code for each in self.problem.findings if each.code in UNITS and each.certainty != AS_GIVEN]
 
     def rests_on_reference(self, metric: str) -> bool:
         """Whether a metric says nothing where the reference is wrong."""

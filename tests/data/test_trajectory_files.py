@@ -13,6 +13,7 @@ from fgbaseline.data.formats import (
     read_pose_covariances,
     read_times,
     read_trajectory,
+    read_trajectory_file,
     write_euroc,
     write_kitti,
     write_trajectory_npz,
@@ -196,7 +197,7 @@ def projective(arrays):
 
 
 def fall(arrays):
-    arrays["t"][2] = arrays["t"][1]
+    arrays["t"][2] = arrays["t"][0]
 
 
 def shorten(arrays):
@@ -262,3 +263,29 @@ def test_arbitrary_bytes_are_an_input_error(tmp_path_factory, content):
     path.write_bytes(content)
     with pytest.raises(InputError):
         read_trajectory(path)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_stamps_of_an_npz_that_lost_their_digits_are_refused_by_their_cause(tmp_path: Path, kind: type) -> None:
+    t, poses = 1.4e9 + 0.05 * np.arange(60), path_of(1, 60)[1]
+    np.savez(tmp_path / "a.npz", t=t.astype(kind), world_T_body=poses)
+    if kind is np.float64:
+        assert read_trajectory(tmp_path / "a.npz").t.tobytes() == t.tobytes()
+        return
+    with pytest.raises(InputError, match=r"a\.npz: t: 59 of 60 stamps repeat .* a float32, which has steps of 128"):
+        read_trajectory(tmp_path / "a.npz")
+
+
+def test_a_repeated_stamp_of_an_npz_is_counted_and_its_first_pose_kept(tmp_path: Path) -> None:
+    t, poses = 0.05 * np.arange(60), path_of(1, 60)[1]
+    t[31] = t[30]
+    covariance = np.tile(np.eye(6), (60, 1, 1)) * np.arange(1.0, 61.0)[:, None, None]
+    np.savez(tmp_path / "a.npz", t=t, world_T_body=poses, covariance=covariance)
+    read = read_trajectory_file(tmp_path / "a.npz")
+    assert read.remarks == (
+        "t: 1 frame has the stamp of the frame before (31): of each such pair the first frame is kept",
+    )
+    others = np.delete(np.arange(60), 31)
+    assert read.trajectory().t.tobytes() == t[others].tobytes()
+    assert read.position.tobytes() == poses[others, :3, 3].tobytes()
+    np.testing.assert_array_equal(read.covariance(), covariance[others])

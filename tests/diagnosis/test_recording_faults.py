@@ -15,6 +15,7 @@ import pytest
 
 from fgbaseline import data
 from fgbaseline.data import Sequence, TimeUnit
+from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.time_unit import unit_of_stamps
 from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
@@ -27,7 +28,7 @@ from ..diagnosis.test_real_recordings import UTIAS
 
 Recordings = Callable[[str], Path]
 EPOCH = 1.4e9
-UNIT_CODES = {"time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"}
+UNIT_CODES = UNITS
 FILE_CODES = UNIT_CODES | {"repeated_stamps", "stamps_rounded", "zero_for_unobserved", "extrinsic_inverse"}
 
 
@@ -311,3 +312,19 @@ def test_case_49_a_truth_of_one_orientation_throughout_is_refused(recordings: Re
     truth = recordings("cases/49-truth-one-frame/truth_ns.tum")
     with pytest.raises(InputError, match="positions without orientations"):
         data.read(recordings("cases/49-truth-one-frame/drive.npz"), truth, "imu")
+
+
+@pytest.mark.parametrize("key", ["linear_velocity", "angular_velocity", "time_stamps", "b", "imu_T_cam"])
+def test_numbers_that_no_sensor_measures_are_refused_by_name(tmp_path: Path, key: str) -> None:
+    array = np.array(arrays_of()[key], dtype=np.float64)
+    array[(0, -1) if array.ndim > 1 else ()] = 1e300
+    with pytest.raises(InputError, match=rf"drive\.npz: {key}: .*1e\+?300|drive\.npz: {key}: .*beyond 1e\+60"):
+        data.read(written(tmp_path, **{key: array}))
+
+
+@pytest.mark.parametrize(("field", "key", "factor"), [("stamps", "time", "ms"), ("velocity", "linear_velocity", 1e-3)])
+def test_a_unit_that_the_user_states_is_no_guess(field: str, key: str, factor: Any) -> None:
+    recorded = scaled(drive(), field, 1e3)
+    for repairs, is_given in ((Repairs(units=UnitOverrides(**{key: factor})), True), (None, False)):
+        found = [each for each in calibrated(recorded, repairs=repairs).findings if each.code in UNIT_CODES]
+        assert [each.certainty == AS_GIVEN for each in found] == [is_given]

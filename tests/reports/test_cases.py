@@ -5,8 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from fgbaseline.compare import associate
+from fgbaseline.data.formats import read_trajectory
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.comparing import ComparisonReport, compare
 
@@ -156,3 +159,18 @@ def test_published_files_give_published_numbers_in_one_command(
     estimates = json.loads((tmp_path / "out" / "comparison.json").read_text())["estimates"]
     found = [each["translation"]["rmse"]["value"] for each in estimates.values()]
     assert found == pytest.approx(published, abs=digit)
+
+
+def test_orb_slam3_writes_the_orientations_of_its_keyframes_transposed(recordings: Recordings) -> None:
+    place = "trajectories/orbslam3_native"
+    files = (recordings(f"{place}/room4_{kind}_dataset-room4_512_mono.txt") for kind in ("f", "kf"))
+    frames, keyframes = map(read_trajectory, files)
+    pairs = associate(frames, keyframes)
+    assert len(pairs) > 100
+    moved = np.linalg.norm(pairs.reference.position - pairs.estimate.position, axis=1)
+    same = moved < 1e-5
+    assert same.any()
+    transposed = np.swapaxes(pairs.estimate.rotation, 1, 2)
+    np.testing.assert_allclose(transposed[same], pairs.reference.rotation[same], atol=1e-6)
+    result = compare(recordings(f"{place}/room4_data.csv"), keyframes, align="sim3")
+    assert any("its orientations fit once transposed" in sentence for sentence in result.verdict)

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline.compare.limits import Better, Bounds, Outcome, around, rounded
+from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.evaluation import evaluate
@@ -309,3 +310,17 @@ def test_a_summary_that_is_none_is_told(text: str, names: tuple[str, ...], tmp_p
     with pytest.raises(InputError, match=r"summary\.json: ") as error:
         read_folder(tmp_path / "out")
     assert all(name in str(error.value) for name in names), str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("certainty", "exit_code"), [("the cameras see turns 0.001 times as large as recorded", 2), (AS_GIVEN, 0)]
+)
+@pytest.mark.parametrize("code", sorted(UNITS))
+def test_no_limit_holds_on_units_that_were_guessed(tmp_path: Path, code: str, certainty: str, exit_code: int) -> None:
+    document = summary(isam2=estimator(0.1))
+    document["problem"] = {"findings": [{"code": code, "certainty": certainty}]}
+    result = checked(tmp_path, document, ATE)
+    assert result.exit_code == exit_code
+    assert bool(exit_code) == any(code in remark and "--time-unit" in remark for remark in remarks(result))
+    document["problem"] = {"findings": [{"code": "gyro_bias", "certainty": certainty}]}
+    assert checked(tmp_path, document, ATE).exit_code == 0

@@ -14,8 +14,9 @@ from evo.core.trajectory import PoseTrajectory3D
 from fgbaseline.compare import time_coverage
 from fgbaseline.data import Estimate, Status, Trajectory, Truth, write_tum
 from fgbaseline.data.motion import dead_reckoned_path
-from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.geometry import FloatArray, InputError, se3, so3
 from fgbaseline.reports.checking import assert_accuracy
+from fgbaseline.reports.comparing import compare
 
 from ..builders.commands import environment
 
@@ -176,3 +177,51 @@ def test_without_a_folder_figures_go_to_that_of_the_test(tmp_path: Path) -> None
 
 def test_nothing_of_ours_is_imported_where_nobody_asks_for_it(tmp_path: Path) -> None:
     assert users_pytest(tmp_path, "-k", "without_it").returncode == 0
+
+
+def rows_of(poses: FloatArray) -> list[list[str]]:
+    """Position and quaternion, x y z w, as text."""
+    numbers = np.concatenate([poses[:, :3, 3], so3.quaternion_xyzw(poses[:, :3, :3])], axis=1)
+    return [list(map(repr, row)) for row in numbers.tolist()]
+
+
+def test_files_are_settled_by_each_other_as_compare_does(tmp_path: Path) -> None:
+    truth, mine = tmp_path / "truth.tum", tmp_path / "mine.txt"
+    write_tum(truth, STAMPS, true_path())
+    lines = [
+        " ".join([str(round(t * 1e9)), *row[:3], row[6], *row[3:6]])
+        for t, row in zip(STAMPS, rows_of(estimated()), strict=True)
+    ]
+    mine.write_text("\n".join(lines) + "\n")
+    values = assert_accuracy(mine, truth, ate=1.0, rotation_deg=2.0)
+    table = compare(truth, mine).metrics.set_index("metric")["value"]
+    for ours, theirs in (("ate.rmse", "translation.rmse"), ("rotation.rmse", "rotation_deg.rmse")):
+        assert values[ours] == pytest.approx(float(table[theirs]), rel=1e-12)
+    plain = assert_accuracy((STAMPS, estimated()), (STAMPS, true_path()), ate=1.0)
+    assert values == pytest.approx(plain, rel=1e-6)
+    with pytest.raises(AssertionError, match="mine: its quaternions are read as w x y z") as error:
+        assert_accuracy(mine, truth, ate=0.1, figure=tmp_path / "x.png")
+    assert "mine: its time stamps are in nanoseconds" in str(error.value)
+
+
+def test_positions_are_compared_in_positions_only(tmp_path: Path) -> None:
+    truth = tmp_path / "truth.txt"
+    rows = zip(STAMPS.tolist(), rows_of(true_path()), strict=True)
+    truth.write_text("".join(f"{t!r} {' '.join(row[:3])}\n" for t, row in rows))
+    values = assert_accuracy((STAMPS, estimated()), truth, ate=1.0)
+    assert "rotation.rmse" not in values
+    assert values["ate.rmse"] == pytest.approx(evo_ate()[0])
+    for options in ({"rotation_deg": 1.0}, {"align": "first-pose"}):
+        with pytest.raises(InputError, match=r"truth\.txt: it has no orientations"):
+            assert_accuracy((STAMPS, estimated()), truth, ate=1.0, **options)
+
+
+def test_what_stays_in_doubt_is_refused(tmp_path: Path) -> None:
+    names = ("truth.txt", "mine.txt")
+    for name, poses in zip(names, (true_path(), estimated()), strict=True):
+        rows = zip(100 * np.arange(T), rows_of(poses), strict=True)
+        (tmp_path / name).write_text("".join(f"{t} {' '.join(row)}\n" for t, row in rows))
+    truth, mine = (tmp_path / name for name in names)
+    with pytest.raises(InputError, match="give --time-unit"):
+        assert_accuracy(mine, truth, ate=1.0)
+    assert assert_accuracy(mine, truth, ate=1.0, time_unit="ms")["ate.rmse"] == pytest.approx(evo_ate()[0])

@@ -71,6 +71,17 @@ def test_every_command_ends_whatever_the_numbers_are(change: str, tmp_path: Path
     every_command_ends(change, tmp_path)
 
 
+@pytest.mark.parametrize("command", [("diagnose", "drive.npz"), ("run", "drive.npz", "--out", "run")])
+def test_a_velocity_that_no_sensor_measures_is_refused_in_a_sentence(tmp_path: Path, command: tuple[str, ...]) -> None:
+    arrays = {key: np.array(array) for key, array in good_recording(0).items()}
+    arrays["linear_velocity"][0, 30] = 1e300
+    np.savez(tmp_path / "drive.npz", **arrays)
+    result = fgbaseline(*command, cwd=tmp_path, first=bounded)
+    assert result.returncode == 2
+    assert "linear_velocity: frame 30 has [1e+300" in result.stderr
+    assert "Warning" not in result.stderr
+
+
 @pytest.mark.parametrize("factor", [pytest.param(1e-9, marks=pytest.mark.full), 1e9])
 def test_a_comparison_ends_whatever_both_are_stamped_in(factor: float, tmp_path: Path) -> None:
     truth, mine = good_trajectory(0)

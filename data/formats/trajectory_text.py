@@ -1,0 +1,140 @@
+"""The poses of a trajectory in text; lines without a pose and repeated stamps are left out and counted."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..observations import BoolArray, IntArray
+from .columns import Columns
+from .kitti import kitti_poses
+from .number_table import Lines, NumberTable, numbers_of
+from .quaternion_order import xyzw
+from .stamped_poses import require_rising, rotations_of_quaternions
+from .stamps import equal_stamps, possible_units, stamps_of
+from .trajectory_file import TrajectoryFile
+
+UP_OF_CAMERA = (0.0, -1.0, 0.0)
+"""in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
+FORWARD = 0.9
+"""the cosine of the angle to the body's x axis: a body that travels so is no camera"""
+
+
+def read_text(empty: TrajectoryFile, lines: Lines, columns: Columns) -> TrajectoryFile:
+    """The trajectory file `empty`, which has name and source, with what its columns hold. Raises InputError."""
+    places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
+    stamp = columns.time if columns.time is not None else columns.number
+    table = numbers_of(lines, places if stamp is None else [stamp, *places], nan=True)
+    if columns.nanoseconds is not None:
+        numbers_of(lines, [columns.nanoseconds])
+    pose = table.values if stamp is None else table.values[:, 1:]
+    n_pose = len(columns.matrix) or len(columns.position) + len(columns.quaternion)
+    kept, columns, remarks = _known(table, pose[:, :n_pose], columns, stamp is not None)
+    if columns.remark:
+        remarks.append(columns.remark)
+    line, pose = table.line[kept], pose[kept]
+    file = replace(empty, line=line, remarks=tuple(remarks))
+    if stamp is not None:
+        file, kept = _with_stamps(file, lines, columns, kept, table.values[kept, 0], pose[:, :n_pose])
+        pose, line = pose[kept], line[kept]
+        file = replace(file, line=line)
+    if columns.matrix:
+        poses = kitti_poses(pose[:, :12], line)
+        position, rotation = poses[:, :3, 3], poses[:, :3, :3]
+        return replace(file, position=position, rotation=rotation, up=_up_of_camera(position, rotation))
+    position = pose[:, :3]
+    file = replace(file, position=position)
+    if not columns.quaternion:
+        return replace(file, remarks=(*file.remarks, "it has positions and no orientations"))
+    numbers = pose[:, 3:7]
+    if not numbers.any():
+        return replace(file, remarks=(*file.remarks, "its quaternions are zero: it has positions and no orientations"))
+    order = columns.orders[0]
+    shown_order = " ".join(f"q{axis}" for axis in order)
+    return replace(
+        file,
+        rotation=rotations_of_quaternions(
+            xyzw(numbers, order), line, f"{shown_order} of length 1 behind the position (here as x y z w)"
+        ),
+        quaternion=numbers,
+        orders=columns.orders,
+        covariance_numbers=pose[:, 7:] if columns.covariance else None,
+        remarks=(*file.remarks, *_covariance_remark(columns)),
+    )
+
+
+def _known(
+    table: NumberTable, pose: FloatArray, columns: Columns, has_stamp: bool
+) -> tuple[IntArray, Columns, list[str]]:
+    """The lines (m,) that have a pose, the columns that they have, and what there is to remark."""
+    if columns.quaternion and np.isnan(pose[:, 3:7]).all() and np.isfinite(pose[:, :3]).any():
+        remarks = ["its quaternions are NaN: it has positions and no orientations"]
+        columns, pose = replace(columns, quaternion=(), covariance=()), pose[:, :3]
+    else:
+        remarks = []
+    unknown: BoolArray = np.asarray(np.isnan(pose).any(axis=1))
+    if has_stamp and np.isnan(table.values[~unknown, 0]).any():
+        i = int(np.flatnonzero(~unknown & np.isnan(table.values[:, 0]))[0])
+        raise InputError(f"line {table.line[i]}: the time stamp is NaN; remove the line or mend it")
+    if has_stamp:
+        unknown |= np.isnan(table.values[:, 0])
+    if unknown.all():
+        raise InputError("every pose is NaN, so there is no trajectory; check that it is the right file")
+    if unknown.any():
+        count = int(unknown.sum())
+        have = "has NaN in place of a pose and is" if count == 1 else "have NaN in place of a pose and are"
+        remarks.append(f"{count:,} of {len(unknown):,} lines {have} left out")
+    return np.flatnonzero(~unknown), columns, remarks
+
+
+def _with_stamps(
+    file: TrajectoryFile, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
+) -> tuple[TrajectoryFile, IntArray]:
+    """The file with the stamps or frame numbers of the lines `kept`, and which of these (m,) are left."""
+    place = columns.time if columns.time is not None else columns.number
+    assert place is not None
+    words = lines.column(place)
+    rest = None if columns.nanoseconds is None else lines.column(columns.nanoseconds)
+    stamps = stamps_of([words[i] for i in kept], value, columns.unit, None if rest is None else [rest[i] for i in kept])
+    moved: BoolArray = np.asarray((np.diff(pose, axis=0) != 0).any(axis=1))
+    reason = equal_stamps(stamps, moved)
+    if reason:
+        raise InputError(reason)
+    assert file.line is not None
+    repeated = np.concatenate([[False], stamps.equal()])
+    left = np.flatnonzero(~repeated)
+    stamps, line = stamps.at(left), file.line[left]
+    require_rising(stamps, line)
+    remarks = file.remarks
+    if repeated.any():
+        count = int(repeated.sum())
+        said = f"{count:,} of {len(repeated):,} lines {'repeats' if count == 1 else 'repeat'} the time stamp before"
+        remarks = (*remarks, f"{said}; the first pose is kept")
+    if columns.time is None and stamps.whole is not None and max(map(abs, stamps.whole)) < 10**7:
+        return replace(file, frame=np.array(stamps.whole, dtype=np.int64), remarks=remarks), left
+    if stamps.unit == "ns" and stamps.whole is None:
+        i = int(np.flatnonzero(stamps.value != np.floor(stamps.value))[0])
+        raise InputError(
+            f"line {line[i]}: the time stamp {words[kept[left[i]]]} is no whole number of nanoseconds; write those"
+        )
+    units, is_settled = possible_units(stamps)
+    return replace(file, stamps=stamps, units=units, unit_settled=is_settled, remarks=remarks), left
+
+
+def _covariance_remark(columns: Columns) -> tuple[str, ...]:
+    if not columns.covariance:
+        return ()
+    if len(columns.covariance) == 12:
+        return ("its covariances are read as OpenVINS writes them: rotation in the body, then position in the world",)
+    return ("its covariances are read as in ROS: position, then rotation, both in the world",)
+
+
+def _up_of_camera(position: FloatArray, rotation: FloatArray) -> FloatArray | None:
+    """Up in the world of a camera; None where the body travels along its x axis, as no camera's frame does."""
+    steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
+    length = np.linalg.norm(steps, axis=1)
+    moving = np.asarray(length > 0.1 * np.max(length, initial=0.0))
+    if np.any(moving) and np.median(np.abs(steps[moving, 0]) / length[moving]) > FORWARD:
+        return None
+    return np.array(UP_OF_CAMERA)
