@@ -18,7 +18,7 @@ from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
 from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run import job
 
 from ..builders.commands import fgbaseline
@@ -43,7 +43,7 @@ class Quick:
     def check(self, other: Mapping[str, Estimate]) -> int:
         """The exit code with some answers replaced, against what is committed."""
         answers = {**self.answers, **other}
-        summary = summarise(compare_all(self.problem, answers, {}))
+        summary = summarize(compare_all(self.problem, answers, {}))
         text = json.dumps(summary.model_dump(mode="json", by_alias=True))
         (self.folder / job.MARK).write_text(text)
         return check(self.folder, SUITES / "quick-limits.toml", self.folder / BASELINE.name, Outputs())

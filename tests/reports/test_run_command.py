@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run import job
 from fgbaseline.reports.run.folder import write_run
 from fgbaseline.reports.run.job import RunSettings
@@ -211,7 +211,7 @@ def test_truth_that_ends_early_is_counted(recording: Path, tmp_path: Path) -> No
         sequence=recording, estimators=("dead-reckoning",), truth=tmp_path / "kitti.txt", truth_frame="imu"
     )
     run = job.solve(job.pose_problem(job.read_sequence(settings), settings), settings)
-    e = summarise(run).estimators["dead-reckoning"]
+    e = summarize(run).estimators["dead-reckoning"]
     assert e.truth is not None
     assert (e.truth.frames, e.truth.missing) == (70, 10)
     assert e.ate_unaligned is not None
