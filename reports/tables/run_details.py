@@ -32,11 +32,12 @@ REASONS: Mapping[str, str] = {
 
 
 def findings_table(findings: Iterable[Finding]) -> Table:
-    """Findings of the diagnosis with their figures before and after repair."""
+    """Findings of the diagnosis before and after repair; the status is the certainty of what is not counted."""
     rows = tuple(
         Row(
-            f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})",
+            f.sentence,
             (Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
+            status="ok" if f.certainty == "counted" else f.certainty,
         )
         for f in findings
     )
