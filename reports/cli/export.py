@@ -30,6 +30,6 @@ def command(out: Path, force: bool, **given: Any) -> int:
     back through `fgbaseline compare`. Ground truth is not exported.
     """
     from fgbaseline.reports.run.export import export
-    from fgbaseline.reports.run.job import RunSettings
+    from fgbaseline.reports.run.problem import RunSettings
 
     return export(RunSettings(**given), out, force=force)

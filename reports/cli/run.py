@@ -80,7 +80,7 @@ def command(
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
     from fgbaseline.reports.cli.run_output import report
-    from fgbaseline.reports.run.job import RunSettings
+    from fgbaseline.reports.run.problem import RunSettings
 
     settings = RunSettings(
         estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),

@@ -8,14 +8,14 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.exchange import layout, write_problem
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.plural import plural
-from fgbaseline.reports.run import job
+from fgbaseline.reports.run.problem import RunSettings, pose_problem, read_sequence, split
 
 
-def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
+def export(settings: RunSettings, out: Path, *, force: bool) -> int:
     """Poses the problem of a recording, writes it into the folder and prints what it holds; gives the exit code."""
     require_free(out, force=force, mark=layout.SCALARS)
-    sequence, held = job.split(job.read_sequence(settings), settings)
-    problem = job.pose_problem(sequence, settings)
+    sequence, held = split(read_sequence(settings), settings)
+    problem = pose_problem(sequence, settings)
     with atomic_folder(out, force=force, mark=layout.SCALARS) as folder:
         write_problem(problem, folder)
     for sentence in _sentences(problem):

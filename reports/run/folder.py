@@ -16,7 +16,7 @@ from fgbaseline.data import Estimate, write_tum
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.run import Summary, summarize
-from fgbaseline.reports.run.job import MARK
+from fgbaseline.reports.run.problem import MARK
 from fgbaseline.reports.tables.run import metrics_table
 
 TRUTH_FILE = "truth.tum"

@@ -233,7 +233,7 @@ def test_two_folders_exchange_their_names(tmp_path: Path) -> None:
 def test_where_the_system_cannot_exchange_names_the_folder_is_replaced_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unable: Callable[..., int] | None
 ) -> None:
-    monkeypatch.setattr("fgbaseline.reports.exchange_names._renameat2", lambda: unable)
+    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder._renameat2", lambda: unable)
     monkeypatch.setattr("ctypes.get_errno", lambda: 38)
     for text in ("old", "new"):
         with atomic_folder(tmp_path / "out", force=True, mark=MARK) as folder:
