@@ -21,7 +21,7 @@ from rich.table import Table
 
 from fgbaseline.data import Problem, Sequence, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError
-from fgbaseline.reports.run.job import RunSettings, check_estimators, pose_problem, read_sequence
+from fgbaseline.reports.run.problem import RunSettings, check_estimators, pose_problem, read_sequence
 
 
 def seconds_taken(problem: Problem, name: str) -> float:

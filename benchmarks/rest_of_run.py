@@ -50,17 +50,17 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
     with watch("imports"):
         from fgbaseline.data.parallel import cores, shared
         from fgbaseline.reports import progress  # noqa: F401
-        from fgbaseline.reports.run import job
-    settings = job.RunSettings(sequence=recording, estimators=estimators)
+        from fgbaseline.reports.run.problem import RunSettings, load_estimators, pose_problem, read_sequence
+    settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
-        sequence = job.read_sequence(settings)
-    with watch(POSING), shared(lambda _: job.pose_problem(sequence, settings, cores()), 1, cores()) as posed:
+        sequence = read_sequence(settings)
+    with watch(POSING), shared(lambda _: pose_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.compare.estimate_comparison import compare_all
         from fgbaseline.data.solving import solve_all
         from fgbaseline.reports import figures
         from fgbaseline.reports.run.folder import write_numbers, write_page
 
-        job.load_estimators(estimators)
+        load_estimators(estimators)
         (problem,) = posed()
     answers = solve_all(problem, estimators, lambda name: watch(f"{SOLVING}{name}"))
     with watch("comparison"):

@@ -1,4 +1,4 @@
-"""All estimates of one problem compared: with the reference, with ground truth and with each other."""
+"""Run and comparison of its estimators with reference and truth: trajectories, consistency, residuals, map, tracks."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -14,63 +14,41 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.parallel import shared
 from fgbaseline.geometry import FloatArray
 
+REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
+"""the reference of a run is the first of these that gave an answer"""
+SAME_GRAPH = ("isam2", "batch")
+"""estimators that minimize one and the same graph"""
+NO_REFERENCE = "no estimator gave an answer to compare with"
+
 
 @dataclass(frozen=True, slots=True)
 class CommonRmse:
-    """The RMSE of positions over the frames that all estimators have which take part."""
+    """RMSE of positions over the frames that all ranked estimators have."""
 
     rmse: float
     """m"""
     frames: int
 
 
-def known(table: pd.DataFrame) -> BoolArray:
-    """(T,) the frames for which a table of `compare.pose_errors` has a position."""
-    return np.asarray(table["position"].notna(), dtype=np.bool_)
-
-
-def common_rmse(tables: Mapping[str, pd.DataFrame]) -> dict[str, CommonRmse]:
-    """By name the RMSE over the frames that all tables of `compare.pose_errors` have; empty without such a frame.
-
-    An estimator with far fewer frames than the others takes no part: see `compare.rankable`.
-    """
-    there = {name: known(table) for name, table in tables.items()}
-    names = compare.rankable({name: int(frames.sum()) for name, frames in there.items()})
-    if not names:
-        return {}
-    common = np.logical_and.reduce([there[name] for name in names])
-    n = int(common.sum())
-    errors = {name: tables[name]["position"].to_numpy(dtype=np.float64)[common] for name in names}
-    return {name: CommonRmse(compare.summarized(errors[name])["rmse"], n) for name in names} if n else {}
-
-
-def same_frames(frames: Iterable[BoolArray]) -> bool:
-    """Whether all of them are the same (T,)."""
-    every = list(frames)
-    return all(np.array_equal(every[0], other) for other in every[1:])
-
-
-def share_of_time(t: FloatArray, frames: BoolArray) -> float:
-    """The share of the recording's time in which there are these frames (T,): see `compare.time_coverage`."""
-    return compare.time_coverage(t[frames], t)
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Evidence:
-    """One estimator's."""
+    """Consistency, residuals and map of an estimate; what compares with truth or reference is None without it.
+
+    For the reference itself `difference`, `sigma_ratio` and `map` are None too.
+    """
 
     covariance: NDArray[np.uint8]
     """(T,) a `compare.CovarianceState` each"""
     error: FloatArray | None
-    """(T, 6) in the body frame: see `compare.body_error`; None without truth"""
+    """(T, 6) in the body frame: see `compare.body_error`"""
     nees: pd.DataFrame | None
-    """see `compare.nees_table`; None without truth"""
+    """see `compare.nees_table`"""
     difference: compare.ReferenceNees | None
-    """against the reference; None for the reference itself, and without one"""
+    """NEES of the difference from the reference"""
     sigma_ratio: pd.DataFrame | None
-    """its sigmas over those of the reference, by frame; None likewise"""
+    """sigmas over those of the reference, by frame"""
     nis_per_degree: FloatArray
-    """(T,) NaN where it recorded no innovation"""
+    """(T,) NaN where no innovation is recorded"""
     nis: compare.NisSummary
     whitened: dict[str, float | int]
     """see `compare.whitened_summary`"""
@@ -79,12 +57,17 @@ class Evidence:
     moved: pd.DataFrame
     """see `compare.dynamic_landmarks`"""
     map: pd.DataFrame | None
-    """see `compare.map_difference`; None for the reference itself, and without one"""
+    """see `compare.map_difference`"""
+
+    @property
+    def map_by_depth(self) -> pd.DataFrame | None:
+        """See `compare.map_by_depth`; None for the reference and where no landmark is shared."""
+        return None if self.map is None or len(self.map) == 0 else compare.map_by_depth(self.map).reset_index()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HeldOutReport:
-    """The tracks that were kept from the run, and what the paths make of them."""
+    """Tracks that were held out of the run, and the prediction errors of the paths on them."""
 
     held: HeldOut
     errors: compare.HeldOutErrors | None
@@ -93,50 +76,9 @@ class HeldOutReport:
     """see `compare.held_out_ranking`; empty where no track is left to judge by"""
 
 
-def gathered(problem: Problem, estimate: Estimate, reprojection: pd.DataFrame, reference: Estimate | None) -> Evidence:
-    """The evidence on an estimate, `reprojection` being its table."""
-    truth = problem.sequence.truth
-    other = None if reference is None or reference.name == estimate.name else reference
-    return Evidence(
-        covariance=compare.covariance_state(estimate),
-        error=None if truth is None else compare.body_error(estimate, truth),
-        nees=None if truth is None else compare.nees_table(estimate, truth),
-        difference=None if other is None else compare.reference_nees(estimate, other),
-        sigma_ratio=None if other is None else compare.sigma_ratio(estimate, other),
-        nis_per_degree=compare.nis_per_degree(estimate),
-        nis=compare.nis_summary(estimate),
-        whitened=compare.whitened_summary(problem, reprojection),
-        patterns=compare.residual_patterns(problem.sequence, reprojection),
-        moved=compare.dynamic_landmarks(problem, estimate, reprojection),
-        map=None if other is None else compare.map_difference(problem.sequence, estimate, other),
-    )
-
-
-def held_out_report(problem: Problem, estimates: Iterable[Estimate], held: HeldOut) -> HeldOutReport:
-    """The ranking of all estimates that answered."""
-    paths = {e.name: e.world_T_imu for e in estimates if e.status is not Status.FAILED}
-    if not paths:
-        return HeldOutReport(held, None, pd.DataFrame())
-    errors = compare.held_out_errors(problem.sequence, held, paths, problem.pixel_variance)
-    return HeldOutReport(held, errors, compare.held_out_ranking(errors))
-
-
-def frames_in_words(frames: NDArray[np.int64]) -> str:
-    """`3, 7 to 9` for rising frames; empty for none."""
-    if len(frames) == 0:
-        return ""
-    runs = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
-
-
-REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
-"""the reference of a run is the first of these that gave an answer"""
-NO_REFERENCE = "no estimator gave an answer to compare with"
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Result:
-    """One estimator of a run, compared."""
+    """Estimator of a run, compared."""
 
     estimate: Estimate
     reprojection: pd.DataFrame
@@ -147,8 +89,6 @@ class Result:
     """from the truth as it is; None without truth"""
     truth_aligned: pd.DataFrame | None
     """from the truth after SE(3) alignment"""
-    nees: FloatArray | None
-    """(T,) against truth"""
     evidence: Evidence
     divergence_common: CommonRmse | None = None
     """what ranks it: over the frames that all estimators have; None where it is not ranked"""
@@ -157,7 +97,7 @@ class Result:
 
     @property
     def name(self) -> str:
-        """The name the estimator is registered under."""
+        """Name under which the estimator is registered."""
         return self.estimate.name
 
     @property
@@ -165,10 +105,20 @@ class Result:
         """Whether there is a trajectory to show."""
         return self.estimate.status is not Status.FAILED
 
+    @property
+    def nees(self) -> FloatArray | None:
+        """(T,) of the poses against truth; None without truth."""
+        return None if self.evidence.nees is None else self.evidence.nees["pose"].to_numpy()
+
+    @property
+    def divergence_rmse(self) -> float:
+        """Positions against the reference, m; NaN without one."""
+        return float("nan") if self.divergence is None else compare.divergence_summary(self.divergence)["rmse"]
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Run:
-    """All there is to report."""
+    """Problem, results of all estimators and the reference among them."""
 
     problem: Problem
     results: Mapping[str, Result]
@@ -178,14 +128,35 @@ class Run:
     common: BoolArray | None
     """(n,) the observations that every estimator used which uses any"""
     settings: Mapping[str, object]
-    """what the user asked for, for the record"""
+    """of the user, for the record"""
     held_out: HeldOutReport | None = None
     """None where no tracks were held out"""
 
     @property
     def answered(self) -> list[Result]:
-        """The results that have a trajectory."""
+        """Results that have a trajectory."""
         return [result for result in self.results.values() if result.answered]
+
+    @property
+    def compared(self) -> list[Result]:
+        """Results other than the reference that are compared with it, by their RMSE."""
+        others = [r for r in self.answered if r.name != self.reference and r.divergence is not None]
+        return sorted(others, key=lambda result: result.divergence_rmse)
+
+    @property
+    def by_products(self) -> frozenset[str]:
+        """Estimators whose answers the reference's own run gives as well."""
+        return frozenset() if self.reference is None else frozenset(self.results[self.reference].estimate.by_products)
+
+    @property
+    def same_graph(self) -> frozenset[str]:
+        """Estimators that find other minima of the reference's graph."""
+        return frozenset(SAME_GRAPH) - {self.reference} if self.reference in SAME_GRAPH else frozenset()
+
+    @property
+    def unranked(self) -> frozenset[str]:
+        """Estimators that are no competitors of the reference."""
+        return self.by_products | self.same_graph
 
 
 def compare_all(
@@ -195,7 +166,7 @@ def compare_all(
     held: HeldOut | None = None,
     processes: int = 1,
 ) -> Run:
-    """All comparisons of a run, `held` being the tracks that were kept from it; so many `processes` share the work."""
+    """All comparisons of a run, `held` being the tracks held out of it; so many `processes` share the work."""
     reference = next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
     if reference is None:
         trusted = compare.Trust(compare.Verdict.UNTRUSTED, (NO_REFERENCE,))
@@ -213,92 +184,66 @@ def compare_all(
         name: replace(result, divergence_common=from_reference.get(name), ate_common=to_truth.get(name))
         for name, result in results.items()
     }
-    held_out = None if held is None else held_out_report(problem, estimates.values(), held)
+    held_out = None if held is None else _held_out_report(problem, estimates.values(), held)
     return Run(problem, results, reference, trusted, compare.used_by_all(estimates.values()), settings, held_out)
 
 
 def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> dict[str, Any]:
-    """All of a `Result` but the estimate itself, which need not be sent from one process to another."""
-    truth, up = problem.sequence.truth, problem.sequence.up
-    reprojection = compare.reprojection(problem.sequence, estimate)
-    evidence = gathered(problem, estimate, reprojection, reference)
+    """Fields of a `Result` but the estimate itself, which need not be sent from one process to another."""
+    sequence, truth = problem.sequence, problem.sequence.truth
+    other = None if reference is None or reference.name == estimate.name else reference
+    reprojection = compare.reprojection(sequence, estimate)
+    evidence = Evidence(
+        covariance=compare.covariance_state(estimate),
+        error=None if truth is None else compare.body_error(estimate, truth),
+        nees=None if truth is None else compare.nees_table(estimate, truth),
+        difference=None if other is None else compare.reference_nees(estimate, other),
+        sigma_ratio=None if other is None else compare.sigma_ratio(estimate, other),
+        nis_per_degree=compare.nis_per_degree(estimate),
+        nis=compare.nis_summary(estimate),
+        whitened=compare.whitened_summary(problem, reprojection),
+        patterns=compare.residual_patterns(sequence, reprojection),
+        moved=compare.dynamic_landmarks(problem, estimate, reprojection),
+        map=None if other is None else compare.map_difference(sequence, estimate, other),
+    )
     return {
         "reprojection": reprojection,
-        "divergence": None if reference is None else compare.divergence(estimate, reference, up),
-        "truth": None if truth is None else compare.truth_errors(estimate, truth, up),
-        "truth_aligned": None if truth is None else compare.truth_errors(estimate, truth, up, aligned=True),
-        "nees": None if evidence.nees is None else evidence.nees["pose"].to_numpy(),
+        "divergence": None if reference is None else compare.divergence(estimate, reference, sequence.up),
+        "truth": None if truth is None else compare.truth_errors(estimate, truth, sequence.up),
+        "truth_aligned": None if truth is None else compare.truth_errors(estimate, truth, sequence.up, aligned=True),
         "evidence": evidence,
     }
 
 
-def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
-    """By the beginning of a metric's path: `n` of what it is taken over, and the `coverage` of the recording's time.
+def _held_out_report(problem: Problem, estimates: Iterable[Estimate], held: HeldOut) -> HeldOutReport:
+    paths = {e.name: e.world_T_imu for e in estimates if e.status is not Status.FAILED}
+    if not paths:
+        return HeldOutReport(held, None, pd.DataFrame())
+    errors = compare.held_out_errors(problem.sequence, held, paths, problem.pixel_variance)
+    return HeldOutReport(held, errors, compare.held_out_ranking(errors))
 
-    n are frames, of the reprojection observations, of the map landmarks, else tracks; what is not spread over time has
-    no coverage.
+
+def known(table: pd.DataFrame) -> BoolArray:
+    """(T,) frames for which a table of `compare.pose_errors` has a position."""
+    return np.asarray(table["position"].notna(), dtype=np.bool_)
+
+
+def common_rmse(tables: Mapping[str, pd.DataFrame]) -> dict[str, CommonRmse]:
+    """RMSE by name over the frames that all tables of `compare.pose_errors` have; empty without such a frame.
+
+    An estimator with far fewer frames than the others is left out: see `compare.rankable`.
     """
-    t, evidence = run.problem.sequence.t, result.evidence
-    found: dict[str, dict[str, float]] = {}
-
-    def of_frames(frames: BoolArray, *keys: str) -> None:
-        sample = {"n": int(frames.sum()), "coverage": compare.time_coverage(t[frames], t)}
-        found.update(dict.fromkeys(keys, sample))
-
-    if result.divergence is not None:
-        of_frames(known(result.divergence), "divergence")
-    if result.truth is not None:
-        of_frames(known(result.truth), "ate", "ate_unaligned")
-    for key, common in (("divergence_common", result.divergence_common), ("ate_common", result.ate_common)):
-        if common is not None:
-            found[key] = {"n": common.frames}
-    by_frame = {
-        "nees": None if evidence.nees is None else evidence.nees["pose"].to_numpy(),
-        "nees_reference": None if evidence.difference is None else evidence.difference.nees,
-        "sigma_ratio": None if evidence.sigma_ratio is None else evidence.sigma_ratio["position"].to_numpy(),
-        "nis": evidence.nis_per_degree,
-    }
-    for key, values in by_frame.items():
-        if values is not None:
-            of_frames(np.asarray(np.isfinite(values), dtype=np.bool_), key)
-    return {**found, **_of_observations(run, result), **_without_time(run, result)}
+    there = {name: known(table) for name, table in tables.items()}
+    names = compare.rankable({name: int(frames.sum()) for name, frames in there.items()})
+    if not names:
+        return {}
+    common = np.logical_and.reduce([there[name] for name in names])
+    n = int(common.sum())
+    errors = {name: tables[name]["position"].to_numpy(dtype=np.float64)[common] for name in names}
+    return {name: CommonRmse(compare.summarized(errors[name])["rmse"], n) for name in names} if n else {}
 
 
-def _of_observations(run: Run, result: Result) -> dict[str, dict[str, float]]:
-    """Observations, and the time of the frames that they are in."""
-    t, table = run.problem.sequence.t, result.reprojection
-    common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
-    parts = {
-        "reprojection": table,
-        "components": table,
-        "reprojection_used": table[table["used"]],
-        "reprojection_common": table[common[table["observation"]]],
-    }
-    return {
-        key: {"n": len(part), "coverage": compare.time_coverage(t[np.unique(part["frame"])], t)}
-        for key, part in parts.items()
-    }
-
-
-def _without_time(run: Run, result: Result) -> dict[str, dict[str, float]]:
-    evidence = result.evidence
-    counts = {"whitened": int(evidence.whitened["tracks"]), "moved_points": len(evidence.moved)}
-    if evidence.map is not None:
-        counts |= {"map": len(evidence.map), "map.median_sigmas": int(evidence.map["sigmas"].notna().sum())}
-    if run.held_out is not None and result.name in run.held_out.ranking.index:
-        counts["held_out"] = int(run.held_out.ranking.attrs["n"])
-    return {key: {"n": n} for key, n in counts.items()}
-
-
-def of_truth(run: Run) -> Mapping[str, float] | None:
-    """The sample that errors to the truth rest on at best: the frames that have one; None without truth."""
-    truth, t = run.problem.sequence.truth, run.problem.sequence.t
-    return (
-        None if truth is None else {"n": int(truth.known.sum()), "coverage": compare.time_coverage(t[truth.known], t)}
-    )
-
-
-def map_by_depth(result: Result) -> pd.DataFrame | None:
-    """See `compare.map_by_depth`; None for the reference and where no landmark is shared."""
-    table = result.evidence.map
-    return None if table is None or len(table) == 0 else compare.map_by_depth(table).reset_index()
+def same_frames(frames: Iterable[BoolArray]) -> bool:
+    """Whether all of them are the same (T,)."""
+    every = list(frames)
+    return all(np.array_equal(every[0], other) for other in every[1:])

@@ -1,4 +1,4 @@
-"""The answers of all estimators to one problem, ours and those of other packages, none of which can stop the others."""
+"""Answers of all estimators to one problem, ours and those of other packages: the failure of one stops no other."""
 
 import inspect
 import time
@@ -15,20 +15,20 @@ from fgbaseline.data import Estimate, Problem, Progress, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError, so3
 
 Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
-"""around the work of a named estimator: gives what is told of every frame"""
+"""around the work of a named estimator: gives the callback for every frame"""
 ROTATION_TOLERANCE = 1e-6
 
 
 def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
-    """Nobody is told of progress."""
+    """Progress is not reported."""
     return nullcontext(None)
 
 
 def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
-    """Each named estimator's answer, in the order of the names; a failure is an answer and stops nothing.
+    """Answer of each named estimator, in the order of the names; a failure is an answer and stops nothing.
 
-    What one run gives along with another (`isam2-online` with `isam2`) is not solved again, and an estimator that
-    has a parameter `given` (`batch` starts from the answer of `isam2`) is told the answers so far by name.
+    A by-product (`isam2-online` of `isam2`) is not solved again, and an estimator that has a parameter `given`
+    (`batch` starts from the answer of `isam2`) receives the answers so far by name.
     """
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
@@ -41,8 +41,8 @@ def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) 
             with watch(name) as progress:
                 estimate = checked(_solved(find_estimator(name), problem, progress, given | answers), name, problem)
                 given |= {other: checked(e, other, problem) for other, e in estimate.by_products.items()}
-        except Exception as error:  # whatever somebody's filter may raise
-            estimate = Estimate.failed(name, told(error), problem.n_frames, len(problem.excluded))
+        except Exception as error:  # a filter of another package may raise anything
+            estimate = Estimate.failed(name, describe(error), problem.n_frames, len(problem.excluded))
             estimate = replace(estimate, seconds_total=time.perf_counter() - start)
         answers[name] = estimate
     return answers
@@ -59,12 +59,12 @@ def _solved(
 def _parameters(estimator: Callable[..., object]) -> Iterable[str]:
     try:
         return inspect.signature(estimator).parameters
-    except (TypeError, ValueError):  # one written in C does not say
+    except (TypeError, ValueError):  # one written in C has no signature
         return ()
 
 
-def told(error: Exception) -> str:
-    """An exception in a sentence: what it is, what it says and the line it comes from."""
+def describe(error: Exception) -> str:
+    """Sentence on an exception: its type, its text and the line it comes from."""
     text = str(error).strip().partition("\n")[0]
     if isinstance(error, FgbaselineError) and text:
         return text

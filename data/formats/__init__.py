@@ -1,7 +1,7 @@
 """Readers and writers: recordings (course npz, ours, UTIAS .mat), trajectories and truth (TUM, KITTI, EuRoC, npz)."""
 
 from .columns import Order
-from .euroc import write_euroc
+from .euroc_writer import write_euroc
 from .ground_truth import BodyFrame, attach_truth
 from .kitti import read_times, write_kitti
 from .landmark_file import read_landmarks
@@ -18,7 +18,7 @@ from .trajectory_reader import (
     read_trajectory_file,
     read_tum,
 )
-from .tum import write_tum
+from .tum_writer import write_tum
 
 __all__ = [
     "BodyFrame",

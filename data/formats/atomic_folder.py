@@ -1,4 +1,4 @@
-"""Folders that appear whole or not at all: written beside their place, then renamed into it."""
+"""Atomic writing of folders: built beside their place, then exchanged with it by `renameat2` where the system can."""
 
 import ctypes
 import errno
@@ -69,7 +69,7 @@ def require_free(place: Path, *, force: bool, mark: str) -> None:
 
 
 @contextmanager
-def whole_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
+def atomic_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
     """A folder to write into that becomes `place` when the block ends well; otherwise nothing is left of it.
 
     Raises InputError, before the block runs, where `place` may not be written (see `require_free`).

@@ -11,7 +11,7 @@ from pathlib import Path
 from fgbaseline.data.registry import GROUP
 
 LIBRARIES = ("gtsam", "numpy", "scipy", "pandas", "threadpoolctl")
-ROOMS = ("geometry", "data", "ekf", "smoother", "compare")
+ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare")
 
 
 def content_of(path: Path) -> str:
@@ -40,9 +40,8 @@ def _ours(pages: bool) -> Iterator[Path]:
     reports = _folder("fgbaseline.reports")
     yield from reports.glob("*.py")
     yield from (reports / "bench" / name for name in ("worker.py", "job.py", "cache_key.py"))
-    if pages:
-        for part in ("figures", "html", "phrases", "results", "tables"):
-            yield from (file for file in (reports / part).rglob("*") if file.suffix in (".py", ".html", ".css", ".js"))
+    for part in ("results", "run", "tables", *(("figures", "html", "phrases") if pages else ())):
+        yield from (file for file in (reports / part).rglob("*") if file.suffix in (".py", ".html", ".css", ".js"))
 
 
 def _others(estimators: Iterable[str]) -> Iterator[Path]:

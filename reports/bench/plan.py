@@ -12,7 +12,7 @@ from fgbaseline.data.simulate import Simulation
 from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.run.job import check_estimators
+from fgbaseline.reports.run.problem import check_estimators
 
 from .cache_key import code_of, content_of
 from .job import File, Job, Planned, Recorded, Simulated

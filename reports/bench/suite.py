@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.toml_file import TomlFile, read_toml
 from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
-from fgbaseline.reports.run.job import RunSettings
+from fgbaseline.reports.run.problem import RunSettings
 
 from .simulated_cases import Drives
 

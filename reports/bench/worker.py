@@ -15,7 +15,7 @@ from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.solving import solve_all, told
+from fgbaseline.data.solving import describe, solve_all
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
@@ -59,7 +59,7 @@ def work(job: Job, channel: Channel) -> Outcome:
         try:
             files, failure = _files(job, report), ""
         except Exception as error:  # a job never stops the others
-            files, failure = {}, told(error)
+            files, failure = {}, describe(error)
         seconds = time.perf_counter() - start
     channel("", "", 0, 0)
     return Outcome(key, files, failure, seconds)

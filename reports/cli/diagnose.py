@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from . import options
+
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")
 @click.argument("sequence", type=click.Path(path_type=Path))
@@ -14,11 +16,7 @@ import click
     type=click.Path(path_type=Path),
     help="TOML file to write what was found to, for run --repairs, to be edited by hand.",
 )
-@click.option(
-    "--time-unit",
-    type=click.Choice(["s", "ms", "us", "ns"]),
-    help="What the time stamps of SEQUENCE count.  [default: seconds, unless the recording shows another unit]",
-)
+@options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 def command(
     sequence: Path, out: Path | None, as_json: bool, write_repairs: Path | None, time_unit: str | None, force: bool
@@ -30,7 +28,7 @@ def command(
     Exits 0 when the recording is clean, 1 with findings, 2 when it cannot tell, and on bad input.
     """
     from fgbaseline.data import TimeUnit
-    from fgbaseline.reports.run.diagnose import tell
+    from fgbaseline.reports.run.diagnose import print_diagnosis
 
     unit = None if time_unit is None else TimeUnit(time_unit)
-    return tell(sequence, out, as_json=as_json, repairs=write_repairs, force=force, time_unit=unit)
+    return print_diagnosis(sequence, out, as_json=as_json, repairs=write_repairs, force=force, time_unit=unit)

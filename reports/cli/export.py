@@ -1,29 +1,19 @@
 """`fgbaseline export`: the problem as plain files, for a filter in any language."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
-from .run import FeatureCount
+from . import options
 
 
 @click.command(epilog="Example: fgbaseline export drive.npz --out out/problem")
 @click.argument("sequence", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
-@click.option(
-    "--preset",
-    type=click.Choice(["calibrated", "documented"]),
-    default="calibrated",
-    show_default=True,
-    help="How the problem is posed: what the data supports, or as the report has it.",
-)
-@click.option(
-    "--features",
-    type=FeatureCount(),
-    help="How many landmarks, those seen most often.  [default: all; 1000 for the documented preset]",
-)
+@options.preset
+@options.features
 @click.option(
     "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
 )
@@ -32,17 +22,7 @@ from .run import FeatureCount
     "--held-out", type=float, default=0.0, metavar="SHARE", help="Keep this share of the tracks out, as run does."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of what is held out.")
-def command(
-    sequence: Path,
-    out: Path,
-    force: bool,
-    preset: Literal["calibrated", "documented"],
-    features: int | Literal["all"] | None,
-    as_recorded: bool,
-    repairs: Path | None,
-    held_out: float,
-    seed: int,
-) -> int:
+def command(out: Path, force: bool, **given: Any) -> int:
     """Write the problem that `fgbaseline run` would solve on SEQUENCE: npz, CSV and JSON.
 
     Repaired velocities and increments with their covariances, observations with the mask, noise, kernel, priors,
@@ -50,15 +30,6 @@ def command(
     back through `fgbaseline compare`. Ground truth is not exported.
     """
     from fgbaseline.reports.run.export import export
-    from fgbaseline.reports.run.job import RunSettings
+    from fgbaseline.reports.run.problem import RunSettings
 
-    settings = RunSettings(
-        sequence=sequence,
-        preset=preset,
-        features=features,
-        as_recorded=as_recorded,
-        held_out=held_out,
-        seed=seed,
-        repairs=repairs,
-    )
-    return export(settings, out, force=force)
+    return export(RunSettings(**given), out, force=force)

@@ -32,7 +32,7 @@ def command(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     As wide as a column, letters of 7 points, lines told apart without colour, fonts embedded. Nothing is computed
     again: what is drawn is what the run wrote. captions.json has a caption for each.
     """
-    from fgbaseline.data.formats.atomic_folder import whole_folder
+    from fgbaseline.data.formats.atomic_folder import atomic_folder
 
     from ..figures.run import draw_printed
     from ..figures.run_data import of_folder
@@ -41,7 +41,7 @@ def command(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
 
     place = out or folder / "paper"
     figures = draw_printed(of_folder(folder))
-    with whole_folder(place, force=force, mark=CAPTIONS) as building:
+    with atomic_folder(place, force=force, mark=CAPTIONS) as building:
         save({name: figure for name, (figure, _) in figures.items()}, building, formats, PAPER)
         save_captions({name: caption for name, (_, caption) in figures.items()}, building)
     click.echo(f"{len(figures)} figures as {', '.join(formats)} are in {place}")

@@ -1,29 +1,13 @@
 """`fgbaseline run`: every estimator, the comparison and the report."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 
+from . import options
+
 DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
-
-
-class FeatureCount(click.ParamType[int | str]):
-    """A number of landmarks, or 'all'."""
-
-    name = "N|all"
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
-        """The number, or 'all'."""
-        if value == "all":
-            return "all"
-        try:
-            number = int(str(value))
-        except ValueError:
-            number = 0
-        if number < 1:
-            self.fail(f"expected a whole number of at least 1 or 'all', got {value!r}", param, ctx)
-        return number
 
 
 @click.command(
@@ -32,19 +16,9 @@ class FeatureCount(click.ParamType[int | str]):
 @click.argument("sequence", required=False, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write.  [default: out/NAME]")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
-@click.option(
-    "--preset",
-    type=click.Choice(["calibrated", "documented"]),
-    default="calibrated",
-    show_default=True,
-    help="How the problem is posed: what the data supports, or as the report has it.",
-)
+@options.preset
 @click.option("--estimators", default=DEFAULT_ESTIMATORS, show_default=True, help="Names, separated by commas.")
-@click.option(
-    "--features",
-    type=FeatureCount(),
-    help="How many landmarks, those seen most often.  [default: all; 1000 for the documented preset]",
-)
+@options.features
 @click.option(
     "--landmarks",
     type=click.Choice(["in-turn", "held"]),
@@ -61,11 +35,7 @@ class FeatureCount(click.ParamType[int | str]):
     is_flag=True,
     help="No diagnosis: the recording as it is, velocity k moving frame k to k + 1, with assumed noise (calibrated).",
 )
-@click.option(
-    "--time-unit",
-    type=click.Choice(["s", "ms", "us", "ns"]),
-    help="What the time stamps of SEQUENCE count.  [default: seconds, unless the recording shows another unit]",
-)
+@options.time_unit
 @click.option(
     "--repairs",
     type=click.Path(path_type=Path),
@@ -93,21 +63,13 @@ class FeatureCount(click.ParamType[int | str]):
     help="Also write a recording for the viewer Rerun (needs the extra fgbaseline[rerun]).",
 )
 def command(
-    sequence: Path | None,
     out: Path | None,
     force: bool,
-    preset: Literal["calibrated", "documented"],
     estimators: str,
-    features: int | Literal["all"] | None,
     landmarks: str,
-    truth: Path | None,
-    truth_frame: Literal["camera", "imu"] | None,
-    as_recorded: bool,
     time_unit: str | None,
-    held_out: float,
-    repairs: Path | None,
-    seed: int,
     rerun_file: Path | None,
+    **given: Any,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
 
@@ -118,20 +80,12 @@ def command(
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
     from fgbaseline.reports.cli.run_output import report
-    from fgbaseline.reports.run.job import RunSettings
+    from fgbaseline.reports.run.problem import RunSettings
 
     settings = RunSettings(
-        sequence=sequence,
-        preset=preset,
         estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
-        features=features,
         landmarks=LandmarkMode(landmarks),
-        truth=truth,
-        truth_frame=truth_frame,
-        seed=seed,
-        as_recorded=as_recorded,
         time_unit=None if time_unit is None else TimeUnit(time_unit),
-        held_out=held_out,
-        repairs=repairs,
+        **given,
     )
     return report(settings, out, force=force, rerun_file=rerun_file)

@@ -1,60 +1,70 @@
-"""What a person sees of a run: progress, the main table and where the report is."""
+"""Run on the terminal: progress, the main table, the verdict and where the report is."""
 
 from pathlib import Path
 
 import click
 
-from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import cores, shared
 from fgbaseline.data.plural import plural
-from fgbaseline.reports.run import job
+from fgbaseline.reports.run.problem import (
+    MARK,
+    RunSettings,
+    check_estimators,
+    load_estimators,
+    pose_problem,
+    read_sequence,
+    solve,
+    split,
+    to_print_first,
+)
 
 FAILED = 1
 UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def report(settings: job.RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
-    """Runs, writes the folder and tells of it; gives the exit code: 1 where an estimator failed, else 0."""
-    job.check_estimators(settings.estimators)
-    sequence = job.read_sequence(settings)
+def report(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
+    """Runs, writes the folder and prints the main results; gives the exit code: 1 where an estimator failed, else 0."""
+    check_estimators(settings.estimators)
+    sequence = read_sequence(settings)
     place = out or Path("out") / sequence.name
-    require_free(place, force=force, mark=job.MARK)
+    require_free(place, force=force, mark=MARK)
     if rerun_file is not None:
         from fgbaseline.reports.run.rerun import require_rerun
 
         require_rerun(rerun_file)
 
-    kept, held = job.split(sequence, settings)
+    kept, held = split(sequence, settings)
 
     from fgbaseline.reports.progress import reporter
 
-    told = reporter()
-    told.say(
+    progress = reporter()
+    progress.say(
         f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
         f"of {plural(sequence.n_landmarks, 'track')}"
     )
     if held is not None:
-        told.say(f"{plural(held.n_tracks, 'track')} held out, {plural(len(held.observations), 'observation')}")
+        progress.say(f"{plural(held.n_tracks, 'track')} held out, {plural(len(held.observations), 'observation')}")
     if settings.preset == "calibrated" and not settings.as_recorded:
-        told.say("diagnosing the recording")
-    with shared(lambda _: job.pose_problem(kept, settings, cores()), 1, cores()) as posed:
-        # Two seconds of imports: bad input is told before, and the diagnosis goes on meanwhile.
+        progress.say("diagnosing the recording")
+    with shared(lambda _: pose_problem(kept, settings, cores()), 1, cores()) as posed:
+        # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
         from fgbaseline.reports.phrases.run import verdict
         from fgbaseline.reports.run.folder import as_dict, write_run
         from fgbaseline.reports.tables import print_table
         from fgbaseline.reports.tables.run import terminal_table
 
-        job.load_estimators(settings.estimators)
+        load_estimators(settings.estimators)
         (problem,) = posed()
-    for sentence in job.to_print_first(problem):
+    for sentence in to_print_first(problem):
         click.echo(sentence)
-    run = job.solve(problem, settings, told.estimator, held, cores())
+    run = solve(problem, settings, progress.estimator, held, cores())
     for name, result in run.results.items():
         if not result.answered:
-            told.say(f"{name} failed: {result.estimate.reason}")
-    told.say("writing the report")
-    with whole_folder(place, force=force, mark=job.MARK) as folder:
+            progress.say(f"{name} failed: {result.estimate.reason}")
+    progress.say("writing the report")
+    with atomic_folder(place, force=force, mark=MARK) as folder:
         summary = write_run(run, folder, cores())
         if rerun_file is not None:
             from fgbaseline.reports.run.rerun import write_rerun

@@ -7,7 +7,7 @@ import numpy as np
 
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.data import write_tum
-from fgbaseline.data.formats.atomic_folder import whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder
 
 from ..figures import save
 from ..figures.comparison import draw
@@ -19,7 +19,7 @@ from ..tables.comparison import comparison_table, main_table, metrics_table
 
 def write(comparison: Comparison, summary: Summary, place: Path, *, force: bool) -> Path:
     """Writes the folder atomically and returns the path of its report. Raises InputError where it may not."""
-    with whole_folder(place, force=force, mark=MARK) as folder:
+    with atomic_folder(place, force=force, mark=MARK) as folder:
         _fill(comparison, summary, folder)
     return place / "report.html"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.run import job
+from fgbaseline.reports.run.problem import RunSettings, pose_problem, split
 
 from .run_folder import RunFolder
 
@@ -26,22 +26,22 @@ def load_problem(settings: Settings, run: RunFolder | None) -> tuple[Problem | N
         return read_problem(sequence), None
     recorded = read(sequence)
     if run is None:
-        wanted = job.RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
+        wanted = RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
     else:
         wanted = _of_run(sequence, run)
         if settings.held_out not in (0.0, wanted.held_out):
             raise InputError(
                 f"held-out: {run.folder} was run with {wanted.held_out:g}; leave --held-out out, or run it again"
             )
-    kept, held = job.split(recorded, wanted)
-    return job.pose_problem(kept, wanted), held
+    kept, held = split(recorded, wanted)
+    return pose_problem(kept, wanted), held
 
 
-def _of_run(sequence: Path, run: RunFolder) -> job.RunSettings:
+def _of_run(sequence: Path, run: RunFolder) -> RunSettings:
     """Settings that pose the problem of a run, from its summary. Raises InputError where it lacks one."""
     known = run.settings
     try:
-        return job.RunSettings(
+        return RunSettings(
             sequence=sequence,
             preset=known["preset"],
             features="all" if known["features"] == "all" else int(known["features"]),

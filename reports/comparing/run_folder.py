@@ -11,7 +11,7 @@ from fgbaseline.data.formats import read_landmarks, read_trajectory
 from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.data.trajectory import Trajectory
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.run.job import MARK
+from fgbaseline.reports.run.problem import MARK
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline import compare
 from fgbaseline.compare import Align
+from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
 from .accuracy import maps_by_depth
@@ -22,7 +23,7 @@ from .reprojection import distribution
 from .style import GRAY, SCREEN, WHITE, head, in_style, plain, sheet, swatch
 from .style import colors as colors_of
 from .style import line as line_of
-from .view import TopView, common_window
+from .view import common_window
 
 if TYPE_CHECKING:
     from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result

@@ -16,13 +16,14 @@ from matplotlib.patches import Rectangle
 from fgbaseline.compare import distance_traveled
 from fgbaseline.data import Status
 from fgbaseline.data.plural import plural
+from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
 from .layout import lay_out
 from .paths import from_above
 from .style import SCREEN, head, in_style, note, plain, swatch
-from .view import TopView, Window, common_window, known, robust_window
+from .view import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
     from fgbaseline.reports.reproduction.study import Study

@@ -13,11 +13,11 @@ from fgbaseline import compare
 from fgbaseline.data import Problem, read_tum
 from fgbaseline.data.formats import read_landmarks
 from fgbaseline.data.formats.named_file import reading, regular_file
+from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
 from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
-from .view import TopView
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run

@@ -10,13 +10,13 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike
 
 from fgbaseline.compare import chi_square_bounds, reprojection_by
+from fgbaseline.compare.departure import departure, far
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
+from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
-from fgbaseline.reports.figures.view import TopView
-from fgbaseline.reports.phrases.run_accuracy import compared, departure, far
 
 FINEST = 16
 """parts of a pixel that observations are rounded to, unless the image is too large for that"""
@@ -107,7 +107,7 @@ def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
 
 
 def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
-    group, expected = "Consistency", "the band holds 95 % of the frames of who knows their errors"
+    group, expected = "Consistency", "the band holds 95 % of the frames of a consistent estimator"
     of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
     pose = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": expected}
     yield _chart(group, "nees", "NEES: true error against the error claimed", "", _numbered(run, of_truth), **pose)
@@ -126,7 +126,7 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
 
 
 def _innovation_band(run: Run) -> tuple[float, ...] | None:
-    """For as many rows as the median frame that sees anything has; None where nobody's filter sees anything."""
+    """For as many rows as the median frame that sees anything has; None where no filter sees anything."""
     seen = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
     rows = np.concatenate([degrees[degrees > 0] for degrees in seen]) if seen else np.empty(0)
     if len(rows) == 0:
@@ -146,11 +146,11 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
 
 def _chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
     """A chart; None where no line has a value."""
-    known = {who: values for who, values in lines.items() if np.isfinite(values).any()}
+    known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
     if not known:
         return None
     settings = {"log": _one_flattens_all(known.values()), "band": None, "middle": None, "hint": "", **more}
-    packed = {who: floats(values) for who, values in known.items()}
+    packed = {key: floats(values) for key, values in known.items()}
     return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **settings}
 
 
@@ -272,7 +272,7 @@ def _observations(run: Run) -> dict[str, Any] | None:
 def _jumps(run: Run) -> list[dict[str, Any]]:
     """The frames that a person will want to see first."""
     jumps: list[dict[str, Any]] = []
-    for result in compared(run):
+    for result in run.compared:
         left = departure(run, result)
         if left is not None:
             text = f"{result.name} first {far(result):.3g} m from {run.reference}"

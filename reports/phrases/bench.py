@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from fgbaseline.reports.phrases.run_accuracy import SAME_GRAPH
+from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 
 from ..formatting import interval, listed, number
 from ..results.bench import ANSWERED, Results

@@ -1,138 +1,21 @@
-"""Which estimator is nearer, claimed only where the run settles it, and where each one leaves the reference.
+"""Sentences on which estimator is nearer to the truth or to the reference: claimed only where the run settles it.
 
-A difference is claimed where the 95 % interval of the paired block bootstrap has its sign, over the frames that all
-have, and where the two figures differ as printed. By-products of the reference and other minima of its graph are not
-ranked.
+A difference is claimed where the 95 % interval of the paired block bootstrap has its sign, over the moments at which
+all have a pose, and where the two figures differ as printed. The reference's by-products and other minima of its graph
+are no competitors of it: their distance is reported, and they are not ranked.
 """
 
-from dataclasses import dataclass
 from pathlib import PurePath
-from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.compare import (
-    MIN_COVERAGE,
-    MIN_SAMPLE_SIZE,
-    PairedRanking,
-    RmseDifference,
-    divergence_summary,
-    is_insufficient,
-    paired_ranking,
-    rmse_difference,
-)
-from fgbaseline.compare.estimate_comparison import Result, Run, of_truth
-from fgbaseline.data import Problem
-from fgbaseline.data.problem import WRONG_MATCH
-from fgbaseline.geometry import FloatArray
+from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
+from fgbaseline.compare.departure import path_length
+from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.sample_sizes import insufficient_truth
 from fgbaseline.reports.formatting import listed, number, per_cent
 
-FAR = 5.0
-"""m, at most"""
-FAR_SHARE = 0.01
-"""of the reference's path, at most"""
-AROUND = 1.0
-"""s before and after"""
-
-
-@dataclass(frozen=True, slots=True)
-class Departure:
-    """The first frame farther from the reference than a distance."""
-
-    frame: int
-    seconds: float
-    beyond: float
-    """share of the frames with a pose from then on that are farther than that"""
-    wrong: float | None
-    """share of the matches within `AROUND` that the mask excluded as contradicting their tracks; None without a mask"""
-
-
-def far(result: Result) -> float:
-    """From how many metres on an estimator has left the reference: 5 m, or 1 % of the path where that is less."""
-    return min(FAR, FAR_SHARE * path_length(result)) or FAR
-
-
-def path_length(result: Result) -> float:
-    """Length of the reference's path, m."""
-    return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["travelled"].to_numpy()))
-
-
-def departure(run: Run, result: Result) -> Departure | None:
-    """When `result` leaves the reference; None where it never does."""
-    if result.divergence is None:
-        return None
-    position = result.divergence["position"].to_numpy(dtype=np.float64)
-    beyond = position > far(result)
-    if not beyond.any():
-        return None
-    k = int(np.argmax(beyond))
-    t = run.problem.sequence.t
-    near = np.abs(t - t[k]) <= AROUND
-    share = float(beyond[k:][~np.isnan(position[k:])].mean())
-    return Departure(k, float(t[k] - t[0]), share, wrong_share(run.problem, near))
-
-
-def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | None:
-    """Share of the matches of the chosen frames (T,) that the mask excluded as wrong; None without mask or match."""
-    wrong = np.isin(problem.excluded, WRONG_MATCH)
-    there = frames[problem.sequence.observations.frame]
-    return float(wrong[there].mean()) if wrong.any() and there.any() else None
-
-
-class WrongSecond(NamedTuple):
-    """A whole second of the recording."""
-
-    second: float
-    """counted from the first frame"""
-    share: float
-    """of its matches that the mask excluded as wrong"""
-
-
-def worst_second(problem: Problem) -> WrongSecond | None:
-    """The (first) second with the largest share of wrong matches; None without a mask or a match.
-
-    Only seconds that have a frame are looked at: a span in nanoseconds has a billion others between two of them.
-    """
-    wrong = np.isin(problem.excluded, WRONG_MATCH)
-    if not wrong.any():
-        return None
-    t, frame = problem.sequence.t, problem.sequence.observations.frame
-    seconds, place = np.unique(np.floor(t - t[0]), return_inverse=True)
-    every = np.bincount(place[frame], minlength=len(seconds))
-    share = np.bincount(place[frame[wrong]], minlength=len(seconds)) / np.maximum(every, 1)
-    worst = int(np.argmax(share))
-    return WrongSecond(float(seconds[worst]), float(share[worst]))
-
-
-SAME_GRAPH = ("isam2", "batch")
-"""estimators that minimize one and the same graph"""
 ROUGH = "the interval is rough, since the errors change so slowly that fewer than ten independent stretches fit"
-
-
-def by_products(run: Run) -> frozenset[str]:
-    """Answers that the reference's own run gives as well."""
-    return frozenset() if run.reference is None else frozenset(run.results[run.reference].estimate.by_products)
-
-
-def same_graph(run: Run) -> frozenset[str]:
-    """Other minima of the reference's graph."""
-    return frozenset(SAME_GRAPH) - {run.reference} if run.reference in SAME_GRAPH else frozenset()
-
-
-def unranked(run: Run) -> frozenset[str]:
-    """No competitors of the reference."""
-    return by_products(run) | same_graph(run)
-
-
-def compared(run: Run) -> list[Result]:
-    """The results other than the reference that are held against it, by their RMSE."""
-    others = [r for r in run.answered if r.name != run.reference and r.divergence is not None]
-    return sorted(others, key=divergence_rmse)
-
-
-def divergence_rmse(result: Result) -> float:
-    """From the reference, m."""
-    return float("nan") if result.divergence is None else divergence_summary(result.divergence)["rmse"]
 
 
 def claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
@@ -140,23 +23,10 @@ def claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
     return difference.settled and difference.value > 0.0 and larger > smaller and number(larger) != number(smaller)
 
 
-def little_truth_sentences(run: Run) -> list[str]:
-    """That the truth is too little to judge by, where it is."""
-    sample = of_truth(run)
-    if sample is None or not is_insufficient(sample, MIN_SAMPLE_SIZE, MIN_COVERAGE):
-        return []
-    n = int(sample["n"])
-    return [
-        f"Too little truth to judge by: {number(n)} of {number(run.problem.n_frames)} frames "
-        f"{'has' if n == 1 else 'have'} one, over {per_cent(sample['coverage'])} of the recording's time; "
-        f"fgbaseline check asks for {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}."
-    ]
-
-
 def truth_sentences(run: Run) -> list[str]:
     """The errors to the truth, and whether it is settled that the reference has the larger one."""
     truth = run.problem.sequence.truth
-    if truth is None or little_truth_sentences(run):
+    if truth is None or insufficient_truth(run):
         return []
     source, n, T = PurePath(truth.source).name, int(truth.known.sum()), run.problem.n_frames
     coverage = (
@@ -179,7 +49,7 @@ def truth_sentences(run: Run) -> list[str]:
 
 def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
     reference = str(run.reference)
-    found = paired_ranking({name: e for name, e in errors.items() if name == reference or name not in unranked(run)})
+    found = paired_ranking({name: e for name, e in errors.items() if name == reference or name not in run.unranked})
     if reference not in found.rmse:
         return []
     own = found.rmse[reference]
@@ -208,8 +78,8 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
 
 def nearest_sentences(run: Run) -> list[str]:
     """The RMSE of each from the reference, and which is settled to be nearer than which."""
-    known = [r for r in compared(run) if not np.isnan(divergence_rmse(r))]
-    rivals = {r.name: r for r in known if r.name not in unranked(run)}
+    known = [r for r in run.compared if not np.isnan(r.divergence_rmse)]
+    rivals = {r.name: r for r in known if r.name not in run.unranked}
     sentences = []
     errors = {
         r.name: r.divergence["position"].to_numpy()
@@ -220,16 +90,16 @@ def nearest_sentences(run: Run) -> list[str]:
     if found.rmse:
         sentences.append(_nearest(run, rivals, found))
     elif rivals:
-        each = listed(f"{name} is {number(divergence_rmse(r))} m" for name, r in rivals.items())
+        each = listed(f"{name} is {number(r.divergence_rmse)} m" for name, r in rivals.items())
         sentences.append(f"{each} from {run.reference} (RMSE), in frames that they do not share: they are not ranked.")
     for result in known:
-        away = f"{number(divergence_rmse(result))} m"
-        if result.name in by_products(run):
+        away = f"{number(result.divergence_rmse)} m"
+        if result.name in run.by_products:
             sentences.append(
                 f"{result.name} is the same run, each pose as known when its frame came: what came later moved them by "
                 f"{away} RMSE."
             )
-        elif result.name in same_graph(run):
+        elif result.name in run.same_graph:
             same = "another minimum of the same graph"
             sentences.append(f"{result.name}, {same}, is {away} from {run.reference} (RMSE).")
     return sentences

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.geometry import InputError
 
 from ..progress import reporter
@@ -42,7 +42,7 @@ def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: b
                 studies.append(study(subject, sweep, found, progress))
     claims = [*(claim for one in studies for claim in claims_of(one)), *missing_claims(studies)]
     progress_of.say("writing the report")
-    with whole_folder(out, force=force, mark=MARK) as folder:
+    with atomic_folder(out, force=force, mark=MARK) as folder:
         write(Reproduction(studies, claims), folder)
     print_table(claims_table(claims), width=UNWRAPPED, spaced=True)
     click.echo(f"\nThe report is in {out / 'report.html'}")

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from fgbaseline.reports.results.run import Nees, Number, Part, Reprojection
+from fgbaseline.reports.results.statistics import Nees, Number, Part, Reprojection
 
 MARK = "comparison.json"
 """the file by which a comparison's folder is known"""

@@ -1,230 +1,28 @@
-"""The models of `summary.json`; `make schema` writes its schema to `docs/summary.schema.json`."""
+"""Model of `summary.json` and how it is filled. `make schema` writes its schema to docs/summary.schema.json."""
 
 import json
-from typing import Annotated, Final, Literal
+import math
+import os
+import platform
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import Field
 
-Number = float | None
-"""null for what is not a finite number; `notes` then says why"""
+from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.data.top_view import TopView
+from fgbaseline.geometry import FloatArray
 
-
-class Part(BaseModel):
-    """An object of the file; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Nees(Part):
-    """Normalised estimation error squared of the poses against truth, error log(T^-1 T_true) in the body frame."""
-
-    mean: Annotated[Number, Field(description="6 is expected")]
-    median: Annotated[Number, Field(description="5.35 is expected")]
-    frames: int
-
-
-class NeesInDetail(Nees):
-    """The same, with position and rotation apart."""
-
-    position_mean: Annotated[Number, Field(description="of the position alone; 3 is expected")]
-    rotation_mean: Annotated[Number, Field(description="of the rotation alone; 3 is expected")]
-    inside_95: Annotated[
-        Number, Field(description="share of the frames inside the 95 % bounds of a single one; frames are correlated")
-    ]
-
-
-class CovarianceCount(Part):
-    """What the covariances of the poses are worth."""
-
-    frames: Annotated[int, Field(description="that have a covariance, be it one or not")]
-    held: Annotated[int, Field(description="with a covariance of zero: the first pose")]
-    not_positive_definite: int
-    where: Annotated[str, Field(description="the frames that are not positive definite, such as '3, 7 to 9'")]
-
-
-class ReferenceNees(Part):
-    """NEES of the difference from the reference, with P - P_ref as its covariance; 6 is expected."""
-
-    mean: Number
-    median: Number
-    inside_95: Annotated[Number, Field(description="share of the frames inside the 95 % bounds of a single one")]
-    frames: int
-    left_out: Annotated[int, Field(description="frames in which P - P_ref is not positive definite")]
-
-
-class SigmaRatio(Part):
-    """Median over the frames of the estimate's sigma over the reference's; a filter's should be above 1."""
-
-    position: Number
-    rotation: Number
-
-
-class Nis(Part):
-    """Normalised innovation squared of a filter, of the rows (uL, uR, (vL + vR) / 2), before kernel and gates."""
-
-    per_degree: Annotated[Number, Field(description="over its degrees of freedom; 1 is expected")]
-    low: Annotated[Number, Field(description="95 % bound of per_degree, innovations independent from frame to frame")]
-    high: Number
-    inside_95: Annotated[Number, Field(description="share of the frames inside their own 95 % bounds")]
-    frames: int
-
-
-class Whitened(Part):
-    """Residuals of the observations it used over the noise assumed, track by track against chi-square."""
-
-    ratio: Annotated[Number, Field(description="squared residuals over their degrees of freedom; 1 is expected")]
-    beyond_95: Annotated[Number, Field(description="share of the tracks beyond their 95 % quantile; 0.05 is expected")]
-    spread_uL: Annotated[Number, Field(description="RMS in sigmas, a little below 1 expected")]
-    spread_uR: Number
-    spread_v: Number
-    tracks: int
-
-
-class MovedPoints(Part):
-    """Tracks whose residuals say that the point moved, or that the track slid over it."""
-
-    tracks: Annotated[int, Field(description="long enough to be asked")]
-    moved: int
-    share: Number
-
-
-class MapDifference(Part):
-    """Landmarks matched by number with those of the reference."""
-
-    n: int
-    median: Annotated[Number, Field(description="distance in the world, drift included, m")]
-    median_seen: Annotated[Number, Field(description="distance as the two cameras see it, without drift, m")]
-    median_sigmas: Annotated[
-        Number, Field(description="world distance over the covariance P - P_ref; 1.54 is expected")
-    ]
-    with_sigmas: int
-    left_out: Annotated[int, Field(description="landmarks for which P - P_ref is not positive definite")]
-
-
-class HeldOutError(Part):
-    """Errors on tracks that no estimator saw, predicted from the other half of the track, px."""
-
-    rank: Annotated[int, Field(description="1 for the smallest median")]
-    median: Number
-    low: Annotated[Number, Field(description="of a 95 % interval of the median (block bootstrap)")]
-    high: Number
-    behind: Annotated[Number, Field(description="median minus the best one")]
-    behind_low: Annotated[Number, Field(description="of a 95 % interval; one that holds 0 cannot tell the two apart")]
-    behind_high: Number
-    p95: Number
-    under_3px: Annotated[Number, Field(description="share, 0 to 1")]
-
-
-class HeldOutSummary(Part):
-    """The tracks that were taken out before diagnosis and estimators."""
-
-    share: float
-    seed: int
-    tracks: int
-    observations: int
-    pieces: Annotated[int, Field(description="of tracks that do not jump, where all estimators have poses")]
-    inliers: Annotated[int, Field(description="pieces that at least one path explains: the same for all")]
-    gate_px: Annotated[float, Field(description="error below which a path explains a piece")]
-    judged: Annotated[int, Field(description="observations that the errors are over, the same for all")]
-
+from .estimator import EstimatorSummary, summarize_estimator
+from .statistics import Number, Part
+from .tree import finite
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
-
-
-class Spread(Part):
-    """Statistics of errors in m, over the frames that have one; null with the note `infinite` where one is infinite."""
-
-    rmse: Number
-    mean: Number
-    median: Number
-    p95: Number
-    max: Number
-    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
-
-
-class Divergence(Spread):
-    """Of each pose from the reference's, m, without alignment."""
-
-    final: Number
-    rotation_rmse_deg: Number
-    rotation_final_deg: Number
-
-
-class Reprojection(Spread):
-    """Norm of the four pixel differences (uL, vL, uR, vR), px."""
-
-    under_3px: Annotated[Number, Field(description="share, 0 to 1")]
-    behind_camera: Annotated[int, Field(description="observations whose landmark lies behind the camera")]
-    n: Annotated[int, Field(description="observations that the figures are over")]
-
-
-class Component(Part):
-    """Measured minus predicted, px, over all observations of the estimated landmarks."""
-
-    bias: Number
-    spread: Number
-
-
-class ObservationCount(Part):
-    """How much of what the problem offered was used."""
-
-    offered: Annotated[int, Field(description="observations of the problem, after its mask")]
-    used: int
-    share: Number
-
-
-class TruthCount(Part):
-    """How many frames the truth metrics rest on."""
-
-    frames: int
-    missing: Annotated[int, Field(description="frames without truth, or that the estimator did not reach")]
-
-
-class CommonRmse(Part):
-    """RMSE over the frames that all ranked estimators have, m."""
-
-    rmse: Number
-    frames: int
-
-
-class EstimatorSummary(Part):
-    """One estimator."""
-
-    status: Literal["ok", "recovered", "failed"]
-    reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
-    seconds: Annotated[float, Field(description="for the whole answer, s")]
-    frames_per_second: Number
-    reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
-    reprojection_used: Annotated[Reprojection, Field(description="over those it used")]
-    reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
-    components: dict[str, Component]
-    divergence: Divergence | None
-    coverage: Annotated[float, Field(description="share of the recording's time in which it has poses")]
-    divergence_common: Annotated[
-        CommonRmse | None, Field(description="over the frames that all ranked estimators have: what ranks it")
-    ]
-    ate_common: Annotated[CommonRmse | None, Field(description="the same of the error to truth after alignment")]
-    ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
-    ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
-    truth: TruthCount | None
-    nees: NeesInDetail | None
-    covariance: CovarianceCount | None
-    nees_reference: ReferenceNees | None
-    sigma_ratio: SigmaRatio | None
-    nis: Nis | None
-    whitened: Whitened
-    moved_points: MovedPoints
-    map: MapDifference | None
-    held_out: HeldOutError | None
-    landmarks: int
-    observations: ObservationCount
-    samples: Annotated[
-        dict[str, dict[str, float]],
-        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of the time"),
-    ]
-    events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
-    notes: Annotated[dict[str, str], Field(description="why values are null: by key, for all below it; * for all")]
+LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
 
 
 class SequenceSummary(Part):
@@ -277,6 +75,19 @@ class ReferenceSummary(Part):
     reasons: Annotated[list[str], Field(description="what the trust rests on, worst first")]
 
 
+class HeldOutSummary(Part):
+    """The tracks that were taken out before diagnosis and estimators."""
+
+    share: float
+    seed: int
+    tracks: int
+    observations: int
+    pieces: Annotated[int, Field(description="of tracks that do not jump, where all estimators have poses")]
+    inliers: Annotated[int, Field(description="pieces that at least one path explains: the same for all")]
+    gate_px: Annotated[float, Field(description="error below which a path explains a piece")]
+    judged: Annotated[int, Field(description="observations that the errors are over, the same for all")]
+
+
 class Summary(Part):
     """A run."""
 
@@ -291,8 +102,92 @@ class Summary(Part):
     machine: dict[str, str | int]
 
 
+def summarize(run: Run) -> Summary:
+    """Summary of a run; what is not a number is None, and its reason stands in `notes`."""
+    sequence, problem = run.problem.sequence, run.problem
+    return Summary.model_validate(
+        finite(
+            {
+                "sequence": {
+                    "name": sequence.name,
+                    "source": sequence.source,
+                    "form": sequence.form,
+                    "frames": sequence.n_frames,
+                    "duration_s": float(sequence.t[-1] - sequence.t[0]),
+                    "observations": len(sequence.observations),
+                    "tracks": sequence.n_landmarks,
+                    "path_length_m": _path_length(run),
+                    "up": sequence.up.tolist(),
+                    "ahead": TopView.of(problem).ahead.tolist(),
+                    "remarks": list(sequence.remarks),
+                },
+                "problem": {
+                    "preset": problem.preset,
+                    "features": len(problem.features),
+                    "diagnosed": problem.diagnosed,
+                    "excluded": _excluded_counts(problem),
+                    "pixel_sigma": math.sqrt(problem.pixel_variance),
+                    "remarks": list(problem.remarks),
+                    "findings": [asdict(finding) for finding in problem.findings],
+                    "repairs": list(problem.repairs),
+                },
+                "reference": {
+                    "name": run.reference,
+                    "trust": run.trust.verdict.name.lower(),
+                    "reasons": list(run.trust.reasons),
+                },
+                "held_out": _held_out(run),
+                "estimators": {name: summarize_estimator(run, result) for name, result in run.results.items()},
+                "settings": dict(run.settings),
+                "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+                "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count() or 0},
+            }
+        )
+    )
+
+
+def _path_length(run: Run) -> float:
+    """Length of the true path, else of the reference's, over the frames that have one, m."""
+    truth = run.problem.sequence.truth
+    if truth is not None:
+        return _length(truth.world_T_imu)
+    return math.nan if run.reference is None else _length(run.results[run.reference].estimate.world_T_imu)
+
+
+def _excluded_counts(problem: Problem) -> dict[str, int]:
+    """Reason, in words -> how many observations of the sequence it excludes from the problem."""
+    counts = np.bincount(problem.excluded, minlength=len(Excluded))
+    return {
+        reason.name.lower().replace("_", " "): int(counts[reason])
+        for reason in Excluded
+        if reason is not Excluded.NO and counts[reason]
+    }
+
+
+def _held_out(run: Run) -> dict[str, Any] | None:
+    report = run.held_out
+    if report is None:
+        return None
+    held, errors = report.held, report.errors
+    return {
+        "share": held.share,
+        "seed": held.seed,
+        "tracks": held.n_tracks,
+        "observations": len(held.observations),
+        "pieces": 0 if errors is None else errors.pieces,
+        "inliers": 0 if errors is None else errors.inliers,
+        "gate_px": 0.0 if errors is None else errors.gate,
+        "judged": 0 if errors is None else len(errors.table),
+    }
+
+
+def _length(poses: FloatArray) -> float:
+    positions = poses[np.isfinite(poses).all(axis=(1, 2)), :3, 3]
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+
+
 def json_schema() -> str:
-    """The JSON schema of `summary.json`, as text."""
+    """JSON schema of `summary.json`, as text."""
     schema = Summary.model_json_schema(by_alias=True, mode="serialization")
     return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
 

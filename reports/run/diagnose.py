@@ -1,4 +1,4 @@
-"""What a person sees of a diagnosis: a table of findings, what cannot be told, the noise, and a folder if wanted."""
+"""Diagnosis of a recording on the terminal, as JSON, as a folder of evidence and as a file of repairs."""
 
 import json
 from pathlib import Path
@@ -9,12 +9,11 @@ import numpy as np
 
 from fgbaseline.data import TimeUnit, read
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.plural import plural
 from fgbaseline.diagnosis import (
     Diagnosis,
-    TrackStatistics,
     diagnose,
     findings_of,
     not_identifiable,
@@ -31,7 +30,7 @@ UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def tell(
+def print_diagnosis(
     path: Path,
     out: Path | None,
     *,
@@ -40,7 +39,7 @@ def tell(
     force: bool,
     time_unit: TimeUnit | None = None,
 ) -> int:
-    """Diagnoses a recording and says what was found; gives the exit code."""
+    """Diagnoses a recording, writes and prints the findings; gives the exit code."""
     if force and out is None and repairs is None:
         raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
     if out is not None:
@@ -50,15 +49,19 @@ def tell(
     diagnosis = diagnose(read(path, time_unit=time_unit))
     tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
-    report = to_json(diagnosis, tracks, findings)
+    text = _text(to_json(diagnosis, tracks, findings))
     if out is not None:
-        with whole_folder(out, force=force, mark=MARK) as folder:
-            write(diagnosis, tracks, report, folder)
+        from fgbaseline.reports import figures
+
+        with atomic_folder(out, force=force, mark=MARK) as folder:
+            (folder / "figures").mkdir()
+            figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
+            (folder / MARK).write_text(text, encoding="utf-8")
     if repairs is not None:
         with atomic_write(repairs) as file:
             file.write(repairs_text(diagnosis).encode())
     if as_json:
-        click.echo(text(report), nl=False)
+        click.echo(text, nl=False)
     else:
         _print(diagnosis, findings)
         if out is not None:
@@ -79,17 +82,8 @@ def _require_writable(file: Path, *, force: bool) -> None:
         raise InputError(f"{file}: there is no folder {file.parent}; make it, or choose another place")
 
 
-def write(diagnosis: Diagnosis, tracks: TrackStatistics, report: dict[str, Any], folder: Path) -> None:
-    """diagnosis.json and the figures, into an existing, empty folder."""
-    from fgbaseline.reports import figures
-
-    (folder / "figures").mkdir()
-    figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
-    (folder / MARK).write_text(text(report), encoding="utf-8")
-
-
-def text(report: dict[str, Any]) -> str:
-    """The file, to the byte the same for the same diagnosis."""
+def _text(report: dict[str, Any]) -> str:
+    """Text of the file, to the byte the same for the same diagnosis."""
     return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -102,7 +96,7 @@ def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
     if diagnosis.cannot_tell:
         click.echo(f"Nothing can be found out about its velocities: {diagnosis.cannot_tell}.")
     if findings:
-        _table(findings)
+        _print_findings(findings)
     elif not diagnosis.cannot_tell:
         click.echo("Nothing wrong was found.")
     unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
@@ -111,43 +105,43 @@ def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
         for sentence in unknown:
             click.echo(f"- {sentence}")
     if diagnosis.fit is not None:
-        click.echo(f"\n{noise(diagnosis)}")
+        click.echo(f"\n{_noise(diagnosis)}")
 
 
-def noise(diagnosis: Diagnosis) -> str:
-    """The noise that was found, in a sentence."""
+def _noise(diagnosis: Diagnosis) -> str:
+    """Sentence on the noise."""
     fit = diagnosis.fit
     assert fit is not None
     sigma = fit.sigmas
-    told = (
+    sentence = (
         f"Noise (one sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity held "
         f"over an interval, {sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
     )
     if fit.inflation.pixel > 1.0:
-        told += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"
+        sentence += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"
     if fit.inflation.velocity > 1.0:
-        told += f"; velocities {fit.inflation.velocity:.1f} times what single intervals show, because their errors last"
-    return told + ")."
+        sentence += (
+            f"; velocities {fit.inflation.velocity:.1f} times what single intervals show, because their errors last"
+        )
+    return sentence + ")."
 
 
-def _table(findings: tuple[Finding, ...]) -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _print_findings(findings: tuple[Finding, ...]) -> None:
+    from fgbaseline.reports.tables import Cell, Column, Row, Table, print_table
 
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0))
-    for title in ("finding", "what was found", "before", "after"):
-        table.add_column(title, justify="right" if title in ("before", "after") else "left", overflow="fold")
-    for f in findings:
-        sentence = f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"
-        table.add_row(f.code, sentence, *figures_of(f))
-    console = Console()
-    Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False).print(table)
-
-
-def figures_of(finding: Finding) -> tuple[str, str]:
-    """Before and after, the unit with the first."""
-    before, after = (_number(value, finding.unit) for value in (finding.before, finding.after))
-    return before, after
+    rows = tuple(
+        Row(
+            f.code,
+            (
+                Cell(f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"),
+                Cell(_number(f.before, f.unit)),
+                Cell(_number(f.after, f.unit)),
+            ),
+        )
+        for f in findings
+    )
+    columns = (Column("what was found", words=True), Column("before"), Column("after"))
+    print_table(Table(columns, rows, name="finding"), width=UNWRAPPED, spaced=True)
 
 
 def _number(value: float, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""What a person gets of an exported problem: a folder, and a line on each of its files."""
+"""Export of a posed problem into a folder, with a summary of it on the terminal."""
 
 from pathlib import Path
 
@@ -6,19 +6,19 @@ import click
 
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.exchange import layout, write_problem
-from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.plural import plural
-from fgbaseline.reports.run import job
+from fgbaseline.reports.run.problem import RunSettings, pose_problem, read_sequence, split
 
 
-def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
-    """Poses the problem of a recording, writes it into the folder and says what it holds; gives the exit code."""
+def export(settings: RunSettings, out: Path, *, force: bool) -> int:
+    """Poses the problem of a recording, writes it into the folder and prints what it holds; gives the exit code."""
     require_free(out, force=force, mark=layout.SCALARS)
-    sequence, held = job.split(job.read_sequence(settings), settings)
-    problem = job.pose_problem(sequence, settings)
-    with whole_folder(out, force=force, mark=layout.SCALARS) as folder:
+    sequence, held = split(read_sequence(settings), settings)
+    problem = pose_problem(sequence, settings)
+    with atomic_folder(out, force=force, mark=layout.SCALARS) as folder:
         write_problem(problem, folder)
-    for sentence in told(problem):
+    for sentence in _sentences(problem):
         click.echo(sentence)
     if held is not None:
         click.echo(f"Held out, and not in the problem: {plural(held.n_tracks, 'track')}")
@@ -26,8 +26,7 @@ def export(settings: job.RunSettings, out: Path, *, force: bool) -> int:
     return 0
 
 
-def told(problem: Problem) -> list[str]:
-    """The problem in sentences."""
+def _sentences(problem: Problem) -> list[str]:
     sequence = problem.sequence
     sigma = problem.pixel_variance**0.5
     kernel = "no kernel" if problem.kernel is None else f"Huber's kernel at {problem.kernel.threshold:g} sigma"

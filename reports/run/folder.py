@@ -1,4 +1,4 @@
-"""Writes the folder of a run: tables, trajectories, landmarks, series, figures and the page."""
+"""Folder of a run: summary, tables, trajectories, series, figures and the page."""
 
 import csv
 import json
@@ -11,55 +11,19 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from fgbaseline.compare import CovarianceState, reprojection_by
-from fgbaseline.compare.estimate_comparison import Result, Run, map_by_depth
+from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, write_tum
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.run import Summary
-from fgbaseline.reports.results.run_summary import metrics_table, summarise
-from fgbaseline.reports.run.job import MARK
-
-
-def consistency_series(result: Result) -> pd.DataFrame:
-    """By frame: what the covariance is worth, NEES against truth and reference, sigma ratios, NIS and its degrees."""
-    evidence, recorded = result.evidence, result.estimate.innovations
-    words = [CovarianceState(state).name.lower().replace("_", " ") for state in evidence.covariance]
-    table = pd.DataFrame({"covariance": words}, index=pd.RangeIndex(len(words), name="frame"))
-    if evidence.nees is not None:
-        table = table.join(evidence.nees.add_prefix("nees_").rename(columns={"nees_pose": "nees"}))
-    if evidence.difference is not None:
-        table["nees_reference"] = evidence.difference.nees
-    if evidence.sigma_ratio is not None:
-        table = table.join(evidence.sigma_ratio.add_prefix("sigma_ratio_"))
-    if recorded is not None:
-        table["nis"], table["nis_degrees"] = recorded.nis, recorded.degrees
-    return table
-
-
-def write_tables(run: Run, folder: Path) -> None:
-    """reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv, into an existing folder.
-
-    The first column names the estimator; a table that the run has nothing for is not written.
-    """
-    of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
-        "reprojection_classes": lambda r: r.evidence.patterns,
-        "moved_points": lambda r: r.evidence.moved[r.evidence.moved["moved"]].drop(columns="moved"),
-        "map_by_depth": map_by_depth,
-    }
-    for name, of in of_each.items():
-        parts = {r.name: part for r in run.answered if (part := of(r)) is not None and len(part)}
-        if parts:
-            joined = pd.concat(parts, names=["estimator"]).reset_index(level="estimator")
-            joined.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
-    if run.held_out is not None and len(run.held_out.ranking):
-        run.held_out.ranking.to_csv(folder / "held_out.csv", float_format="%.6g")
-
+from fgbaseline.reports.results.run import Summary, summarize
+from fgbaseline.reports.run.problem import MARK
+from fgbaseline.reports.tables.run import metrics_table
 
 TRUTH_FILE = "truth.tum"
 
 
 def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
-    """Writes every file of DESIGN's run folder into an existing, empty folder; gives the summary.
+    """Writes all files of a run into an existing, empty folder; gives the summary.
 
     `processes` share the drawing of the figures. A caller that is one of several processes at work leaves it at one.
     """
@@ -73,27 +37,27 @@ def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
 
 
 def write_numbers(run: Run, folder: Path) -> Summary:
-    """The same without figures and page."""
-    summary = summarise(run)
+    """Writes all files but figures and page; gives the summary."""
+    summary = summarize(run)
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
-        nine_digits(series(run, result)).to_csv(folder / "series" / f"{name}.csv")
+        _nine_digits(_series(run, result)).to_csv(folder / "series" / f"{name}.csv")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
-            write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
+            _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
     truth = run.problem.sequence.truth
     if truth is not None:
         write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
-    write_tables(run, folder / "tables")
+    _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
     text = json.dumps(as_dict(summary), indent=2, allow_nan=False)
     (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
     return summary
 
 
-def nine_digits(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with its floats as text, empty where they have no number: pandas asks of each on its own what it is."""
+def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with its floats as text, empty for NaN: faster than the formatting of pandas."""
     text = {
         str(name): [f"{value:.9g}" if value == value else "" for value in column.tolist()]
         for name, column in table.items()
@@ -112,7 +76,7 @@ def as_dict(summary: Summary) -> dict[str, Any]:
     return summary.model_dump(mode="json", by_alias=True)
 
 
-def write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
+def _write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
     """id,x,y,z,n_used of every landmark of an estimate, m, in the world frame."""
     landmarks = estimate.landmarks
     used = run.problem.sequence.observations.landmark[estimate.used]
@@ -124,7 +88,7 @@ def write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
             writer.writerow([index, *position, int(n)])
 
 
-def series(run: Run, result: Result) -> pd.DataFrame:
+def _series(run: Run, result: Result) -> pd.DataFrame:
     """One row per frame: time stamp, divergence, error to truth, reprojection, NEES and seconds spent."""
     T = run.problem.n_frames
     stamps = [repr(t) for t in run.problem.sequence.t.tolist()]  # in full: nine digits of a Unix time are seconds
@@ -133,6 +97,41 @@ def series(run: Run, result: Result) -> pd.DataFrame:
         if errors is not None:
             table = table.join(errors.add_prefix(f"{prefix}_"))
     table = table.join(reprojection_by(result.reprojection, "frame").add_prefix("reprojection_"))
-    table = table.join(consistency_series(result))
+    table = table.join(_consistency(result))
     table["seconds"] = result.estimate.seconds if len(result.estimate.seconds) == T else np.nan
     return table
+
+
+def _consistency(result: Result) -> pd.DataFrame:
+    """By frame: state of the covariance, NEES against truth and reference, sigma ratios, NIS and its degrees."""
+    evidence, recorded = result.evidence, result.estimate.innovations
+    words = [CovarianceState(state).name.lower().replace("_", " ") for state in evidence.covariance]
+    table = pd.DataFrame({"covariance": words}, index=pd.RangeIndex(len(words), name="frame"))
+    if evidence.nees is not None:
+        table = table.join(evidence.nees.add_prefix("nees_").rename(columns={"nees_pose": "nees"}))
+    if evidence.difference is not None:
+        table["nees_reference"] = evidence.difference.nees
+    if evidence.sigma_ratio is not None:
+        table = table.join(evidence.sigma_ratio.add_prefix("sigma_ratio_"))
+    if recorded is not None:
+        table["nis"], table["nis_degrees"] = recorded.nis, recorded.degrees
+    return table
+
+
+def _write_tables(run: Run, folder: Path) -> None:
+    """reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv, into an existing folder.
+
+    The first column names the estimator; empty tables are not written.
+    """
+    of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
+        "reprojection_classes": lambda r: r.evidence.patterns,
+        "moved_points": lambda r: r.evidence.moved[r.evidence.moved["moved"]].drop(columns="moved"),
+        "map_by_depth": lambda r: r.evidence.map_by_depth,
+    }
+    for name, of in of_each.items():
+        parts = {r.name: part for r in run.answered if (part := of(r)) is not None and len(part)}
+        if parts:
+            joined = pd.concat(parts, names=["estimator"]).reset_index(level="estimator")
+            joined.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
+    if run.held_out is not None and len(run.held_out.ranking):
+        run.held_out.ranking.to_csv(folder / "held_out.csv", float_format="%.6g")

@@ -1,18 +1,18 @@
-"""The tables of a run: every estimator's main figures, its consistency, residuals and map, and the long tables."""
+"""Tables of a run: main figures and evidence of every estimator on the page, on the terminal and in metrics.csv."""
 
 from collections.abc import Iterable, Mapping
-from itertools import groupby
 from math import isfinite
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from fgbaseline.compare.estimate_comparison import Run, map_by_depth, same_frames
+from fgbaseline.compare.estimate_comparison import Run, same_frames
 from fgbaseline.compare.limits import Better
 
-from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
-from ..phrases.run_accuracy import unranked
-from ..results.tree import INFINITE, at
+from ..formatting import DASH, INFINITY, counted, number
+from ..results.run import Summary
+from ..results.tree import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
 
 LOWER, HIGHER = Better.LOWER, Better.HIGHER
@@ -87,20 +87,6 @@ EXPLAINED: Mapping[str, str] = {
     MAP: "Landmarks are matched with the reference's by number; 'as seen' is in the frame of each one's own camera, "
     "without drift; 1.54 sigmas are expected.",
 }
-EXCLUDED: Mapping[str, str] = {
-    "feature not chosen": "its feature is not among those asked for",
-    "disparity": "its disparity is too small to tell the depth",
-    "rows": "its rows in the left and right image disagree",
-    "prediction": "it contradicts its own track, carried along by the velocities",
-    "short": "what is left of its track is too short to check",
-    "geometry": "its point is not determined, or lies behind a camera",
-    "moving": "its point moved",
-    "copied": "it is a copy of the frame before and was never tracked",
-}
-"""Reason of the mask -> its words in the table of what was left out"""
-MOST_DYNAMIC, MOST_EVENTS = 100, 200
-"""rows of the long tables"""
-
 Estimators = Mapping[str, Mapping[str, Any]]
 
 
@@ -127,76 +113,6 @@ def evidence_table(run: Run, estimators: Estimators) -> Table:
     table = _table(run, estimators, [c for c in EVIDENCE_COLUMNS if c is not NOT_COVARIANCES or any_bad])
     caption = " ".join(EXPLAINED[group] for group in dict.fromkeys(column.group for column in table.columns))
     return Table(table.columns, tuple(r for r in table.rows if r.cells), caption=caption, notes=table.notes)
-
-
-def components_table(estimators: Estimators) -> Table:
-    """Bias and spread of uL, vL, uR and vR of every estimator that has any."""
-    columns = tuple(
-        Column(title, row, "px", ("components", row, key))
-        for row in ("uL", "vL", "uR", "vR")
-        for title, key in (("bias", "bias"), ("spread", "spread"))
-    )
-    rows = {name: [c.value(e) for c in columns] for name, e in estimators.items()}
-    return Table(
-        columns,
-        tuple(Row(name, tuple(Cell(v.text) for v in values)) for name, values in rows.items() if any(values)),
-        caption="Measured minus predicted: mean and standard deviation over all observations of the landmarks that an "
-        "estimator has.",
-    )
-
-
-def findings_table(run: Run) -> Table:
-    """Every finding of the diagnosis, with its certainty and its figure before and after the repair."""
-    rows = []
-    for f in run.problem.findings:
-        name = f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"
-        rows.append(Row(name, tuple(Cell(quantity(value, f.unit)) for value in (f.before, f.after))))
-    return Table((Column("before"), Column("after")), tuple(rows), name="what the diagnosis found")
-
-
-def excluded_table(summary: Mapping[str, Any]) -> Table:
-    """How many observations the mask excludes, by reason, the most frequent first."""
-    total = max(1, int(at(summary, "sequence", "observations") or 0))
-    counts = sorted((at(summary, "problem", "excluded") or {}).items(), key=lambda item: -item[1])
-    rows = [
-        Row(EXCLUDED.get(reason.replace("_", " "), reason), (Cell(number(n)), Cell(per_cent(n / total))))
-        for reason, n in counts
-        if n
-    ]
-    return Table(
-        (Column("observations"), Column("of all")),
-        tuple(rows),
-        name="an observation takes no part because",
-        caption="Decided once for all estimators, before any of them runs.",
-    )
-
-
-def event_tables(run: Run) -> list[Table]:
-    """The events of each estimator, a title with how many of each kind; those of one run once."""
-    tables, seen = [], set[int]()
-    columns = (Column("landmark"), Column("what", words=True), Column("why", words=True))
-    for name, result in run.results.items():
-        events = result.estimate.events
-        if not events or id(events) in seen:
-            continue
-        seen.add(id(events))
-        names = ", ".join(n for n, r in run.results.items() if r.estimate.events is events) or name
-        kinds = {str(kind): len(list(same)) for kind, same in groupby(sorted(str(e.kind) for e in events))}
-        counts = sorted(kinds.items(), key=lambda item: -item[1])
-        title = f"{names}: " + ", ".join(f"{number(n)} × {kind}" for kind, n in counts)
-        rows = tuple(
-            Row(str(e.frame), (Cell("" if e.landmark is None else str(e.landmark)), Cell(str(e.kind)), Cell(e.reason)))
-            for e in events[:MOST_EVENTS]
-        )
-        more = len(events) - MOST_EVENTS
-        caption = f"and {number(more)} more, which are not listed here." if more > 0 else ""
-        tables.append(Table(columns, rows, name="frame", title=title, caption=caption))
-    return tables
-
-
-def long_tables(run: Run) -> list[Table]:
-    """Reprojection in classes, the map by depth and the dynamic landmarks, where a run has them."""
-    return [table for table in (_classes(run), _map(run), _dynamic(run)) if table is not None and table.rows]
 
 
 def terminal_table(estimators: Estimators, reference: str | None) -> Table:
@@ -276,7 +192,7 @@ def _named(columns: tuple[Column, ...], reference: str | None) -> tuple[Column, 
 
 
 def _rivals(run: Run, column: Column, answered: list[str]) -> set[str]:
-    return set(answered) - ({run.reference, *unranked(run)} if column.group == REFERENCE else set())
+    return set(answered) - ({run.reference, *run.unranked} if column.group == REFERENCE else set())
 
 
 def _why_absent(estimator: Mapping[str, Any], column: Column) -> str:
@@ -291,49 +207,12 @@ def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
     return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
 
 
-def _long(title: str, name: str, headings: Iterable[str], rows: Iterable[tuple[Any, ...]]) -> Table:
-    """A table of plain values: the first of a row is its name, text is aligned to the left."""
-    every = list(rows)
-    words = [isinstance(value, str) for value in every[0][1:]] if every else []
-    columns = tuple(Column(h, words=word) for h, word in zip(headings, words, strict=False))
-    cells = [Row(str(row[0]), tuple(Cell(v if isinstance(v, str) else number(v)) for v in row[1:])) for row in every]
-    return Table(columns, tuple(cells), name=name, title=title)
-
-
-def _classes(run: Run) -> Table:
+def metrics_table(summary: Summary) -> pd.DataFrame:
+    """`metrics.csv`: estimator, metric (its path in the summary) and value, one row for each number but the samples."""
     rows = [
-        (r.name, row["by"], row["of"], int(row["n"]), *(row[c] for c in ("median", "mean", "p95", "u", "v")))
-        for r in run.answered
-        for row in r.evidence.patterns.to_dict("records")
+        (name, metric, value)
+        for name, estimator in summary.estimators.items()
+        for metric, value in leaves(estimator.model_dump(exclude={"notes", "status", "reason", "samples"}))
+        if value is None or isinstance(value, int | float)
     ]
-    headings = ("by", "class", "n", "median, px", "mean, px", "95 %, px", "mean u, px", "mean v, px")
-    title = "Reprojection errors by distance, track age, place in the image and camera"
-    return _long(title, "estimator", headings, rows)
-
-
-def _map(run: Run) -> Table:
-    tables = {r.name: map_by_depth(r) for r in run.answered}
-    rows = [
-        (name, str(row["depth"]), int(row["n"]), row["distance"], row["seen"], row["sigmas"])
-        for name, table in tables.items()
-        if table is not None
-        for row in table.to_dict("records")
-    ]
-    headings = ("depth", "landmarks", "distance, m", "as seen, m", "sigmas")
-    return _long("Landmarks beside the reference's, medians by depth", "estimator", headings, rows)
-
-
-def _dynamic(run: Run) -> Table | None:
-    """Tracks whose points moved, by the reference's residuals."""
-    if run.reference is None:
-        return None
-    table = run.results[run.reference].evidence.moved
-    moved = table[table["moved"]].sort_values("gain", ascending=False)
-    rows = [
-        (str(row["landmark"]), int(row["n"]), row["speed"], row["squared"], row["gain"])
-        for row in moved.head(MOST_DYNAMIC).to_dict("records")
-    ]
-    more = f", the clearest {MOST_DYNAMIC}" if len(moved) > MOST_DYNAMIC else ""
-    title = f"{counted(len(moved), 'track')} whose points moved or slid, as {run.reference} sees them{more}"
-    headings = ("observations", "speed, m/s", "squared residuals", "of these explained")
-    return _long(title, "landmark", headings, rows)
+    return pd.DataFrame(rows, columns=["estimator", "metric", "value"])

@@ -18,7 +18,7 @@ from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, 
 from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
-from ..builders.reported import FRAMES, answer, as_dict, run_of, scene
+from ..builders.runs import FRAMES, answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
 
 NAMES = ("isam2", "ekf", "joint-ekf", "batch")

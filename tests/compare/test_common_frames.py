@@ -23,7 +23,7 @@ from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
-from ..builders.reported import answer, as_dict, run_of, scene
+from ..builders.runs import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
 from ..conftest import RECORDINGS
 

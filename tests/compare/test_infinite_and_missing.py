@@ -17,8 +17,8 @@ from fgbaseline.data import Estimate, Landmarks, Problem
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.run_summary import metrics_table, summarise
-from fgbaseline.reports.tables.run import main_table
+from fgbaseline.reports.results.run import summarize
+from fgbaseline.reports.tables.run import main_table, metrics_table
 
 from ..builders.synthetic import Scene, plain_problem
 
@@ -116,7 +116,7 @@ def run_of(estimate: Estimate, problem: Problem) -> comparison.Run:
 def test_summary_page_and_metrics_say_infinite_and_count_the_missing() -> None:
     problem = plain_problem(Scene().sequence())
     run = run_of(answer(problem, infinite=True, missing=True), problem)
-    summary = summarise(run)
+    summary = summarize(run)
     document: dict[str, Any] = json.loads(json.dumps(summary.model_dump(mode="json", by_alias=True), allow_nan=False))
     isam2, half = (document["estimators"][name] for name in ("isam2", "half"))
     assert isam2["reprojection"]["rmse"] is None

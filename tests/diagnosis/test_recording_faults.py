@@ -21,7 +21,7 @@ from fgbaseline.data.time_unit import unit_of_stamps
 from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
 from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
-from fgbaseline.reports.run.job import RunSettings, pose_problem
+from fgbaseline.reports.run.problem import RunSettings, pose_problem
 
 from ..builders.commands import fgbaseline
 from ..diagnosis.test_real_recordings import UTIAS

@@ -20,7 +20,7 @@ from fgbaseline.diagnosis import (
     track_statistics,
 )
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.results.run import summarize
 
 from ..builders.commands import fgbaseline
 from ..builders.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, base, cell, cut, solved, velocity_jump
@@ -45,7 +45,7 @@ def test_every_estimator_admits_its_errors_or_fails_with_a_reason_and_the_tables
     if recording.make in (base, velocity_jump):
         expected = Verdict.TRUSTED if recording.make is base else Verdict.UNTRUSTED
         assert run.trust.verdict is expected
-    summary = summarise(run).model_dump(mode="json")
+    summary = summarize(run).model_dump(mode="json")
     assert set(summary["estimators"]) == set(ESTIMATORS)
     assert all(e["reason"] for e in summary["estimators"].values() if e["status"] == "failed")
 

@@ -5,6 +5,7 @@ import pytest
 
 from .test_packaging import ROOMS
 
+
 @pytest.fixture(scope="module")
 def graph() -> grimp.ImportGraph:
     first, *others = (f"fgbaseline.{room}" for room in ROOMS)

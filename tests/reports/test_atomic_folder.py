@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fgbaseline.data.formats.atomic_folder import require_free, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import everything_in
@@ -15,7 +15,7 @@ MARK = "summary.json"
 
 
 def written(place: Path, text: str, *, force: bool = False) -> None:
-    with whole_folder(place, force=force, mark=MARK) as folder:
+    with atomic_folder(place, force=force, mark=MARK) as folder:
         (folder / "inner").mkdir()
         (folder / MARK).write_text(text)
 
@@ -26,7 +26,7 @@ def test_a_new_folder_appears_with_its_parents(tmp_path: Path) -> None:
 
 
 def test_nothing_is_seen_of_it_before_it_is_whole(tmp_path: Path) -> None:
-    with whole_folder(tmp_path / "out", force=False, mark=MARK) as folder:
+    with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
         (folder / MARK).write_text("half")
         assert not (tmp_path / "out").exists()
 
@@ -35,7 +35,7 @@ def test_nothing_is_seen_of_it_before_it_is_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize("place", ["out", "a/b/c"])
 def test_nothing_is_left_of_one_that_ended_badly(tmp_path: Path, error: type[BaseException], place: str) -> None:
     def fail() -> None:
-        with whole_folder(tmp_path / place, force=False, mark=MARK) as folder:
+        with atomic_folder(tmp_path / place, force=False, mark=MARK) as folder:
             (folder / "file").write_text("half")
             raise error
 
@@ -140,7 +140,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
 
 def test_a_folder_that_appeared_in_the_meantime_is_kept(tmp_path: Path) -> None:
     def overtaken() -> None:
-        with whole_folder(tmp_path / "out", force=False, mark=MARK) as folder:
+        with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
             (folder / MARK).write_text("mine")
             (tmp_path / "out").mkdir()
             (tmp_path / "out" / "theirs").write_text("")

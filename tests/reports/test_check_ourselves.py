@@ -18,8 +18,8 @@ from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
 from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.results.run_summary import summarise
-from fgbaseline.reports.run import job
+from fgbaseline.reports.results.run import summarize
+from fgbaseline.reports.run.problem import MARK, RunSettings, pose_problem
 
 from ..builders.commands import fgbaseline
 
@@ -43,9 +43,9 @@ class Quick:
     def check(self, other: Mapping[str, Estimate]) -> int:
         """The exit code with some answers replaced, against what is committed."""
         answers = {**self.answers, **other}
-        summary = summarise(compare_all(self.problem, answers, {}))
+        summary = summarize(compare_all(self.problem, answers, {}))
         text = json.dumps(summary.model_dump(mode="json", by_alias=True))
-        (self.folder / job.MARK).write_text(text)
+        (self.folder / MARK).write_text(text)
         return check(self.folder, SUITES / "quick-limits.toml", self.folder / BASELINE.name, Outputs())
 
 
@@ -59,7 +59,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
     alone = {**baseline, "runs": {sequence.name: baseline["runs"][RUN]}}
     (folder / BASELINE.name).write_text(json.dumps(alone))
     estimators = tuple(suite["estimators"])
-    problem = job.pose_problem(sequence, job.RunSettings(estimators=estimators))
+    problem = pose_problem(sequence, RunSettings(estimators=estimators))
     return Quick(problem, solve_all(problem, estimators), folder)
 
 

@@ -21,7 +21,7 @@ from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of
 
 from ..builders.commands import fgbaseline
-from ..builders.reported import answer, as_dict, partly_known, run_of, scene, standard_run
+from ..builders.runs import answer, as_dict, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 from ..compare.test_common_frames import off, path
 from ..conftest import RECORDINGS

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fgbaseline import diagnosis
+from fgbaseline.compare.departure import worst_second
 from fgbaseline.data import Problem, read_problem
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.figures.panels import moving_sum
-from fgbaseline.reports.phrases.run_accuracy import worst_second
 
 from ..builders.commands import fgbaseline
 from ..builders.mutated_files import good_recording, good_trajectory

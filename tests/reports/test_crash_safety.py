@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.formats.atomic_folder import exchanged, whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder, exchanged
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import COMMAND, everything_in, fgbaseline, started
@@ -27,11 +27,11 @@ WRITER = """
 import sys
 from itertools import count
 from pathlib import Path
-from fgbaseline.data.formats.atomic_folder import whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder
 
 print("ready", flush=True)
 for n in count():
-    with whole_folder(Path(sys.argv[1]), force=True, mark="summary.json") as folder:
+    with atomic_folder(Path(sys.argv[1]), force=True, mark="summary.json") as folder:
         for i in range(12):
             (folder / f"{i}.txt").write_text(str(n))
         (folder / "summary.json").write_text(str(n))
@@ -41,12 +41,12 @@ RIVAL = """
 import os, sys, time
 from pathlib import Path
 from fgbaseline.geometry import InputError
-from fgbaseline.data.formats.atomic_folder import whole_folder
+from fgbaseline.data.formats.atomic_folder import atomic_folder
 
 print("ready", flush=True)
 sys.stdin.readline()
 try:
-    with whole_folder(Path(sys.argv[1]), force=bool(sys.argv[2]), mark="summary.json") as folder:
+    with atomic_folder(Path(sys.argv[1]), force=bool(sys.argv[2]), mark="summary.json") as folder:
         for name in [*(f"{i}.txt" for i in range(12)), "summary.json"]:
             (folder / name).write_text(str(os.getpid()))
             time.sleep(0.01)
@@ -76,7 +76,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_a_writer_killed_at_any_moment_leaves_one_whole_folder(tmp_path: Path) -> None:
     chance, place, seen = random.Random(1), tmp_path / "out", set()
-    with whole_folder(place, force=False, mark=MARK) as first:
+    with atomic_folder(place, force=False, mark=MARK) as first:
         for name in [*(f"{i}.txt" for i in range(FILES)), MARK]:
             (first / name).write_text("before")
     for _ in range(12):
@@ -233,17 +233,17 @@ def test_two_folders_exchange_their_names(tmp_path: Path) -> None:
 def test_where_the_system_cannot_exchange_names_the_folder_is_replaced_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unable: Callable[..., int] | None
 ) -> None:
-    monkeypatch.setattr("fgbaseline.reports.exchange_names._renameat2", lambda: unable)
+    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder._renameat2", lambda: unable)
     monkeypatch.setattr("ctypes.get_errno", lambda: 38)
     for text in ("old", "new"):
-        with whole_folder(tmp_path / "out", force=True, mark=MARK) as folder:
+        with atomic_folder(tmp_path / "out", force=True, mark=MARK) as folder:
             (folder / MARK).write_text(text)
     assert contents(tmp_path) == {f"out/{MARK}": b"new"}
 
 
 def test_a_folder_that_another_made_in_the_meantime_is_not_overwritten(tmp_path: Path) -> None:
     def late() -> None:
-        with whole_folder(tmp_path / "out", force=False, mark=MARK) as folder:
+        with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
             (folder / MARK).write_text("late")
             (tmp_path / "out").mkdir()
             (tmp_path / "out" / MARK).write_text("first")

@@ -15,14 +15,14 @@ from PIL import Image
 
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Observations
+from fgbaseline.data.top_view import TopView
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.layout import lay_out
 from fgbaseline.reports.figures.run import drawings
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import OWN, SCREEN, in_style, plain
-from fgbaseline.reports.figures.view import TopView
 
-from ..builders.reported import answer, failed, partly_known, run_of, scene, standard_run
+from ..builders.runs import answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 

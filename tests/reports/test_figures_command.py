@@ -14,7 +14,7 @@ from fgbaseline.reports.cli import main
 from fgbaseline.reports.figures.style import PAPER
 from fgbaseline.reports.run.folder import write_run
 
-from ..builders.reported import answer, failed, run_of, scene, standard_run
+from ..builders.runs import answer, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 

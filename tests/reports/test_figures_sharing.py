@@ -5,7 +5,7 @@ from functools import cache
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.reports import figures
 
-from ..builders.reported import answer, run_of, scene
+from ..builders.runs import answer, run_of, scene
 from ..builders.synthetic import plain_problem
 
 

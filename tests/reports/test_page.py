@@ -20,7 +20,7 @@ from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.tables.run import COLUMNS, main_table
 
-from ..builders.reported import answer, as_dict, failed, run_of, scene, standard_run
+from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 SCRIPT = "<script>alert(1)</script>"

@@ -21,7 +21,7 @@ from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style
 from fgbaseline.reports.html.run_page import render
 
-from ..builders.reported import answer, as_dict, failed, run_of, scene
+from ..builders.runs import answer, as_dict, failed, run_of, scene
 from ..builders.synthetic import plain_problem
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

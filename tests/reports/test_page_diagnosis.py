@@ -9,13 +9,13 @@ from fgbaseline.data.finding import Finding
 from fgbaseline.reports.formatting import quantity
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
-from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.results.run import summarize
 
-from ..builders.reported import standard_run
+from ..builders.runs import standard_run
 
 
 def rendered(run: Run) -> str:
-    return render(run, summarise(run).model_dump(mode="json", by_alias=True), {})
+    return render(run, summarize(run).model_dump(mode="json", by_alias=True), {})
 
 
 def test_findings_stand_with_their_figures_and_repairs_below() -> None:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import compare
+from fgbaseline.compare.departure import departure
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.run import verdict
-from fgbaseline.reports.phrases.run_accuracy import departure
 
-from ..builders.reported import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
+from ..builders.runs import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 

@@ -11,7 +11,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.run import rerun as rerun_file
 
-from ..builders.reported import standard_run
+from ..builders.runs import standard_run
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(

@@ -11,18 +11,19 @@ import pandas as pd
 import pytest
 
 from fgbaseline import data, diagnosis
-from fgbaseline.compare.estimate_comparison import Run, compare_all, frames_in_words
+from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import Innovations
 from fgbaseline.geometry import InputError
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
-from fgbaseline.reports.run import job
+from fgbaseline.reports.results.evidence import frame_ranges
 from fgbaseline.reports.run.folder import write_run
+from fgbaseline.reports.run.problem import RunSettings, solve, split
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty
-from ..builders.reported import answer, as_dict, failed, run_of, scene, standard_run
+from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import drive, matched, plain_problem
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "summary.schema.json"
@@ -31,9 +32,9 @@ SCHEMA = Path(__file__).parents[2] / "docs" / "summary.schema.json"
 @cache
 def held_out_run() -> Run:
     """Dead reckoning and both filters on a short drive with a quarter of its tracks held out."""
-    settings = job.RunSettings(held_out=0.25, seed=3, estimators=("dead-reckoning", "ekf", "joint-ekf"))
-    kept, held = job.split(drive(seconds=8.0, features_per_frame=25.0), settings)
-    return job.solve(matched(kept), settings, held=held)
+    settings = RunSettings(held_out=0.25, seed=3, estimators=("dead-reckoning", "ekf", "joint-ekf"))
+    kept, held = split(drive(seconds=8.0, features_per_frame=25.0), settings)
+    return solve(matched(kept), settings, held=held)
 
 
 def test_the_summary_has_all_of_it_and_keeps_to_the_schema() -> None:
@@ -65,9 +66,9 @@ def test_nothing_is_held_out_unless_asked_for() -> None:
     assert summary["held_out"] is None
     assert all(e["notes"]["held_out"] == "no tracks were held out" for e in summary["estimators"].values())
     sequence = drive()
-    assert job.split(sequence, job.RunSettings()) == (sequence, None)
+    assert split(sequence, RunSettings()) == (sequence, None)
     with pytest.raises(InputError, match="held-out"):
-        job.split(sequence, job.RunSettings(held_out=1.5))
+        split(sequence, RunSettings(held_out=1.5))
 
 
 def test_the_folder_has_series_and_tables_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,10 +159,10 @@ def test_a_filter_that_is_blind_most_of_the_time_has_its_figure_all_the_same() -
     assert "consistency" in figures.draw(run_of(problem, answer(problem, "isam2"), estimate))
 
 
-def test_frames_in_words() -> None:
-    assert frames_in_words(np.array([], dtype=np.int64)) == ""
-    assert frames_in_words(np.array([4])) == "4"
-    assert frames_in_words(np.array([0, 1, 2, 7, 9, 10])) == "0 to 2, 7, 9 to 10"
+def test_frame_ranges() -> None:
+    assert frame_ranges(np.array([], dtype=np.int64)) == ""
+    assert frame_ranges(np.array([4])) == "4"
+    assert frame_ranges(np.array([0, 1, 2, 7, 9, 10])) == "0 to 2, 7, 9 to 10"
 
 
 def test_the_command_takes_a_share(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status, solving
 from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.run.job import RunSettings, check_estimators, read_sequence
+from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
 
 from ..builders.synthetic import Scene, plain_problem
 
@@ -176,7 +176,7 @@ def test_estimators_are_checked_before_anything_runs(names: tuple[str, ...], mes
 
 @pytest.mark.parametrize("name", ["a/b", "..", ".hidden", "c\\d"])
 def test_a_name_that_can_be_no_files_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    monkeypatch.setattr("fgbaseline.reports.run.job.estimator_names", lambda: [name])
+    monkeypatch.setattr("fgbaseline.reports.run.problem.estimator_names", lambda: [name])
     with pytest.raises(InputError, match="can be no file's name"):
         check_estimators((name,))
 

@@ -14,10 +14,10 @@ import pytest
 from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Landmarks, Observations, Status
-from fgbaseline.reports.results.run import json_schema
-from fgbaseline.reports.results.run_summary import metrics_table, summarise
+from fgbaseline.reports.results.run import json_schema, summarize
+from fgbaseline.reports.tables.run import metrics_table
 
-from ..builders.reported import answer, as_dict, failed, partly_known, run_of, scene, standard_run
+from ..builders.runs import answer, as_dict, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "summary.schema.json"
@@ -117,7 +117,7 @@ def test_the_reasons_are_the_right_ones() -> None:
 
 @pytest.mark.parametrize("kind", RUNS)
 def test_metrics_csv_is_every_number_of_the_summary(kind: str, tmp_path: Path) -> None:
-    summary = summarise(RUNS[kind]())
+    summary = summarize(RUNS[kind]())
     metrics_table(summary).to_csv(tmp_path / "metrics.csv", index=False)
     with (tmp_path / "metrics.csv").open(newline="", encoding="utf-8") as file:
         header, *table = csv.reader(file)

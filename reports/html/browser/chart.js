@@ -11,10 +11,10 @@ class TimeChart {
     const button = place.querySelector("button");
     const signed = [...chart.lines.values()].some(line => line.some(value => value < 0));
     button.hidden = signed;
-    button.setAttribute("aria-pressed", String(this.log));
+    press(button, this.log);
     button.addEventListener("click", () => {
       this.log = !this.log;
-      button.setAttribute("aria-pressed", String(this.log));
+      press(button, this.log);
       this.draw();
     });
     this.listen();
@@ -35,7 +35,7 @@ class TimeChart {
       const at = frame(event);
       if (event.pointerType === "mouse" && event.buttons === 1) goTo(at);
       showHint(event, [[`frame ${at}, ${timeOf(at)}`, null], ...this.shown().map(([key, line]) =>
-        [`${everybody.get(key).name} ${told(line[at], this.chart.unit)}`, key])]);
+        [`${trajectories.get(key).name} ${quantity(line[at], this.chart.unit)}`, key])]);
     });
     this.svg.addEventListener("pointerleave", hideHint);
   }
@@ -107,22 +107,14 @@ class TimeChart {
     }
     if (this.chart.middle !== null) parts.push(across(this.chart.middle, "middle"));
     const lines = this.shown().sort(([a], [b]) => isReference(b) - isReference(a));
-    for (const [key, line] of lines) parts.push(svg("path", { class: "line who-" + key, d: this.path(line, y) }));
+    for (const [key, line] of lines) {
+      const d = polyline(line.length, k => (Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null));
+      parts.push(svg("path", { class: "line who-" + key, d }));
+    }
     this.cursor = svg("line", { class: "cursor", y1: ROOM.top, y2: height - ROOM.bottom });
     parts.push(this.cursor);
     this.svg.replaceChildren(...parts);
     this.moveCursor();
-  }
-
-  path(line, y) {
-    let d = "";
-    let pen = "M";
-    for (let k = 0; k < line.length; k++) {
-      if (!Number.isFinite(line[k])) { pen = "M"; continue; }
-      d += pen + this.x(seconds[k]).toFixed(1) + " " + y(line[k]).toFixed(1);
-      pen = "L";
-    }
-    return d;
   }
 
   moveCursor() {

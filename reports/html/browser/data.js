@@ -1,4 +1,4 @@
-// The run as the page holds it: base64 of little-endian arrays, see packing.py and payload.py.
+// The run as the page holds it: base64 of little-endian arrays, see run_data.py.
 const run = JSON.parse(document.getElementById("run").textContent);
 
 function bytes(text) {
@@ -13,12 +13,12 @@ const integers = text => new Uint32Array(bytes(text).buffer);
 const seconds = floats(run.t);
 const TRUTH = "truth";
 
-// Everybody with a path, by key: the number of an estimator as text, or "truth".
-const everybody = new Map();
+// Trajectories by key: the number of an estimator as text, or "truth".
+const trajectories = new Map();
 run.who.forEach((who, i) => {
   if (!who.answered) return;
   const index = integers(who.landmarks);
-  everybody.set(String(i), {
+  trajectories.set(String(i), {
     key: String(i),
     name: who.name,
     path: floats(who.path),
@@ -29,7 +29,7 @@ run.who.forEach((who, i) => {
     used: who.used && bytes(who.used),
   });
 });
-if (run.truth) everybody.set(TRUTH, { key: TRUTH, name: "truth", path: floats(run.truth) });
+if (run.truth) trajectories.set(TRUTH, { key: TRUTH, name: "truth", path: floats(run.truth) });
 
 const charts = run.charts.map(chart => ({
   ...chart,

@@ -1,21 +1,31 @@
 // Small pieces of SVG and HTML; text only ever goes in as text.
 const SVG = "http://www.w3.org/2000/svg";
 
-function svg(name, attributes = {}, text = "") {
-  const element = document.createElementNS(SVG, name);
+function filled(element, attributes, text) {
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   if (text) element.textContent = text;
   return element;
 }
+const svg = (name, attributes = {}, text = "") => filled(document.createElementNS(SVG, name), attributes, text);
+const html = (name, attributes = {}, text = "") => filled(document.createElement(name), attributes, text);
+const press = (button, on) => button.setAttribute("aria-pressed", String(on));
 
-function html(name, attributes = {}, text = "") {
-  const element = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  if (text) element.textContent = text;
-  return element;
+// Far outside a picture, numbers only make the file longer.
+const bounded = value => Math.max(-1e5, Math.min(1e5, value)).toFixed(1);
+
+// A line through n places, broken where `place` gives none.
+function polyline(n, place) {
+  let d = "";
+  let pen = "M";
+  for (let i = 0; i < n; i++) {
+    const at = place(i);
+    if (at) d += `${pen}${bounded(at[0])} ${bounded(at[1])}`;
+    pen = at ? "L" : "M";
+  }
+  return d;
 }
 
-function told(value, unit = "") {
+function quantity(value, unit = "") {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   let text;

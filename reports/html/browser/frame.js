@@ -8,11 +8,11 @@ class FrameView {
     });
     this.words = place.querySelector(".said");
     this.select = place.querySelector("select");
-    for (const who of everybody.values()) {
+    for (const who of trajectories.values()) {
       if (who.points && who.points.length) this.select.append(html("option", { value: who.key }, who.name));
     }
     const reference = [...this.select.options].find(option => isReference(option.value));
-    const first = [...this.select.options].find(option => !isReference(option.value) && everybody.get(option.value).used);
+    const first = [...this.select.options].find(option => !isReference(option.value) && trajectories.get(option.value).used);
     const start = first || reference;
     if (start) this.select.value = start.value;
     this.select.addEventListener("change", () => this.draw());
@@ -22,7 +22,7 @@ class FrameView {
 
   // Every observation of the frame: measured, predicted (or null), and what became of it.
   seen() {
-    const who = everybody.get(this.select.value);
+    const who = trajectories.get(this.select.value);
     const seen = [];
     for (let i = observations.starts[chosen.frame]; i < observations.starts[chosen.frame + 1]; i++) {
       const measured = Array.from(observations.pixel.subarray(4 * i, 4 * i + 4), value => value / observations.parts);
@@ -51,7 +51,7 @@ class FrameView {
     const key = this.select.value;
     const seen = this.seen();
     this.images.forEach((image, side) => this.drawImage(image, side, seen, key));
-    this.say(seen, key);
+    this.summarize(seen, key);
   }
 
   drawImage(image, side, seen, key) {
@@ -79,18 +79,18 @@ class FrameView {
 
   about(one, key) {
     const lines = [[`landmark ${one.landmark}: ${this.fate(one, key)}`, null]];
-    if (one.predicted) lines.push([`${told(one.error, "px")} from its reprojection`, key]);
+    if (one.predicted) lines.push([`${quantity(one.error, "px")} from its reprojection`, key]);
     return lines;
   }
 
   fate(one, key) {
     if (one.fate === "excluded") return "excluded, " + (run.reasons[one.reason] || "");
-    if (one.fate === "used") return "used by " + everybody.get(key).name;
-    return key ? "not used by " + everybody.get(key).name : "takes part";
+    if (one.fate === "used") return "used by " + trajectories.get(key).name;
+    return key ? "not used by " + trajectories.get(key).name : "takes part";
   }
 
-  say(seen, key) {
-    const name = key ? everybody.get(key).name : "";
+  summarize(seen, key) {
+    const name = key ? trajectories.get(key).name : "";
     const of = fate => seen.filter(one => one.fate === fate);
     const middle = some => {
       const errors = some.map(one => one.error).filter(Number.isFinite).sort((a, b) => a - b);
@@ -104,7 +104,7 @@ class FrameView {
       const some = of(fate);
       if (some.length === 0) continue;
       const error = middle(some);
-      const errors = Number.isFinite(error) ? ` (median error ${told(error, "px")})` : "";
+      const errors = Number.isFinite(error) ? ` (median error ${quantity(error, "px")})` : "";
       parts.push(`${some.length} ${text}${errors}`);
     }
     const reasons = new Map();

@@ -2,13 +2,13 @@
 const slider = document.getElementById("frame");
 const clock = document.getElementById("clock");
 
-function tellFrame() {
+function showFrame() {
   slider.value = String(chosen.frame);
   slider.setAttribute("aria-valuetext", `frame ${chosen.frame}, ${timeOf(chosen.frame)}`);
   clock.textContent = `frame ${chosen.frame} · ${timeOf(chosen.frame)}`;
 }
 slider.addEventListener("input", () => goTo(Number(slider.value)));
-onFrame.push(tellFrame);
+onFrame.push(showFrame);
 
 for (const box of document.querySelectorAll("#who input")) {
   box.addEventListener("change", () => show(box.value, box.checked));
@@ -19,12 +19,12 @@ let playing = null;
 function stop() {
   clearInterval(playing);
   playing = null;
-  play.setAttribute("aria-pressed", "false");
+  press(play, false);
 }
 play.addEventListener("click", () => {
   if (playing !== null) return stop();
   if (chosen.frame === run.frames - 1) goTo(0);
-  play.setAttribute("aria-pressed", "true");
+  press(play, true);
   const step = Math.max(1, Math.round(run.frames / 400));
   playing = setInterval(() => (chosen.frame < run.frames - 1 ? goTo(chosen.frame + step) : stop()), 60);
   return undefined;
@@ -41,7 +41,7 @@ function fill() {
   for (const cell of table.querySelectorAll("td")) {
     const chart = charts[Number(cell.dataset.chart)];
     const line = chart.lines.get(cell.dataset.key);
-    cell.textContent = line ? told(line[chosen.frame]) : "";
+    cell.textContent = line ? quantity(line[chosen.frame]) : "";
   }
 }
 if (table) {
@@ -64,4 +64,4 @@ const frame = document.getElementById("frame-view");
 if (frame && observations) new FrameView(frame);
 document.documentElement.classList.add("live");
 if (run.jumps.length) goTo(run.jumps[0].frame);
-tellFrame();
+showFrame();

@@ -22,7 +22,7 @@ class PathView {
 
   // The box of the paths; a path that runs off alone may be switched off, but does not hide the others.
   bounds() {
-    const reach = [...everybody.values()].map(who => {
+    const reach = [...trajectories.values()].map(who => {
       const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
       who.path.forEach((value, i) => {
         if (!Number.isFinite(value)) return;
@@ -116,7 +116,7 @@ class PathView {
 
   // The reference lies below the others.
   shown() {
-    return [...everybody.values()].filter(who => chosen.shown.has(who.key))
+    return [...trajectories.values()].filter(who => chosen.shown.has(who.key))
       .sort((a, b) => isReference(b.key) - isReference(a.key));
   }
 
@@ -126,15 +126,7 @@ class PathView {
   }
 
   track(path) {
-    let d = "";
-    let pen = "M";
-    for (let i = 0; i < path.length; i += 3) {
-      if (!Number.isFinite(path[i])) { pen = "M"; continue; }
-      const [x, y] = this.project(path, i);
-      d += pen + bounded(x) + " " + bounded(y);
-      pen = "L";
-    }
-    return d;
+    return polyline(path.length / 3, k => (Number.isFinite(path[3 * k]) ? this.project(path, 3 * k) : null));
   }
 
   dots(points) {
@@ -221,14 +213,14 @@ class PathView {
     return best;
   }
 
-  tell(event) {
+  showNearest(event) {
     const near = this.nearest(event);
     if (near === null) return hideHint();
     const { who, frame } = near;
     const errors = ["divergence", "error"].flatMap(name => {
       const chart = charts.find(one => one.name === name);
       const line = chart && chart.lines.get(who.key);
-      return line ? [[`${told(line[frame], "m")} from ${name === "error" ? "the truth" : run.reference}`, null]] : [];
+      return line ? [[`${quantity(line[frame], "m")} from ${name === "error" ? "the truth" : run.reference}`, null]] : [];
     });
     return showHint(event, [[who.name, who.key], [`frame ${frame}, ${timeOf(frame)}`, null], ...errors]);
   }
@@ -246,7 +238,7 @@ class PathView {
       moved = false;
     });
     this.svg.addEventListener("pointermove", event => {
-      if (from === null) return this.tell(event);
+      if (from === null) return this.showNearest(event);
       const [dx, dy] = [event.clientX - from[0], event.clientY - from[1]];
       if (!moved && Math.hypot(dx, dy) < 4) return undefined;
       if (!moved) this.svg.setPointerCapture(event.pointerId);
@@ -295,16 +287,15 @@ class PathView {
   }
 
   buttons(place) {
-    const pressed = { solid: "solid", landmarks: "landmarks", ellipses: "ellipses" };
     for (const button of place.querySelectorAll("button")) {
       const what = button.dataset.do;
       button.addEventListener("click", () => {
-        if (pressed[what]) {
+        if (["solid", "landmarks", "ellipses"].includes(what)) {
           this[what] = !this[what];
-          button.setAttribute("aria-pressed", String(this[what]));
+          press(button, this[what]);
           if (what === "solid") this.reset();
         } else if (what === "larger") {
-          button.setAttribute("aria-pressed", String(place.classList.toggle("large")));
+          press(button, place.classList.toggle("large"));
         } else if (what === "reset") this.reset();
         else this.magnify(what === "in" ? 1.4 : 1 / 1.4);
         this.draw();
@@ -312,6 +303,3 @@ class PathView {
     }
   }
 }
-
-// Far outside a picture, numbers only make the file longer.
-const bounded = value => Math.max(-1e5, Math.min(1e5, value)).toFixed(1);

@@ -1,5 +1,5 @@
 // What is chosen: one frame and a set of estimators for the whole page.
-const chosen = { frame: 0, shown: new Set(everybody.keys()) };
+const chosen = { frame: 0, shown: new Set(trajectories.keys()) };
 const onFrame = [];
 const onShown = [];
 
@@ -8,13 +8,13 @@ function goTo(frame) {
   const next = Math.max(0, Math.min(last, Math.round(frame)));
   if (next === chosen.frame) return;
   chosen.frame = next;
-  onFrame.forEach(tell => tell());
+  onFrame.forEach(update => update());
 }
 
 function show(key, shown) {
   if (shown) chosen.shown.add(key);
   else chosen.shown.delete(key);
-  onShown.forEach(tell => tell());
+  onShown.forEach(update => update());
 }
 
 // The frame whose time is nearest.

@@ -1,4 +1,4 @@
-"""The main job: from a recording and the user's wishes to a run that can be reported."""
+"""From the settings of a user to the posed problem of a recording, its solution and the compared run."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 FEW_TRUE = 0.5
-"""share of frames with truth, below which a run says so first"""
+"""share of frames with truth, below which a run prints that first"""
 MARK = "summary.json"
 """the file by which a run's folder is known"""
 
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What the user asked for."""
+    """Wishes of the user."""
 
     sequence: Path | None = None
     """None for the simulated drive"""
@@ -142,12 +142,12 @@ def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) 
 
 
 def to_print_first(problem: Problem) -> list[str]:
-    """What a run says before anything else: faults of the file itself, and a truth of few frames."""
-    said = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
+    """Sentences that a run prints first: faults of the file itself, and a truth of few frames."""
+    sentences = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
     truth = problem.sequence.truth
     if truth is not None and truth.known.mean() < FEW_TRUE:
-        said += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]
-    return said
+        sentences += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]
+    return sentences
 
 
 def _require_units(sequence: Sequence) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import Estimate, Landmarks, Problem, Sequence, Status, Truth
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.results.run_summary import summarise
+from fgbaseline.reports.results.run import summarize
 
 from .synthetic import Scene, plain_problem
 
@@ -74,7 +74,7 @@ def partly_known(truth: Truth, missing: int) -> Truth:
 
 def as_dict(run: Run) -> Mapping[str, Any]:
     """`summary.json` of a run."""
-    return summarise(run).model_dump(mode="json", by_alias=True)
+    return summarize(run).model_dump(mode="json", by_alias=True)
 
 
 RECOVERED = Status.RECOVERED

@@ -1,0 +1,71 @@
+"""Sample sizes that the figures of a run rest on, which decide whether a limit can be judged."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from fgbaseline import compare
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.geometry import FloatArray
+
+from .estimate_comparison import Result, Run, known
+
+
+def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
+    """By the beginning of a metric's path: `n` of what it is taken over, and the `coverage` of the recording's time.
+
+    n are frames, of the reprojection observations, of the map landmarks, else tracks; what is not spread over time has
+    no coverage.
+    """
+    t, evidence, table = run.problem.sequence.t, result.evidence, result.reprojection
+    ranking = None if run.held_out is None else run.held_out.ranking
+    common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
+    truth = _of_frames(t, None if result.truth is None else known(result.truth))
+    every: dict[str, dict[str, float] | None] = {
+        "divergence": _of_frames(t, None if result.divergence is None else known(result.divergence)),
+        "ate": truth,
+        "ate_unaligned": truth,
+        "divergence_common": None if result.divergence_common is None else {"n": result.divergence_common.frames},
+        "ate_common": None if result.ate_common is None else {"n": result.ate_common.frames},
+        "nees": _of_values(t, result.nees),
+        "nees_reference": _of_values(t, None if evidence.difference is None else evidence.difference.nees),
+        "sigma_ratio": _of_values(t, None if evidence.sigma_ratio is None else evidence.sigma_ratio["position"]),
+        "nis": _of_values(t, evidence.nis_per_degree),
+        "reprojection": _of_observations(t, table),
+        "components": _of_observations(t, table),
+        "reprojection_used": _of_observations(t, table[table["used"]]),
+        "reprojection_common": _of_observations(t, table[common[table["observation"]]]),
+        "whitened": {"n": int(evidence.whitened["tracks"])},
+        "moved_points": {"n": len(evidence.moved)},
+        "map": None if evidence.map is None else {"n": len(evidence.map)},
+        "map.median_sigmas": None if evidence.map is None else {"n": int(evidence.map["sigmas"].notna().sum())},
+        "held_out": None if ranking is None or result.name not in ranking.index else {"n": int(ranking.attrs["n"])},
+    }
+    return {key: sample for key, sample in every.items() if sample is not None}
+
+
+def truth_sample(run: Run) -> Mapping[str, float] | None:
+    """Sample that errors to the truth rest on at best: the frames that have one; None without truth."""
+    truth = run.problem.sequence.truth
+    return _of_frames(run.problem.sequence.t, None if truth is None else truth.known)
+
+
+def insufficient_truth(run: Run) -> bool:
+    """Whether there is a truth, but too little of it to judge by."""
+    sample = truth_sample(run)
+    return sample is not None and compare.is_insufficient(sample, compare.MIN_SAMPLE_SIZE, compare.MIN_COVERAGE)
+
+
+def _of_frames(t: FloatArray, frames: BoolArray | None) -> dict[str, float] | None:
+    return None if frames is None else {"n": int(frames.sum()), "coverage": compare.time_coverage(t[frames], t)}
+
+
+def _of_values(t: FloatArray, values: ArrayLike | None) -> dict[str, float] | None:
+    """Sample of the frames in which values (T,) are finite."""
+    return None if values is None else _of_frames(t, np.isfinite(np.asarray(values, dtype=np.float64)))
+
+
+def _of_observations(t: FloatArray, table: pd.DataFrame) -> dict[str, float]:
+    return {"n": len(table), "coverage": compare.time_coverage(t[np.unique(table["frame"])], t)}

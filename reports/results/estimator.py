@@ -1,0 +1,178 @@
+"""Summary of an estimator in `summary.json`: its models, how they are filled, and why values are null."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from fgbaseline import compare
+from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.sample_sizes import samples
+
+from .evidence import (
+    CovarianceCount,
+    HeldOutError,
+    MapDifference,
+    MovedPoints,
+    NeesInDetail,
+    Nis,
+    ReferenceNees,
+    SigmaRatio,
+    Whitened,
+    evidence_notes,
+    summarize_evidence,
+)
+from .statistics import Divergence, Number, Part, Reprojection, Spread
+from .tree import INFINITE, nulls
+
+
+class Component(Part):
+    """Measured minus predicted, px, over all observations of the estimated landmarks."""
+
+    bias: Number
+    spread: Number
+
+
+class ObservationCount(Part):
+    """How much of what the problem offered was used."""
+
+    offered: Annotated[int, Field(description="observations of the problem, after its mask")]
+    used: int
+    share: Number
+
+
+class TruthCount(Part):
+    """How many frames the truth metrics rest on."""
+
+    frames: int
+    missing: Annotated[int, Field(description="frames without truth, or that the estimator did not reach")]
+
+
+class CommonRmse(Part):
+    """RMSE over the frames that all ranked estimators have, m."""
+
+    rmse: Number
+    frames: int
+
+
+class EstimatorSummary(Part):
+    """One estimator."""
+
+    status: Literal["ok", "recovered", "failed"]
+    reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
+    seconds: Annotated[float, Field(description="for the whole answer, s")]
+    frames_per_second: Number
+    reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
+    reprojection_used: Annotated[Reprojection, Field(description="over those it used")]
+    reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
+    components: dict[str, Component]
+    divergence: Divergence | None
+    coverage: Annotated[float, Field(description="share of the recording's time in which it has poses")]
+    divergence_common: Annotated[
+        CommonRmse | None, Field(description="over the frames that all ranked estimators have: what ranks it")
+    ]
+    ate_common: Annotated[CommonRmse | None, Field(description="the same of the error to truth after alignment")]
+    ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
+    ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
+    truth: TruthCount | None
+    nees: NeesInDetail | None
+    covariance: CovarianceCount | None
+    nees_reference: ReferenceNees | None
+    sigma_ratio: SigmaRatio | None
+    nis: Nis | None
+    whitened: Whitened
+    moved_points: MovedPoints
+    map: MapDifference | None
+    held_out: HeldOutError | None
+    landmarks: int
+    observations: ObservationCount
+    samples: Annotated[
+        dict[str, dict[str, float]],
+        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of the time"),
+    ]
+    events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
+    notes: Annotated[dict[str, str], Field(description="why values are null: by key, for all below it; * for all")]
+
+
+TOO_FEW = "it has too few frames in common with the other estimators to be ranked"
+
+
+def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
+    """Summary of an estimator, whose figures may be NaN or infinite."""
+    estimate, table, t = result.estimate, result.reprojection, run.problem.sequence.t
+    common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
+    offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())
+    seconds = estimate.seconds_total
+    values = {
+        "status": str(estimate.status),
+        "reason": estimate.reason,
+        "seconds": seconds,
+        "frames_per_second": run.problem.n_frames / seconds if seconds > 0 else math.nan,
+        "reprojection": compare.reprojection_summary(table),
+        "reprojection_used": compare.reprojection_summary(table[table["used"]]),
+        "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
+        "components": compare.component_summary(table),
+        "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
+        "coverage": compare.time_coverage(t[np.isfinite(estimate.world_T_imu[:, 0, 0])], t),
+        "divergence_common": None if result.divergence_common is None else asdict(result.divergence_common),
+        "ate_common": None if result.ate_common is None else asdict(result.ate_common),
+        "ate": None if result.truth_aligned is None else compare.summarized(result.truth_aligned["position"]),
+        "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
+        "truth": None if result.truth is None else _truth_count(result.truth),
+        **summarize_evidence(run, result),
+        "landmarks": len(estimate.landmarks),
+        "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
+        "samples": samples(run, result) if result.answered else {},
+        "events": dict(sorted(Counter(event.kind for event in estimate.events).items())),
+    }
+    return {**values, "notes": _notes(run, result, nulls(values))}
+
+
+def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict[str, str]:
+    """Why values are null, by key: for all that lies below it, `*` for all.
+
+    `absent` are their paths, and whether a value is infinite.
+    """
+    estimate = result.estimate
+    if not result.answered:
+        return {"*": f"the estimator failed: {estimate.reason}"}
+    reached = bool(np.isfinite(estimate.world_T_imu[-1]).all())
+    last = "the last frame has no truth" if reached else "it did not reach the last frame"
+    no_truth = result.truth is None
+    reasons = {
+        "reprojection": None if len(estimate.landmarks) else "it estimated no landmarks",
+        "reprojection_used": None if estimate.used.any() else "it uses no observations",
+        "reprojection_common": "it has none of the observations that every estimator used",
+        "components": None if len(estimate.landmarks) else "it estimated no landmarks",
+        "divergence": "there is no reference to diverge from" if result.divergence is None else None,
+        "divergence.final": "it or the reference did not reach the last frame",
+        "divergence.rotation_final_deg": "it or the reference did not reach the last frame",
+        "ate": "the recording has no truth" if no_truth else "no frame has both a pose and a truth",
+        "ate_common": "the recording has no truth" if no_truth else TOO_FEW,
+        "divergence_common": "there is no reference to diverge from" if result.divergence is None else TOO_FEW,
+        "ate_unaligned": "the recording has no truth" if no_truth else None,
+        "ate_unaligned.final": last,
+        "ate_unaligned.rotation_final_deg": last,
+        "truth": "the recording has no truth",
+        **evidence_notes(run, result),
+        "frames_per_second": "it took no measurable time",
+        "observations.share": "the problem has no observations",
+    }
+    noted: dict[str, str] = {}
+    for null, infinite in absent:
+        if infinite:
+            noted[null] = INFINITE
+            continue
+        key = next((k for k in (null, null.partition(".")[0]) if reasons.get(k)), null)
+        noted[key] = reasons.get(key) or "it is not a finite number"
+    return noted
+
+
+def _truth_count(table: pd.DataFrame) -> dict[str, int]:
+    frames = int(table["position"].notna().sum())
+    return {"frames": frames, "missing": len(table) - frames}

@@ -1,0 +1,49 @@
+"""Parts that the models of a run and of a comparison share: numbers, statistics of errors, NEES."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = float | None
+"""null for what is not a finite number; `notes` then says why"""
+
+
+class Part(BaseModel):
+    """An object of the file; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Spread(Part):
+    """Statistics of errors in m, over the frames that have one; null with the note `infinite` where one is infinite."""
+
+    rmse: Number
+    mean: Number
+    median: Number
+    p95: Number
+    max: Number
+    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
+
+
+class Divergence(Spread):
+    """Of each pose from the reference's, m, without alignment."""
+
+    final: Number
+    rotation_rmse_deg: Number
+    rotation_final_deg: Number
+
+
+class Reprojection(Spread):
+    """Norm of the four pixel differences (uL, vL, uR, vR), px."""
+
+    under_3px: Annotated[Number, Field(description="share, 0 to 1")]
+    behind_camera: Annotated[int, Field(description="observations whose landmark lies behind the camera")]
+    n: Annotated[int, Field(description="observations that the figures are over")]
+
+
+class Nees(Part):
+    """Normalised estimation error squared of the poses against truth, error log(T^-1 T_true) in the body frame."""
+
+    mean: Annotated[Number, Field(description="6 is expected")]
+    median: Annotated[Number, Field(description="5.35 is expected")]
+    frames: int
