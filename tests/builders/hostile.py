@@ -203,30 +203,30 @@ class Hostile:
 BLIND = tuple(name for name in ESTIMATORS if name != "dead-reckoning")
 RECORDINGS = (
     Hostile("nothing is wrong", base),
-    Hostile("every observation wrong from half of it on", wrong_from_half, note="the mask takes them out"),
+    Hostile("every observation wrong from half of it on", wrong_from_half, note="the mask excludes them"),
     Hostile("no features for 5 s", blind),
     Hostile("a standing start of 3 s", standing_start),
     Hostile("all landmarks behind the camera", behind, overconfident=(), fails=BLIND, note="no observation is left"),
     Hostile("all landmarks at infinity", at_infinity, overconfident=()),
     Hostile("zero and negative disparities only", no_positive_disparity, overconfident=(), fails=BLIND),
-    Hostile("a gap of 10 s", gap, note="what the velocity may have done meanwhile is allowed for"),
+    Hostile("a gap of 10 s", gap, note="the noise allows for changes of the velocity in the gap"),
     Hostile(
         "50 m cut out, stamps as if nothing was",
         cut,
         overconfident=ESTIMATORS,
-        note="nothing in the recording tells of it but that all tracks end at once, which diagnosis and trust say",
+        note="only the end of all tracks at once shows it; diagnosis and trust report that",
     ),
     Hostile(
         "one velocity sample of 500 m/s",
         velocity_jump,
         overconfident=ESTIMATORS,
-        note="the diagnosis takes it for noise and a turned camera; the reference is said to be untrusted",
+        note="the diagnosis takes it for noise and a rotated camera; the reference is untrusted",
     ),
     Hostile("one landmark only", one_landmark, overconfident=()),
     Hostile(
         "2000 features in a frame",
         crowd,
-        note="over three frames; `joint-ekf` lets 512 of them into its state and tells what that left out",
+        note="over three frames; `joint-ekf` initializes 512 of them and reports the rest",
     ),
 )
 
