@@ -21,10 +21,13 @@ class Exports(griffe.Extension):
             member = module.members[name]
             if isinstance(member, griffe.Alias):
                 member.resolve_target()
-        for module, name in exported:
-            hidden = module.members[name]
-            if hidden.is_module and not hidden.is_init_module and name in hidden.members:
-                module.set_member(name, hidden.members[name])
+        hidden = [
+            (module, name, module.modules_collection[module.imports[name]])
+            for module, name in exported
+            if module.members[name].is_module and module.imports.get(name, "") not in ("", module.members[name].path)
+        ]
+        for module, name, member in hidden:
+            module.set_member(name, member)
 
 
 def _below(module: griffe.Module) -> list[griffe.Module]:

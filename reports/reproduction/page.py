@@ -25,7 +25,7 @@ STAGES = (
     Column("from dead reckoning, RMS"),
     Column("largest"),
     Column("reprojection", unit="px"),
-    Column("behind the camera"),
+    Column("share behind the camera"),
     Column("frames lost"),
     Column("an update moves a frame by"),
 )

@@ -258,11 +258,14 @@ def test_what_a_form_cannot_hold_is_not_written(tmp_path):
 
 @settings(max_examples=60, deadline=None)
 @given(st.binary(max_size=200) | st.text(alphabet="0123456789.e-, \n#x", max_size=300).map(str.encode))
-def test_arbitrary_bytes_are_an_input_error(tmp_path_factory, content):
+def test_arbitrary_bytes_are_finite_poses_or_an_input_error(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("bytes") / "a"
     path.write_bytes(content)
-    with pytest.raises(InputError):
-        read_trajectory(path)
+    try:
+        numbers = read_trajectory(path)  # such as b"0 0 0 0": one position
+    except InputError:
+        return
+    assert np.isfinite(numbers.world_T_body).all()
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
