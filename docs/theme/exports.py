@@ -21,13 +21,14 @@ class Exports(griffe.Extension):
             member = module.members[name]
             if isinstance(member, griffe.Alias):
                 member.resolve_target()
-        hidden = [
-            (module, name, module.modules_collection[module.imports[name]])
-            for module, name in exported
-            if module.members[name].is_module and module.imports.get(name, "") not in ("", module.members[name].path)
-        ]
-        for module, name, member in hidden:
-            module.set_member(name, member)
+        functions = []
+        for module, name in exported:
+            path = module.imports.get(name)
+            hidden = module.members[name]
+            if hidden.is_module and path is not None and path != hidden.path:
+                functions.append((module, name, module.modules_collection[path]))
+        for module, name, function in functions:
+            module.set_member(name, function)
 
 
 def _below(module: griffe.Module) -> list[griffe.Module]:
