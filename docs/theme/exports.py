@@ -21,10 +21,14 @@ class Exports(griffe.Extension):
             member = module.members[name]
             if isinstance(member, griffe.Alias):
                 member.resolve_target()
+        functions = []
         for module, name in exported:
+            path = module.imports.get(name)
             hidden = module.members[name]
-            if hidden.is_module and not hidden.is_init_module and name in hidden.members:
-                module.set_member(name, hidden.members[name])
+            if hidden.is_module and path is not None and path != hidden.path:
+                functions.append((module, name, module.modules_collection[path]))
+        for module, name, function in functions:
+            module.set_member(name, function)
 
 
 def _below(module: griffe.Module) -> list[griffe.Module]:
