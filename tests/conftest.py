@@ -12,9 +12,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import settings
+
+from .builders.course_file import course_arrays
 
 settings.register_profile("fgbaseline", deadline=None)  # a busy machine is no failure
 settings.load_profile("fgbaseline")
@@ -52,19 +53,7 @@ def recordings() -> Callable[[str], Path]:
     return path
 
 
-@pytest.fixture
-def course_arrays() -> dict[str, Any]:
+@pytest.fixture(name="course_arrays")
+def _course_arrays() -> dict[str, Any]:
     """The arrays of a later course file: 6 frames, 5 landmarks, 7 observations."""
-    random = np.random.default_rng(2)
-    features = np.full((4, 5, 6), -1.0)
-    for landmark, frame in ((0, 0), (0, 1), (1, 1), (2, 3), (4, 3), (4, 4), (4, 5)):
-        features[:, landmark, frame] = random.uniform(0.0, 600.0, 4)
-    return {
-        "time_stamps": 1.3e9 + 0.1 * np.arange(6)[None, :],
-        "linear_velocity": random.normal(size=(3, 6)),
-        "angular_velocity": random.normal(size=(3, 6)),
-        "K": np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]]),
-        "b": np.array(0.5),
-        "imu_T_cam": np.array([[0.0, 0, 1, 1.5], [1, 0, 0, 0.2], [0, 1, 0, -0.6], [0, 0, 0, 1]]),
-        "features": features,
-    }
+    return course_arrays()

@@ -61,25 +61,25 @@ def _velocities(diagnosis: Diagnosis) -> dict[str, Any]:
     scale, scale_deviation = diagnosis.velocity_scale
     timing, dt = diagnosis.timing, float(np.median(diagnosis.sequence.dt))
     angle, angle_deviation = diagnosis.misalignment
-    told, when = diagnosis.fit is not None, timing.identifiable
+    fitted, when = diagnosis.fit is not None, timing.identifiable
     return {
         "axes": {
             "angular_velocity": diagnosis.angular.matrix.tolist(),
             "linear_velocity": diagnosis.linear.matrix.tolist(),
-            "angular": _axes(diagnosis.angular, told),
-            "linear": _axes(diagnosis.linear, told),
+            "angular": _axes(diagnosis.angular, fitted),
+            "linear": _axes(diagnosis.linear, fitted),
         },
-        "gyro_bias": _if(told, diagnosis.gyro_bias),
-        "gyro_bias_std": _if(told, diagnosis.gyro_bias_deviation),
-        "velocity_scale": scale if told else np.nan,
+        "gyro_bias": _if(fitted, diagnosis.gyro_bias),
+        "gyro_bias_std": _if(fitted, diagnosis.gyro_bias_deviation),
+        "velocity_scale": scale if fitted else np.nan,
         "velocity_scale_std": scale_deviation,
         "time_offset_s": timing.shift if when else np.nan,
         "time_offset_std_s": timing.deviation if when else np.nan,
         "time_offset_frames": timing.shift / dt if when else np.nan,
         "interval": {"shift": diagnosis.shift, "name": _interval_name(diagnosis.shift)},
-        "misalignment_deg": _if(told, np.rad2deg(angle)),
-        "misalignment_std_deg": _if(told, np.rad2deg(angle_deviation)),
-        "disparity_offset_px": diagnosis.disparity_offset[0] if told else np.nan,
+        "misalignment_deg": _if(fitted, np.rad2deg(angle)),
+        "misalignment_std_deg": _if(fitted, np.rad2deg(angle_deviation)),
+        "disparity_offset_px": diagnosis.disparity_offset[0] if fitted else np.nan,
         "disparity_offset_std_px": diagnosis.disparity_offset[1],
     }
 
@@ -88,11 +88,11 @@ def _interval_name(shift: float) -> str:
     return next((usual.name.lower() for usual in Shift if usual == shift), "shifted")
 
 
-def _axes(axes: Axes, told: bool) -> dict[str, Any]:
+def _axes(axes: Axes, fitted: bool) -> dict[str, Any]:
     return {
         "convention": axes.name,
         "identifiable": list(axes.seen),
-        "lead": axes.margin if told else np.nan,
+        "lead": axes.margin if fitted else np.nan,
         "median_error_before": axes.before,
         "median_error_after": axes.after,
     }
@@ -134,8 +134,8 @@ def _tracks(tracks: TrackStatistics) -> dict[str, Any]:
     }
 
 
-def _if(told: bool, values: FloatArray) -> list[float]:
-    return [float(value) if told else np.nan for value in values]
+def _if(fitted: bool, values: FloatArray) -> list[float]:
+    return [float(value) if fitted else np.nan for value in values]
 
 
 def _without_nan(tree: Any, path: str, notes: dict[str, str], reason: str) -> Any:

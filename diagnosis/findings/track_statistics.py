@@ -35,9 +35,9 @@ class TrackStatistics:
     not_positive: int
     """observations whose disparity is zero or less"""
     tiny: int
-    """observations whose disparity is positive and at most `links.MIN_DISPARITY`"""
+    """observations whose disparity is positive and at most `track_segments.MIN_DISPARITY`"""
     rows: int
-    """observations with |vL - vR| above `links.MAX_ROW_MISMATCH`"""
+    """observations with |vL - vR| above `track_segments.MAX_ROW_MISMATCH`"""
     copied: int
     """observations that are the same to the bit as the frame before, in intervals whose tracks are copies"""
     usable: IntArray
@@ -79,14 +79,14 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
     links, wrong, moving, moving_after, after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0, 0.0
     odometry = diagnosis.odometry
     if odometry is not None:
-        told = odometry.known[odometry.links.frame]
+        known = odometry.known[odometry.links.frame]
         floor = max(1.0, WRONG_PIXEL / odometry.pixel_sigma)
-        outlier = told & (odometry.whitened > TRUNCATION * floor**2)
-        links = np.bincount(odometry.links.frame[told], minlength=n)
+        outlier = known & (odometry.whitened > TRUNCATION * floor**2)
+        links = np.bincount(odometry.links.frame[known], minlength=n)
         wrong = np.bincount(odometry.links.frame[outlier], minlength=n)
         moving = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier)
         repaired = repaired or repair(diagnosis, MaskSettings())
-        left = told & _left(sequence, repaired, odometry.links.before, odometry.links.after)
+        left = known & _left(sequence, repaired, odometry.links.before, odometry.links.after)
         after = float(outlier[left].mean()) if left.any() else 0.0
         moving_after = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier & left)
     return TrackStatistics(

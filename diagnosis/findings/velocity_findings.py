@@ -29,11 +29,11 @@ KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
 
 def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> tuple[Finding, ...]:
     """Significant faults, velocities first; none for a clean recording. `tracks` is `track_statistics(diagnosis)`."""
-    told: list[Finding] = [*diagnosis.sequence.findings]
+    findings: list[Finding] = [*diagnosis.sequence.findings]
     if diagnosis.recorded is not None:
-        told += unit_findings(diagnosis.units, diagnosis.recorded)
+        findings += unit_findings(diagnosis.units, diagnosis.recorded)
     if diagnosis.inversion is not None:
-        told.append(_extrinsic_inverse(*diagnosis.inversion))
+        findings.append(_extrinsic_inverse(*diagnosis.inversion))
     if diagnosis.fit is not None:
         parts: tuple[Callable[[Diagnosis], Finding | None], ...] = (
             _angular_axes,
@@ -44,8 +44,8 @@ def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> 
             _extrinsic,
             _disparity_offset,
         )
-        told += [finding for part in parts if (finding := part(diagnosis)) is not None]
-    return (*told, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_statistics(diagnosis)))
+        findings += [finding for part in parts if (finding := part(diagnosis)) is not None]
+    return (*findings, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_statistics(diagnosis)))
 
 
 def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -70,20 +70,22 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Parameters that the recording does not determine, one sentence each."""
     if diagnosis.cannot_tell:
         return (f"Nothing about the velocities: {diagnosis.cannot_tell}.",)
-    told = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
+    sentences = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
     if not diagnosis.timing.identifiable:
-        told.append("A delay between velocities and images: that needs turns that both show.")
+        sentences.append("A delay between velocities and images: that needs turns that both show.")
     deviation = diagnosis.gyro_bias_deviation
     if (deviation > KNOWN_BIAS).any():
-        told.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
+        sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
     if diagnosis.velocity_scale[1] > KNOWN_SCALE:
-        told.append(f"The scale of the velocities better than to {diagnosis.velocity_scale[1]:.1%}.")
+        sentences.append(f"The scale of the velocities better than to {diagnosis.velocity_scale[1]:.1%}.")
     angle = diagnosis.misalignment[1]
     loose = ["xyz"[i] for i in range(3) if angle[i] > KNOWN_ANGLE]
     if loose:
         worst = np.rad2deg(angle.max())
-        told.append(f"Whether imu_T_cam is turned about {listed(loose)}: the error is known to {worst:.1f}° at best.")
-    return tuple(sentence for sentence in told if sentence)
+        sentences.append(
+            f"Whether imu_T_cam is turned about {listed(loose)}: the error is known to {worst:.1f}° at best."
+        )
+    return tuple(sentence for sentence in sentences if sentence)
 
 
 def rate_error(diagnosis: Diagnosis, shift: float, bias: FloatArray, convention: str) -> float:
@@ -217,8 +219,10 @@ def _unseen(what: str, axes: Axes) -> str:
     if len(unseen) == 3:
         return f"In which axes the {what} was recorded: the motion excites none of them enough."
     rows = axes.name.split(",")
-    told = listed(f"{rows['xyz'.index(name)]} is along {name} of imu_T_cam" for name in "xyz" if name not in unseen)
+    determined = listed(
+        f"{rows['xyz'.index(name)]} is along {name} of imu_T_cam" for name in "xyz" if name not in unseen
+    )
     return (
-        f"All axes of the {what}: the motion shows only that its {told}, not which of its components are along "
+        f"All axes of the {what}: the motion shows only that its {determined}, not which of its components are along "
         f"{listed(unseen)}, or their signs."
     )

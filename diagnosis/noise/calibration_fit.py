@@ -95,9 +95,9 @@ def half_cost(
 def _components(fits: list[WindowFit], sigmas: NoiseSettings, baseline: float) -> NoiseSettings:
     residual = np.concatenate([fit.motion_residual for fit in fits])
     redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
-    told = redundancy > MIN_REDUNDANCY
-    share = np.where(told, residual**2 / np.maximum(redundancy, MIN_REDUNDANCY), np.nan)
-    variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if told.any(axis=0).all() else np.zeros(6)
+    redundant = redundancy > MIN_REDUNDANCY
+    share = np.where(redundant, residual**2 / np.maximum(redundancy, MIN_REDUNDANCY), np.nan)
+    variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if redundant.any(axis=0).all() else np.zeros(6)
     pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
     return NoiseSettings(
         pixel=max(FLOOR.pixel, sigmas.pixel * float(np.sqrt(pixel))),

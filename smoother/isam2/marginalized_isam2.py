@@ -19,7 +19,7 @@ from ..graph.keys import AUXILIARY_POSE
 from .checkpointed_isam2 import CheckpointedISAM2
 
 AUXILIARY_NOISE = gtsam.noiseModel.Unit.Create(6)
-"""of the newest pose to the tail, see `keys.TAIL`; as nothing else holds that, it does not matter how strong"""
+"""between the newest pose and `keys.AUXILIARY_POSE`; as nothing else holds that one, it does not matter how strong"""
 IN_PRIOR = -1
 """stands for a factor's slot in the tree, where it is no longer one, or was removed"""
 NO_POSE = -1

@@ -68,3 +68,13 @@ def information(problem: Problem, state: State) -> FloatArray:
         columns.append((up - down) / (2.0 * h))
     J = np.stack(columns, axis=1)
     return J.T @ J
+
+
+def assert_no_small_step_lowers_the_cost(problem: Problem, state: State) -> None:
+    """The state is a minimum: steps are shares of the standard deviations, in the valley and not up its walls."""
+    lowest, random = cost(problem, state), np.random.default_rng(2)
+    L_inverse = np.linalg.inv(np.linalg.cholesky(information(problem, state)))
+    for size in (1e-1, 1e-2, 1e-3):
+        for _ in range(20):
+            step = L_inverse.T @ random.standard_normal(state.size)
+            assert cost(problem, state.moved(size * step)) > lowest

@@ -22,6 +22,7 @@ from fgbaseline.reports.checking.limits_file import read_limits
 from fgbaseline.reports.comparing.run_folder import read_run_folder
 from fgbaseline.reports.results.reader import read_folder, read_measured
 
+from .course_file import course_arrays
 from .summaries import estimator, summary
 from .synthetic import Scene, drive, plain_problem
 from .trajectory_writers import VARIANTS, Path3D
@@ -56,26 +57,6 @@ def _file(name: str, *readers: Callable[[Path], object]) -> Callable[[bytes, Pat
             raise refused[0]
 
     return read
-
-
-def course_arrays() -> dict[str, Any]:
-    """A later course file with truth: 6 frames, 5 landmarks."""
-    random = np.random.default_rng(2)
-    features = np.full((4, 5, 6), -1.0)
-    for landmark, frame in ((0, 0), (0, 1), (1, 1), (2, 3), (4, 3), (4, 4), (4, 5)):
-        features[:, landmark, frame] = random.uniform(0.0, 600.0, 4)
-    return {
-        "time_stamps": 1.3e9 + 0.1 * np.arange(6)[None, :],
-        "linear_velocity": random.normal(size=(3, 6)),
-        "angular_velocity": random.normal(size=(3, 6)),
-        "K": np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]]),
-        "b": np.array(0.5),
-        "imu_T_cam": np.array([[0.0, 0, 1, 1.5], [1, 0, 0, 0.2], [0, 1, 0, -0.6], [0, 0, 0, 1]]),
-        "features": features,
-        "ground_truth": np.tile(np.eye(4), (6, 1, 1)),
-        "landmarks": random.normal(size=(3, 5)),
-        "up_imu": np.array([0.0, 0.0, 1.0]),
-    }
 
 
 def npz(save: Callable[..., None] = np.savez, **arrays: Any) -> bytes:
@@ -262,7 +243,7 @@ def _problem_npz() -> Reader:
 
 def readers() -> dict[str, Reader]:
     """By name."""
-    course = course_arrays()
+    course = course_arrays(truth=True)
     t, poses = _poses()
     trajectory = {"t": t, "world_T_body": poses, "covariance": np.tile(np.eye(6), (len(t), 1, 1))}
     paths = (read_trajectory, read_pose_covariances)
