@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from .observations import BoolArray, IntArray
 
@@ -147,17 +147,32 @@ class Estimate:
     """of a filter that records them"""
     gyro_bias: GyroBias | None = None
     """where it was estimated along with the poses"""
+    velocity: FloatArray | None = None
+    """(T, 3) m/s in world axes; estimated from raw inertial data, as are the two biases"""
+    gyroscope_bias: FloatArray | None = None
+    """(T, 3) rad/s"""
+    accelerometer_bias: FloatArray | None = None
+    """(T, 3) m/s^2"""
+    state_covariance: FloatArray | None = None
+    """(T, 15, 15) of the errors [translation, rotation, velocity, gyroscope bias, accelerometer bias]: right
+    perturbation of the pose, additive otherwise; its first 6 x 6 block is `covariance`"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further answers that the same run gave at no cost, by the name they are registered under"""
 
     def moved(self, motion: FloatArray) -> "Estimate":
         """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
-        R, landmarks = motion[:3, :3], self.landmarks
+        R, landmarks, state_covariance = motion[:3, :3], self.landmarks, self.state_covariance
+        if state_covariance is not None:  # the velocity's error is in world axes
+            turn = np.eye(strapdown.STATE)
+            turn[strapdown.VELOCITY, strapdown.VELOCITY] = R
+            state_covariance = turn @ state_covariance @ turn.T
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(
             self,
             world_T_imu=motion @ self.world_T_imu,
             landmarks=Landmarks(landmarks.index, se3.transform(motion, landmarks.position), covariance),
+            velocity=None if self.velocity is None else self.velocity @ R.T,
+            state_covariance=state_covariance,
             by_products={name: other.moved(motion) for name, other in self.by_products.items()},
         )
 

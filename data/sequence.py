@@ -8,6 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
 
 from .finding import Finding
 from .finite import LARGEST, measurable
+from .imu import ImuSamples
 from .observations import BoolArray, Observations
 
 ROTATION_TOLERANCE = 1e-6
@@ -22,6 +23,12 @@ class Truth:
     landmarks: FloatArray | None = None
     """(N, 3) m, one row per landmark of the sequence; NaN where it is not known"""
     source: str = "in the recording"
+    velocity: FloatArray | None = None
+    """(T, 3) m/s in world axes, of a recording with raw inertial data; NaN where it is not known"""
+    gyroscope_bias: FloatArray | None = None
+    """(T, 3) rad/s; NaN where it is not known"""
+    accelerometer_bias: FloatArray | None = None
+    """(T, 3) m/s^2; NaN where it is not known"""
 
     @property
     def known(self) -> BoolArray:
@@ -47,20 +54,22 @@ class Truth:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sequence:
-    """A recording of T frames: body velocities and stereo tracks, as the recorder wrote them."""
+    """A recording of T frames, as the recorder wrote it: stereo tracks with body velocities or raw inertial samples."""
 
     name: str
     t: FloatArray
     """(T,) time stamps, s, strictly rising"""
     linear_velocity: FloatArray
-    """(T, 3) m/s in the IMU's frame"""
+    """(T, 3) m/s in the IMU's frame; (0, 3) with raw inertial samples"""
     angular_velocity: FloatArray
-    """(T, 3) rad/s in the IMU's frame"""
+    """(T, 3) rad/s in the IMU's frame; (0, 3) with raw inertial samples"""
     camera: StereoCamera
     imu_T_cam: FloatArray
     """(4, 4) extrinsic of the left camera"""
     observations: Observations
     n_landmarks: int
+    imu: ImuSamples | None = None
+    """raw inertial samples, in place of body velocities"""
     truth: Truth | None = None
     up_imu: FloatArray | None = None
     """(3,) unit vector: where up is in the IMU's frame at frame 0; by default the camera's -y axis"""
@@ -115,7 +124,9 @@ def check_sequence(s: Sequence) -> None:
     if T < 2:
         raise InputError(f"time_stamps: a sequence needs at least 2 frames, this one has {T}")
     for name, array in (("linear_velocity", s.linear_velocity), ("angular_velocity", s.angular_velocity)):
-        if array.shape != (T, 3):
+        if s.imu is not None and len(array):
+            raise InputError(f"{name}: a recording has body velocities or raw inertial samples, not both")
+        if array.shape != (0 if s.imu is not None else T, 3):
             raise InputError(f"{name}: expected 3 values for each of the {T} time stamps, got shape {array.shape}")
         _require_finite(name, array)
     _require_finite("time_stamps", s.t[:, None])

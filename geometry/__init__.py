@@ -1,6 +1,6 @@
 """Rotations, rigid motions, the stereo camera and its measurement model on stacked arrays; the error base class."""
 
-from . import se3, so3
+from . import se3, so3, strapdown
 from .errors import FgbaselineError, InputError
 from .measurement import HuberKernel, StereoMeasurement
 from .so3 import FloatArray
@@ -16,4 +16,5 @@ __all__ = [
     "disparity",
     "se3",
     "so3",
+    "strapdown",
 ]

@@ -137,7 +137,7 @@ def right_jacobian(twist: ArrayLike) -> FloatArray:
     V, W = hat3(xi[..., :3]), hat3(xi[..., 3:])
     angle = np.linalg.norm(xi[..., 3:], axis=-1)
     c, square, WV, VW = angle_coefficients(angle), W @ W, W @ V, V @ W
-    quartic, quintic = (coefficient[..., None, None] for coefficient in _higher_coefficients(angle))
+    quartic, quintic = (coefficient[..., None, None] for coefficient in higher_coefficients(angle))
     J = np.zeros((*xi.shape[:-1], 6, 6))
     J[..., :3, :3] = J[..., 3:, 3:] = np.eye(3) + c.cosine[..., None, None] * W + c.cubic[..., None, None] * square
     WVW = WV @ W
@@ -155,7 +155,7 @@ def inverse_right_jacobian(twist: ArrayLike) -> FloatArray:
     return np.asarray(np.linalg.inv(right_jacobian(twist)), dtype=np.float64)
 
 
-def _higher_coefficients(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def higher_coefficients(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(x^2 / 2 + cos x - 1) / x^4 and (2 x - 3 sin x + x cos x) / (2 x^5) of angles x (...,); series below 0.3."""
     small = angle < 0.3
     x, y = np.where(small, 1.0, angle), np.where(small, angle, 0.0) ** 2

@@ -11,6 +11,7 @@ from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence
+from .inertial import ImuIntervals, InertialStart
 
 
 class Excluded(IntEnum):
@@ -74,6 +75,9 @@ class LandmarkPrior:
 class Problem:
     """A state estimation problem over T frames: world_T_imu of every frame and the positions of m landmarks.
 
+    With raw inertial data each frame also has a velocity and biases: `imu` takes the place of the increments, `start`
+    that of `initial_covariance`, and z of the world points up.
+
     Minimize the sum of squared whitened residuals of the increments (right perturbation [v, w], covariance
     `increment_covariance`), of the stereo observations (each of the four rows with variance `pixel_variance`,
     under `kernel`) and of `landmark_prior`, with the first pose at `initial_pose` with `initial_covariance`
@@ -84,9 +88,10 @@ class Problem:
     sequence: Sequence
     """the recording as the estimators see it: repaired, where the preset repairs"""
     increment: FloatArray
-    """(T-1, 6) twist [v, w] times dt (m, rad): frame k to frame k+1 is exp(hat(increment[k]))"""
+    """(T-1, 6) twist [v, w] times dt (m, rad): frame k to frame k+1 is exp(hat(increment[k])); (0, 6) with raw inertial
+    data"""
     increment_covariance: FloatArray
-    """(T-1, 6, 6)"""
+    """(T-1, 6, 6); (0, 6, 6) with raw inertial data"""
     pixel_variance: float
     """px^2, of each of uL, vL, uR, vR"""
     features: IntArray
@@ -97,6 +102,10 @@ class Problem:
     """(4, 4) world_T_imu of frame 0"""
     initial_covariance: FloatArray
     """(6, 6) of the right perturbation of the first pose; zero holds it"""
+    imu: ImuIntervals | None = None
+    """samples between the frames, where the recording has raw inertial data"""
+    start: InertialStart | None = None
+    """velocity, biases and covariance (15, 15) at frame 0; given together with `imu`"""
     landmark_prior: LandmarkPrior | None = None
     kernel: HuberKernel | None = None
     mapping_pixel_variance: float | None = None

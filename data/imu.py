@@ -1,0 +1,93 @@
+"""Raw samples of an inertial measurement unit: gyroscope, accelerometer, noise densities and gravity."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from .finite import measurable
+
+STANDARD_GRAVITY = 9.81
+"""m/s^2, where a recording does not state it"""
+
+
+@dataclass(frozen=True, slots=True)
+class ImuNoise:
+    """Noise of an IMU in continuous time, as EuRoC's `sensor.yaml` and Kalibr's `imu.yaml` have it.
+
+    measured = true + bias + white noise; the biases are random walks. Raises InputError for a density that is not
+    positive, and for a walk that is negative.
+    """
+
+    gyroscope_density: float
+    """rad/s/sqrt(Hz)"""
+    gyroscope_walk: float
+    """rad/s^2/sqrt(Hz)"""
+    accelerometer_density: float
+    """m/s^2/sqrt(Hz)"""
+    accelerometer_walk: float
+    """m/s^3/sqrt(Hz)"""
+
+    @property
+    def densities(self) -> FloatArray:
+        """(4,) the values in the order of the fields."""
+        return np.array([getattr(self, field.name) for field in fields(self)])
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            density = field.name.endswith("density")
+            if not (np.isfinite(value) and (value > 0.0 if density else value >= 0.0)):
+                expected = "a positive number" if density else "a number from 0 on"
+                raise InputError(f"imu_noise: {field.name} is {value!r}, expected {expected}")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ImuSamples:
+    """M raw samples in the IMU's frame, in the clock of the frames. Raises InputError where they cannot be used."""
+
+    t: FloatArray
+    """(M,) time stamps, s, strictly increasing"""
+    angular_velocity: FloatArray
+    """(M, 3) rad/s"""
+    specific_force: FloatArray
+    """(M, 3) m/s^2; at rest it is +gravity upward"""
+    noise: ImuNoise
+    gravity: float = STANDARD_GRAVITY
+    """magnitude, m/s^2"""
+
+    def __post_init__(self) -> None:
+        M = len(self.t)
+        if M < 2:
+            raise InputError(f"imu_time_stamps: raw inertial data needs at least 2 samples, this one has {M}")
+        for name in ("angular_velocity", "specific_force"):
+            array = getattr(self, name)
+            if array.shape != (M, 3):
+                raise InputError(f"imu_{name}: expected 3 values for each of the {M} samples, got shape {array.shape}")
+            finite = measurable(array).all(axis=1)
+            if not finite.all():
+                k = int(np.argmin(finite))
+                raise InputError(f"imu_{name}: sample {k} is not finite: {array[k].tolist()}")
+        rising = np.diff(self.t) > 0.0
+        if not (np.isfinite(self.t).all() and rising.all()):
+            k = int(np.argmin(rising))
+            raise InputError(
+                f"imu_time_stamps: stamps must rise, but sample {k + 1} ({self.t[k + 1]!r} s) is not after sample {k} "
+                f"({self.t[k]!r} s)"
+            )
+        if not (np.isfinite(self.gravity) and self.gravity > 0.0):
+            raise InputError(f"gravity: expected a positive magnitude in m/s^2, got {self.gravity!r}")
+        for array in (self.t, self.angular_velocity, self.specific_force):
+            array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:  # constructed again, so that a copy is read-only too
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def period(self) -> float:
+        """Median interval between samples, s."""
+        return float(np.median(np.diff(self.t)))
