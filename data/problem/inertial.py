@@ -29,9 +29,9 @@ class InertialStart:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ImuIntervals:
-    """Samples cut at the frames: P pieces of constant angular velocity and specific force, those of interval k together.
+    """Samples cut at the frames: P pieces of constant angular velocity and specific force, in order.
 
-    A piece lies between neighbouring instants of samples and frames and holds the mean of the two interpolated values,
+    A piece lies between neighboring instants of samples and frames and holds the mean of the two interpolated values,
     so its error is of second order in the length of a piece.
     """
 
