@@ -9,10 +9,10 @@ from threadpoolctl import threadpool_limits
 from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
 from fgbaseline.data.problem import Problem
 
+from ..motion_model import POSE, BodyHistory
 from .filter import JointFilter
-from .gyro_bias import GyroBiasPrior
+from .gyro_bias import BIAS, GyroBiasPrior
 from .settings import JointSettings, Linearization
-from .state import BIAS, POSE
 
 BIAS_BLOCK = slice(POSE, POSE + BIAS)
 
@@ -57,33 +57,30 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     start = time.perf_counter()
     T = problem.n_frames
     joint = JointFilter(problem, settings)
-    poses = np.full((T, 4, 4), np.nan)
-    covariances = np.full((T, 6, 6), np.nan)
-    bias = GyroBias(np.full((T, BIAS), np.nan), np.full((T, BIAS, BIAS), np.nan))
+    history = BodyHistory(T, joint.motion.start)
     seconds = np.zeros(T)
     failure = ""
     for k, seen in enumerate(problem.observations().by_frame(T)):
         frame_start = time.perf_counter()
         joint.process_frame(k, seen)
-        covariance = joint.state.P[:POSE, :POSE]
-        if not (np.isfinite(joint.state.pose).all() and np.isfinite(covariance).all()):
+        body, n = joint.state.body, joint.state.n_body
+        covariance = joint.state.P[:n, :n]
+        if not (np.isfinite(body.pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
             break
-        poses[k], covariances[k] = joint.state.pose, covariance
-        if settings.gyro_bias is not None:
-            bias.mean[k], bias.covariance[k] = joint.state.bias, joint.state.P[BIAS_BLOCK, BIAS_BLOCK]
+        history.record(k, body, covariance)
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
+    bias = None
     if settings.gyro_bias is not None:
+        bias = GyroBias(history.additive, np.ascontiguousarray(history.covariance[:, BIAS_BLOCK, BIAS_BLOCK]))
         joint.events += _bias_events(bias)
     if not failure:
         joint.finish()
     status, reason = _status(failure, joint, T)
     return Estimate(
         name="joint-ekf",
-        world_T_imu=poses,
-        covariance=covariances,
         landmarks=joint.map.landmarks(problem.features),
         used=problem.scatter_mask(joint.used),
         status=status,
@@ -92,7 +89,8 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         seconds_total=time.perf_counter() - start,
         events=tuple(joint.events),
         innovations=joint.innovations,
-        gyro_bias=None if settings.gyro_bias is None else bias,
+        gyro_bias=bias,
+        **history.fields(),
     )
 
 
