@@ -16,7 +16,7 @@ IMU_T_CAM[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 NOISE = ImuNoise(2e-3, 2e-5, 2e-2, 3e-3)
 START_SIGMA = np.repeat([0.0, 0.01, 0.05, 2e-3, 2e-2], 3)
 """of the true start about the given one; heading and position are exact"""
-MIN_DISPARITY = 3.0
+MIN_DISPARITY = 6.0
 """px, of the exact pixels"""
 STEP = 1e-4
 """s, of the finite differences that give the true samples"""
