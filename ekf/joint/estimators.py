@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
 from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FgbaselineError
 
 from ..motion_model import POSE, BodyHistory
 from .filter import JointFilter
@@ -20,19 +21,29 @@ BIAS_BLOCK = slice(POSE, POSE + BIAS)
 def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
     """EKF-SLAM with one joint state: pose, optional gyroscope bias and landmarks, with all cross-covariances.
 
-    A landmark is initialized at its first observation (or at the problem's prior) and marginalized once
-    `JointSettings.unseen_frames` consecutive frames have not observed it. For tracks without longer gaps the poses
-    equal those of the filter that keeps every landmark. A landmark observed again later is initialized as a new one.
-    Marginalized landmarks keep their estimate and covariance.
+    With raw inertial samples the state has velocity and both biases. A landmark is initialized at its first observation
+    (or at the problem's prior) and marginalized once `JointSettings.unseen_frames` consecutive frames have not observed
+    it. For tracks without longer gaps the poses equal those of the filter that keeps every landmark. A landmark
+    observed again later is initialized as a new one. Marginalized landmarks keep their estimate and covariance.
+
+    Raises FgbaselineError for `gyro_bias` in the settings of a problem with raw inertial samples.
     """
+    settings = settings or JointSettings()
+    if problem.imu is not None and settings.gyro_bias is not None:
+        raise FgbaselineError(
+            "joint-ekf-bias takes body velocities only: with raw inertial samples joint-ekf estimates both biases"
+        )
     if len(problem.observations()) == 0:
         return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
     with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _run(problem, progress, settings or JointSettings())
+        return _run(problem, progress, settings)
 
 
 def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`."""
+    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`, of body velocities.
+
+    Raises FgbaselineError for raw inertial samples.
+    """
     settings = JointSettings(gyro_bias=GyroBiasPrior())
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-bias")
 
