@@ -74,5 +74,10 @@ def interval_noise(real: Real, sequence: Sequence) -> ImuIntervals:
 
 def read_start(real: Real, source: str) -> InertialStart:
     """The start of an exported problem."""
-    names = ("start_velocity", "start_gyroscope_bias", "start_accelerometer_bias")
-    return InertialStart(*(real(name, 3) for name in names), real(START, 15, 15), source)
+    return InertialStart(
+        velocity=real("start_velocity", 3),
+        gyroscope_bias=real("start_gyroscope_bias", 3),
+        accelerometer_bias=real("start_accelerometer_bias", 3),
+        covariance=real(START, 15, 15),
+        source=source,
+    )

@@ -68,16 +68,19 @@ def _vectors(archive: NpzArchive, key: str, M: int) -> FloatArray:
 
 def read_state_truth(archive: NpzArchive, truth: Truth) -> Truth:
     """The truth with the velocity and the biases of the npz, where it has them."""
-    T = len(truth.world_T_imu)
-    found = {}
-    for name in STATE_TRUTH:
-        key = f"true_{name}"
-        if key in archive.keys:
-            array = archive.array(key)
-            if array.shape != (3, T):
-                raise InputError(f"{key}: expected shape (3, {T}), got {array.shape}")
-            found[name] = np.ascontiguousarray(array.T)
-    return replace(truth, **found)
+    velocity, gyroscope_bias, accelerometer_bias = (
+        _true_vectors(archive, f"true_{name}", len(truth.world_T_imu)) for name in STATE_TRUTH
+    )
+    return replace(truth, velocity=velocity, gyroscope_bias=gyroscope_bias, accelerometer_bias=accelerometer_bias)
+
+
+def _true_vectors(archive: NpzArchive, key: str, T: int) -> FloatArray | None:
+    if key not in archive.keys:
+        return None
+    array = archive.array(key)
+    if array.shape != (3, T):
+        raise InputError(f"{key}: expected shape (3, {T}), got {array.shape}")
+    return np.ascontiguousarray(array.T)
 
 
 def imu_arrays(imu: ImuSamples) -> dict[str, FloatArray]:

@@ -15,7 +15,7 @@ from .ground_truth import BodyFrame, attach_truth
 from .imu_arrays import assumed_noise
 from .imu_attachment import attach_imu
 from .imu_csv import read_imu_csv
-from .imu_yaml import read_imu_calibration
+from .imu_yaml import ImuCalibration, read_imu_calibration
 from .mat_file import MatFile
 from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
@@ -54,12 +54,12 @@ def read(
 
 
 def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -> Sequence:
-    noise, gravity, said = ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),)
+    found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),))
     if calibration is not None:
-        noise, gravity, said = read_imu_calibration(calibration)
-    raw = read_imu_csv(imu, noise, gravity)
+        found = read_imu_calibration(calibration)
+    raw = read_imu_csv(imu, found.noise, found.gravity)
     with reading(imu):
-        return attach_imu(sequence, raw._replace(remarks=(*said, *raw.remarks)), shown(imu))
+        return attach_imu(sequence, raw._replace(remarks=(*found.remarks, *raw.remarks)), shown(imu))
 
 
 def _read(file: Path, source: str) -> Sequence:
