@@ -137,7 +137,9 @@ class Sequence:
 
     @property
     def up(self) -> FloatArray:
-        """(3,) the unit vector that points up, in the world (the IMU's frame at frame 0)."""
+        """(3,) the unit vector that points up in the world: the IMU's frame at frame 0, or z up with raw samples."""
+        if self.imu is not None:
+            return np.array([0.0, 0.0, 1.0])
         assert self.up_imu is not None
         return self.up_imu
 

@@ -30,6 +30,7 @@ def inertial_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
             "imu_linear_acceleration": imu.specific_force,
             "imu_noise": imu.noise.densities,
             "gravity": np.array(imu.gravity),
+            "up_imu": np.asarray(problem.sequence.up_imu),
         }
     if cut is not None:
         arrays["interval_noise"] = cut.densities

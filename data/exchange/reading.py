@@ -157,6 +157,6 @@ def _sequence(numbers: _Numbers, words: dict[str, Any]) -> Sequence:
         observations=Observations(frame, landmark, numbers.real("pixel", n, 4)),
         n_landmarks=n_landmarks,
         imu=imu,
-        up_imu=numbers.real("up", 3),
+        up_imu=numbers.real("up_imu" if numbers.has("up_imu") else "up", 3),
         remarks=words["sequence_remarks"],
     )

@@ -40,7 +40,7 @@ def _arrays(s: Sequence) -> dict[str, FloatArray]:
         "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
         "b": np.array(camera.baseline),
         "imu_T_cam": s.imu_T_cam,
-        "up_imu": s.up,
+        "up_imu": s.up if s.up_imu is None else s.up_imu,
     }
     if s.truth is not None:
         arrays["ground_truth"] = s.truth.world_T_imu

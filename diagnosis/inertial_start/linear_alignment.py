@@ -93,7 +93,7 @@ def _gravity_and_velocities(
         gravity = gravity + tangent @ solution[-2:]
         gravity *= imu.gravity / float(np.linalg.norm(gravity))
     states = np.concatenate([np.zeros(3), solution[: 6 * n - 3]]).reshape(-1, 3)
-    return states[:n], states[n : 2 * n], gravity
+    return states[:n], states[n : 2 * n], np.asarray(gravity, dtype=np.float64)
 
 
 def _equations(motions: Motions, R: FloatArray, seen: RelativePoses) -> tuple[FloatArray, FloatArray]:

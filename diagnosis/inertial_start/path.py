@@ -76,9 +76,9 @@ def _initial(imu: ImuIntervals, frames: IntArray, relative: RelativePoses, start
 
 def _factor(states: States, relative: RelativePoses, length: int) -> float:
     """The factor on the odometry's deviations that makes the median error over `length` intervals chi-square."""
-    runs = np.split(np.arange(len(relative.first)), np.flatnonzero(np.diff(relative.first) != 1) + 1)
-    place = np.concatenate([np.arange(run[0], run[-1] + 2 - length, length) for run in runs if len(run)] or [[]])
-    place = place.astype(np.int64)
+    cuts = np.flatnonzero(np.diff(relative.first) != 1) + 1
+    runs = [run.tolist() for run in np.split(np.arange(len(relative.first)), cuts) if len(run)]
+    place = np.array([k for run in runs for k in range(run[0], run[-1] + 2 - length, length)], dtype=np.int64)
     if len(place) < MIN_WINDOWS:
         return 1.0
     motion, covariance = np.tile(np.eye(4), (len(place), 1, 1)), np.zeros((len(place), 6, 6))

@@ -84,8 +84,15 @@ def motions_between(imu: ImuIntervals, frames: IntArray, biases: FloatArray) -> 
         densities = np.asarray(imu.densities[a:b].max(axis=0))
         rate, force = imu.angular_velocity[at] - bias[:3], imu.specific_force[at] - bias[3:]
         motions.append(strapdown.integrate(rate, force, imu.dt[at], densities))
-    stacked = [np.array([motion[i] for motion in motions]) for i in range(len(strapdown.ImuMotion._fields))]
-    return Motions(*stacked, biases=biases)
+    return Motions(
+        rotation=np.array([motion.rotation for motion in motions]),
+        velocity=np.array([motion.velocity for motion in motions]),
+        position=np.array([motion.position for motion in motions]),
+        dt=np.array([motion.dt for motion in motions]),
+        transition=np.array([motion.transition for motion in motions]),
+        noise=np.array([motion.noise for motion in motions]),
+        biases=biases,
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
