@@ -91,8 +91,9 @@ class InertialMotion:
 
 def motion_model(problem: Problem) -> MotionModel:
     """Motion model of the problem's recording."""
-    if problem.imu is None or problem.start is None:
+    if problem.imu is None:
         return VelocityMotion(problem)
+    assert problem.start is not None
     return InertialMotion(problem.initial_pose, problem.start, problem.imu)
 
 
