@@ -14,7 +14,7 @@ from ..problem.inertial import imu_intervals
 from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
 from .columns import Order
-from .inertial_truth import inertial_truth
+from .inertial_truth import inertial_truth, with_state
 from .named_file import FilePath, reading, shown
 from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
@@ -44,20 +44,24 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
             f"{shown(path)}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
     with reading(path), np.errstate(all="ignore"):
-        poses, remarks = _poses_of_frames(sequence, path, frame)
+        poses, line, remarks = _poses_of_frames(sequence, path, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
         source = shown(path)
         inertial = sequence.imu is not None
         truth = inertial_truth(poses, source) if inertial else Truth.from_any_world(poses, source=source)
+        if inertial and frame == "imu":
+            truth = with_state(truth, path, line)
         missing = sequence.n_frames - int(truth.known.sum())
         if missing:
             remarks.append(f"{missing} of {sequence.n_frames} frames have no ground truth in {shown(path)}.")
         return replace(sequence, truth=truth, remarks=(*sequence.remarks, *remarks))
 
 
-def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> tuple[FloatArray, list[str]]:
-    """The poses (T, 4, 4) in the file's own world, NaN where it has none, and what there is to say of them."""
+def _poses_of_frames(
+    sequence: Sequence, path: FilePath, frame: BodyFrame | None
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """The poses (T, 4, 4) in the file's own world, NaN where it has none, their lines (T,) and what there is to say."""
     file = read_trajectory_file(path)
     if file.has_positions_only:
         raise InputError(
@@ -69,7 +73,7 @@ def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None
     if file.stamps is None:
         frames, lines = _frames(sequence, file)
         poses[frames] = file.trajectory().world_T_body[lines]
-        return poses, remarks
+        return poses, _lines(file, sequence.n_frames, frames, lines), remarks
     unit = _unit(sequence, file)
     if unit is not TimeUnit.S:
         remarks.append(f"The time stamps of {shown(path)} are in {unit.noun}: divided by {unit.per_second:,}.")
@@ -90,7 +94,15 @@ def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None
     apart = float(np.abs(sequence.t[frames] - read.t[nearest]).max())
     if apart:
         remarks.append(f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart.")
-    return poses, remarks
+    return poses, _lines(file, sequence.n_frames, frames, nearest), remarks
+
+
+def _lines(file: TrajectoryFile, n_frames: int, frames: IntArray, index: IntArray) -> IntArray:
+    """(T,) the line of the file that each frame's pose stands on; -1 where there is none."""
+    line = np.full(n_frames, -1, dtype=np.int64)
+    if file.line is not None:
+        line[frames] = file.line[index]
+    return line
 
 
 def _order(

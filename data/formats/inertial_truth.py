@@ -1,10 +1,18 @@
 """Truth of a recording with raw inertial samples: in the axes of its file, from the first frame that has a pose."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..observations import IntArray
 from ..sequence import Truth
+from .named_file import FilePath, regular_file
+from .number_table import numbers_of, read_lines
+
+STATE_WIDTH = 17
+"""columns of EuRoC's truth: stamp, position, quaternion, velocity, gyroscope and accelerometer bias"""
 
 
 def inertial_truth(poses: FloatArray, source: str) -> Truth:
@@ -19,3 +27,22 @@ def inertial_truth(poses: FloatArray, source: str) -> Truth:
     world_T_imu[:, :3, 3] -= poses[int(np.argmax(known)), :3, 3]
     world_T_imu[~known] = np.nan
     return Truth(world_T_imu, source=source)
+
+
+def with_state(truth: Truth, path: FilePath, line: IntArray) -> Truth:
+    """The truth with velocity and biases, where the file has EuRoC's 17 columns; `line` (T,) is that of each frame.
+
+    The axes of the world are those of the file. Raises InputError naming the line for what is no number.
+    """
+    file = regular_file(path)
+    with file.open("rb") as opened:
+        if opened.read(2) == b"PK":
+            return truth
+    lines = read_lines(file)
+    if lines.width != STATE_WIDTH or lines.separator is None:
+        return truth
+    table = numbers_of(lines, range(8, STATE_WIDTH), nan=True)
+    state = np.full((len(line), STATE_WIDTH - 8), np.nan)
+    known = line >= 0
+    state[known] = table.values[np.searchsorted(table.line, line[known])]
+    return replace(truth, velocity=state[:, :3], gyroscope_bias=state[:, 3:6], accelerometer_bias=state[:, 6:])

@@ -14,6 +14,7 @@ from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.track_segments import repeated
 from ..tracks.unusable import unusable
 from .result import InertialDiagnosis
+from .sensor_axes import SensorAxes, in_imu_axes, sensor_axes
 from .sensors import sensor_checks
 from .units import imu_units, rescaled_samples
 
@@ -56,21 +57,23 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
     seen = odometry(recorded) if len(recorded.observations) else None
     units = imu_units(recorded, seen)
     sequence = rescaled_samples(recorded, units)
+    axes = SensorAxes() if seen is None else sensor_axes(sequence, seen)
+    sequence = in_imu_axes(sequence, axes)
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
     reason = unusable(sequence)
     if reason or seen is None:
-        return InertialDiagnosis(sequence, recorded, reason, units, imu)
+        return InertialDiagnosis(sequence, recorded, reason, units, axes, imu)
     copies = repeated(sequence)
     first = inertial_start(sequence, seen, imu, max(seen.pixel_sigma, np.finfo(float).tiny))
     if first is None:
-        return InertialDiagnosis(sequence, recorded, no_start(seen), units, imu, seen, copies)
+        return InertialDiagnosis(sequence, recorded, no_start(seen), units, axes, imu, seen, copies)
     path = inertial_path(sequence, seen, imu, first)
     fit = fit_windows(sequence, seen, path.twist(sequence), processes)
     pixel = seen.pixel_sigma * path.inflation if fit is None else fit.sigmas.pixel
     start = inertial_start(sequence, seen, imu, pixel * misfit_of_beginning(sequence, seen, path))
     sensors = sensor_checks(sequence, seen, path, start)
-    return InertialDiagnosis(sequence, recorded, "", units, imu, seen, copies, start, path, fit, sensors)
+    return InertialDiagnosis(sequence, recorded, "", units, axes, imu, seen, copies, start, path, fit, sensors)
 
 
 def misfit_of_beginning(sequence: Sequence, seen: Odometry, path: InertialPath) -> float:

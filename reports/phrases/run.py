@@ -122,6 +122,11 @@ def _noise(run: Run) -> list[str]:
     problem = run.problem
     if problem.diagnosed:
         return []
+    if problem.imu is not None:
+        return [
+            f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px are assumed as noise (one sigma), not "
+            "estimated from this recording; the noise of the inertial samples is as given."
+        ]
     sigma = np.sqrt(np.median(np.diagonal(problem.increment_covariance, axis1=1, axis2=2), axis=0))
     return [
         f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px, {number(float(sigma[:3].max()))} m and "

@@ -286,6 +286,30 @@ def test_truth_may_begin_late(recording: data.Sequence, tmp_path: Path) -> None:
     np.testing.assert_allclose(read.truth.world_T_imu[5, :3, :3], truth.world_T_imu[5, :3, :3], atol=1e-8)
 
 
+def test_eurocs_truth_has_velocity_and_biases(recording: data.Sequence, tmp_path: Path) -> None:
+    """In the axes of the file, and of the frames that it has."""
+    truth = recording.truth
+    assert truth is not None
+    assert truth.velocity is not None
+    assert truth.gyroscope_bias is not None
+    assert truth.accelerometer_bias is not None
+    assert recording.imu is not None
+    late = replace(recording, t=recording.t + 1.0e9, imu=replace(recording.imu, t=recording.imu.t + 1.0e9))
+    data.write_npz(late, tmp_path / "a.npz")
+    state = np.concatenate([truth.velocity, truth.gyroscope_bias, truth.accelerometer_bias], axis=1)
+    data.write_euroc(tmp_path / "poses.csv", late.t, truth.world_T_imu)
+    lines = (tmp_path / "poses.csv").read_text().splitlines()
+    header = lines[0] + "," + ",".join(f"s{i}" for i in range(9))
+    rows = [f"{line},{','.join(map(repr, row))}" for line, row in zip(lines[1:], state.tolist(), strict=True)]
+    (tmp_path / "truth.csv").write_text("\n".join([header, *rows[3:]]) + "\n")
+    read = data.read(tmp_path / "a.npz", tmp_path / "truth.csv", "imu").truth
+    assert read is not None
+    for name in ("velocity", "gyroscope_bias", "accelerometer_bias"):
+        values = getattr(read, name)
+        assert np.isnan(values[:3]).all()
+        np.testing.assert_array_equal(values[3:], getattr(truth, name)[3:])
+
+
 @pytest.mark.parametrize("gap", [0.0, 0.35])
 def test_an_exported_problem_comes_back_to_the_bit(gap: float, tmp_path: Path) -> None:
     problem = inertial_problem(2, n_frames=12)

@@ -40,6 +40,12 @@ ELSEWHERE = {
     "fgbaseline run drive.npz --rerun drive.rrd": (
         "tests/reports/test_rerun_file.py::test_the_viewer_finds_paths_cameras_landmarks_errors_and_matches"
     ),
+    **{
+        f"fgbaseline {verb} tracks.npz --imu imu0/data.csv --imu-calibration imu0/sensor.yaml{out}": (
+            "tests/diagnosis/test_inertial_problem.py::test_the_commands_take_a_recording_with_samples"
+        )
+        for verb, out in (("run", " --out out/drive"), ("diagnose", ""), ("export", " --out out/problem"))
+    },
     "fgbaseline reproduce 03.npz 10.npz --out out/reproduction": (
         "tests/reports/test_reproduce.py::test_every_figure_is_there_in_three_forms"
     ),
