@@ -43,6 +43,10 @@ class ImuNoise:
                 raise InputError(f"imu_noise: {field.name} is {value!r}, expected {expected}")
 
 
+ASSUMED_NOISE = ImuNoise(1e-3, 1e-5, 2e-2, 1e-3)
+"""of a MEMS unit of medium grade, in vibration: stands in where a recording does not state its noise"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ImuSamples:
     """M raw samples in the IMU's frame, in the clock of the frames. Raises InputError where they cannot be used."""

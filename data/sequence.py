@@ -16,7 +16,10 @@ ROTATION_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Truth:
-    """Known poses (and landmarks) in the world frame: the IMU's frame at frame 0."""
+    """Known poses (and landmarks) in the world frame: the IMU's frame at frame 0.
+
+    With raw inertial samples it is any world with its origin near frame 0; a problem brings it to its own.
+    """
 
     world_T_imu: FloatArray
     """(T, 4, 4); frames without truth are all NaN"""
@@ -29,6 +32,8 @@ class Truth:
     """(T, 3) rad/s; NaN where it is not known"""
     accelerometer_bias: FloatArray | None = None
     """(T, 3) m/s^2; NaN where it is not known"""
+    up: FloatArray | None = None
+    """(3,) unit vector, opposite to gravity in this world, where the source of the poses defines it"""
 
     @property
     def known(self) -> BoolArray:
@@ -50,6 +55,23 @@ class Truth:
         world_T_imu = origin @ poses
         world_T_imu[~np.isfinite(world_T_imu).all(axis=(1, 2))] = np.nan
         return Truth(world_T_imu, moved, source)
+
+    def moved(self, motion: FloatArray) -> "Truth":
+        """The truth in another world; `motion` (4, 4) is new_T_old."""
+        R = motion[:3, :3]
+        return replace(
+            self,
+            world_T_imu=motion @ self.world_T_imu,
+            landmarks=None if self.landmarks is None else se3.transform(motion, self.landmarks),
+            velocity=None if self.velocity is None else self.velocity @ R.T,
+            up=None if self.up is None else R @ self.up,
+        )
+
+    def of_frames(self, kept: BoolArray) -> "Truth":
+        """The truth of some of the frames (T,)."""
+        parts = {name: getattr(self, name) for name in ("velocity", "gyroscope_bias", "accelerometer_bias")}
+        chosen = {name: None if values is None else values[kept] for name, values in parts.items()}
+        return replace(self, world_T_imu=self.world_T_imu[kept], **chosen)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -158,14 +180,18 @@ def check_sequence(s: Sequence) -> None:
     if s.truth is not None and s.truth.world_T_imu.shape != (T, 4, 4):
         raise InputError(f"ground_truth: expected shape ({T}, 4, 4), got {s.truth.world_T_imu.shape}")
     if s.truth is not None:
-        _check_truth(s.truth, s.n_landmarks)
+        _check_truth(s.truth, T, s.n_landmarks)
 
 
-def _check_truth(truth: Truth, n_landmarks: int) -> None:
+def _check_truth(truth: Truth, T: int, n_landmarks: int) -> None:
     defect = so3.rotation_defect(truth.world_T_imu[truth.known][:, :3, :3])
     if defect.size and defect.max() > ROTATION_TOLERANCE:
         k = int(np.flatnonzero(truth.known)[defect.argmax()])
         raise InputError(f"ground_truth: the pose of frame {k} is no rigid motion (rotation off by {defect.max():.3g})")
+    for name in ("velocity", "gyroscope_bias", "accelerometer_bias"):
+        values = getattr(truth, name)
+        if values is not None and values.shape != (T, 3):
+            raise InputError(f"ground_truth: expected a {name} of shape ({T}, 3), got {values.shape}")
     if truth.landmarks is not None and truth.landmarks.shape != (n_landmarks, 3):
         raise InputError(f"landmarks: expected shape ({n_landmarks}, 3), got {truth.landmarks.shape}")
 

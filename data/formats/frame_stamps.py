@@ -45,7 +45,7 @@ class FrameStamps(NamedTuple):
 
     def truth(self, truth: Truth | None) -> Truth | None:
         """That of the kept frames."""
-        return truth if truth is None else Truth(truth.world_T_imu[self.kept], truth.landmarks, truth.source)
+        return truth if truth is None else truth.of_frames(self.kept)
 
 
 def read_stamps(key: str, array: FloatArray) -> FrameStamps:

@@ -8,6 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError, strapdown
 
 from ..imu import ImuNoise, ImuSamples
 from ..observations import IntArray
+from .imu_gaps import interval_densities
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,6 +47,8 @@ class ImuIntervals:
     noise: ImuNoise
     gravity: float
     """magnitude, m/s^2"""
+    densities: FloatArray
+    """(T-1, 4) those of `noise`, for each interval; larger over gaps between samples"""
 
     def pieces(self, k: int) -> slice:
         """Pieces of the interval from frame k to k + 1."""
@@ -58,7 +61,7 @@ class ImuIntervals:
             self.angular_velocity[at] - gyroscope_bias,
             self.specific_force[at] - accelerometer_bias,
             self.dt[at],
-            self.noise.densities,
+            self.densities[k],
         )
 
     @property
@@ -70,8 +73,9 @@ class ImuIntervals:
 def imu_intervals(samples: ImuSamples, frames: FloatArray) -> ImuIntervals:
     """Pieces of the samples between frames (T,), s.
 
-    Before the first and after the last sample its value is held, for up to one sample period. Raises InputError where
-    a frame is farther outside the samples.
+    Before the first and after the last sample its value is held, for up to one sample period. Over a gap the
+    values are interpolated, and the noise is that of `imu_gaps.interval_densities`. Raises InputError where a frame is
+    farther outside the samples.
     """
     before, after, period = samples.t[0] - frames[0], frames[-1] - samples.t[-1], samples.period
     if max(before, after) > period:
@@ -85,4 +89,5 @@ def imu_intervals(samples: ImuSamples, frames: FloatArray) -> ImuIntervals:
     at = np.stack([np.interp(knots, samples.t, column) for column in values.T], axis=1)
     held = 0.5 * (at[:-1] + at[1:])
     starts = np.searchsorted(knots, frames).astype(np.int64)
-    return ImuIntervals(starts, np.diff(knots), held[:, :3], held[:, 3:], samples.noise, samples.gravity)
+    densities = interval_densities(samples, frames)
+    return ImuIntervals(starts, np.diff(knots), held[:, :3], held[:, 3:], samples.noise, samples.gravity, densities)
