@@ -16,6 +16,8 @@ IMU_T_CAM[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 NOISE = ImuNoise(2e-3, 2e-5, 2e-2, 3e-3)
 START_SIGMA = np.repeat([0.0, 0.01, 0.05, 2e-3, 2e-2], 3)
 """of the true start about the given one; heading and position are exact"""
+MIN_DISPARITY = 3.0
+"""px, of the exact pixels"""
 STEP = 1e-4
 """s, of the finite differences that give the true samples"""
 
@@ -105,15 +107,15 @@ def _observations(world_T_imu: FloatArray, rng: np.random.Generator) -> tuple[da
         p = se3.transform(cam_T_world, points)
         z = np.where(p[:, 2] > 0.5, p[:, 2], np.nan)
         u, v = CAMERA.fu * p[:, 0] / z + CAMERA.cu, CAMERA.fv * p[:, 1] / z + CAMERA.cv
-        seen = np.flatnonzero((u > 60.0) & (u < 640.0) & (v > 0.0) & (v < 480.0))
-        exact = np.stack([u, v, u - CAMERA.fu * CAMERA.baseline / z, v], axis=1)[seen]
+        disparity = CAMERA.fu * CAMERA.baseline / z  # a choice by the noisy one would make points nearer than they are
+        seen = np.flatnonzero((u > 60.0) & (u < 640.0) & (v > 0.0) & (v < 480.0) & (disparity > MIN_DISPARITY))
+        exact = np.stack([u, v, u - disparity, v], axis=1)[seen]
         frame.append(np.full(len(seen), k))
         landmark.append(seen)
         pixel.append(exact + rng.normal(size=exact.shape))
     chosen = data.Observations.sort(np.concatenate(frame), np.concatenate(landmark), np.concatenate(pixel))
     few = np.bincount(chosen.landmark, minlength=len(points)) < 3
-    far = chosen.pixel[:, 0] - chosen.pixel[:, 2] < 1.5
-    return chosen.select(~few[chosen.landmark] & ~far), len(points)
+    return chosen.select(~few[chosen.landmark]), len(points)
 
 
 def at_truth(problem: Problem) -> Problem:
