@@ -9,6 +9,8 @@ OF_THE_FILE = frozenset(
         "repeated_stamps",
         "stamps_rounded",
         "zero_for_unobserved",
+        "doubled_samples",
+        "frames_without_samples",
         "extrinsic_inverse",
         *UNITS,
     }

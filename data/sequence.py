@@ -69,9 +69,15 @@ class Truth:
 
     def of_frames(self, kept: BoolArray) -> "Truth":
         """The truth of some of the frames (T,)."""
-        parts = {name: getattr(self, name) for name in ("velocity", "gyroscope_bias", "accelerometer_bias")}
-        chosen = {name: None if values is None else values[kept] for name, values in parts.items()}
-        return replace(self, world_T_imu=self.world_T_imu[kept], **chosen)
+        state = (self.velocity, self.gyroscope_bias, self.accelerometer_bias)
+        velocity, gyroscope_bias, accelerometer_bias = (None if values is None else values[kept] for values in state)
+        return replace(
+            self,
+            world_T_imu=self.world_T_imu[kept],
+            velocity=velocity,
+            gyroscope_bias=gyroscope_bias,
+            accelerometer_bias=accelerometer_bias,
+        )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -131,7 +137,9 @@ class Sequence:
 
     @property
     def up(self) -> FloatArray:
-        """(3,) the unit vector that points up, in the world (the IMU's frame at frame 0)."""
+        """(3,) the unit vector that points up in the world: the IMU's frame at frame 0, or z up with raw samples."""
+        if self.imu is not None:
+            return np.array([0.0, 0.0, 1.0])
         assert self.up_imu is not None
         return self.up_imu
 

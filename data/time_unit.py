@@ -142,5 +142,8 @@ def in_seconds(sequence: Sequence, unit: TimeUnit | None = None) -> Sequence:
 
 
 def rescaled_time(sequence: Sequence, factor: float) -> Sequence:
-    """The recording with its stamps multiplied."""
-    return sequence if factor == 1.0 else replace(sequence, t=sequence.t * factor)
+    """The recording with its stamps multiplied, those of raw inertial samples too."""
+    if factor == 1.0:
+        return sequence
+    imu = None if sequence.imu is None else replace(sequence.imu, t=sequence.imu.t * factor)
+    return replace(sequence, t=sequence.t * factor, imu=imu)

@@ -17,6 +17,8 @@ from .estimation.pipeline import diagnose
 from .estimation.result import Diagnosis
 from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
+from .inertial.pipeline import diagnose_inertial
+from .inertial.problem import as_recorded_inertial, inertial_problem
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
@@ -50,9 +52,12 @@ def calibrated(
     noise. Where nothing can be estimated, or with `settings`, the recording is taken as recorded. Values in `repairs`
     take precedence over the diagnosis. The noise of an increment is the standard deviation of a velocity times dt. A
     fractional shift correlates the errors of neighboring increments, which is not modeled. `features` keeps that many
-    landmarks, those observed most often after masking. The number of `processes` does not change the result. Raises
+    landmarks, those observed most often after masking. With raw inertial samples the problem has a start in place of
+    increments, and the noise that the recording states. The number of `processes` does not change the result. Raises
     InputError for impossible repairs, for repairs together with `settings`, and where the units are in doubt.
     """
+    if sequence.imu is not None:
+        return _inertial(sequence, features, settings, repairs, processes)
     if settings is not None and repairs is not None:
         raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
     if settings is None:
@@ -71,6 +76,17 @@ def calibrated(
         findings=findings_of(diagnosis),
         repairs=rescalings(diagnosis),
     )
+
+
+def _inertial(
+    sequence: Sequence, features: int | None, settings: Calibration | None, repairs: Repairs | None, processes: int
+) -> Problem:
+    """The problem of a recording with raw inertial samples, whose start takes the place of velocities."""
+    if repairs is not None:
+        raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
+    if settings is not None:
+        return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
+    return inertial_problem(diagnose_inertial(sequence, processes), features)
 
 
 def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Problem:

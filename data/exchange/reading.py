@@ -16,6 +16,7 @@ from ..observations import IntArray, Observations
 from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from ..sequence import Sequence
 from . import layout
+from .inertial import START, interval_noise, read_samples, read_start
 
 MOST_UNSEEN = 100
 """landmarks for each observation: some are seen in no frame, and arrays have their size"""
@@ -51,6 +52,7 @@ def _words(path: Path) -> dict[str, Any]:
             "remarks": tuple(map(str, words["remarks"])),
             "sequence": {key: str(s[key]) for key in ("name", "form", "source")},
             "sequence_remarks": tuple(map(str, s["remarks"])),
+            "start": str(words.get("start", "given")),
         }
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{error} is missing or not what it should be; export the problem again") from error
@@ -105,16 +107,19 @@ def _problem(numbers: _Numbers, words: dict[str, Any]) -> Problem:
         mean = numbers.real("landmark_prior_mean", len(features), 3)
         prior = LandmarkPrior(mean, numbers.real("landmark_prior_covariance", 3, 3))
     threshold = numbers.optional("huber_threshold")
+    steps = T - 1 if sequence.imu is None else 0
     return Problem(
         preset=words["preset"],
         sequence=sequence,
-        increment=numbers.real("increment", T - 1, 6),
-        increment_covariance=numbers.real("increment_covariance", T - 1, 6, 6),
+        increment=numbers.real("increment", steps, 6),
+        increment_covariance=numbers.real("increment_covariance", steps, 6, 6),
         pixel_variance=positive("pixel_variance", numbers.real("pixel_variance"), "px^2"),
         features=features,
         excluded=excluded.astype(np.uint8),
         initial_pose=numbers.real("initial_pose", 4, 4),
         initial_covariance=numbers.real("initial_covariance", 6, 6),
+        imu=None if sequence.imu is None else interval_noise(numbers.real, sequence),
+        start=read_start(numbers.real, words["start"]) if numbers.has(START) else None,
         landmark_prior=prior,
         kernel=None if threshold is None else HuberKernel(threshold),
         mapping_pixel_variance=numbers.optional("mapping_pixel_variance"),
@@ -138,17 +143,20 @@ def _sequence(numbers: _Numbers, words: dict[str, Any]) -> Sequence:
     order = np.diff(frame) * (int(landmark.max(initial=0)) + 1) + np.diff(landmark)
     if np.any(order <= 0):
         raise InputError("frame: observations must be sorted by frame, then landmark, without repeats")
+    imu = read_samples(numbers.real) if numbers.has("imu_time_stamps") else None
+    rows = len(t) if imu is None else 0
     return Sequence(
         **words["sequence"],
         t=t,
-        linear_velocity=numbers.real("linear_velocity", len(t), 3),
-        angular_velocity=numbers.real("angular_velocity", len(t), 3),
+        linear_velocity=numbers.real("linear_velocity", rows, 3),
+        angular_velocity=numbers.real("angular_velocity", rows, 3),
         camera=StereoCamera(
             float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]), positive("b", numbers.real("b"), "m")
         ),
         imu_T_cam=extrinsic("imu_T_cam", imu_T_cam[:3, :3], imu_T_cam[:3, 3]),
         observations=Observations(frame, landmark, numbers.real("pixel", n, 4)),
         n_landmarks=n_landmarks,
-        up_imu=numbers.real("up", 3),
+        imu=imu,
+        up_imu=numbers.real("up_imu" if numbers.has("up_imu") else "up", 3),
         remarks=words["sequence_remarks"],
     )

@@ -12,6 +12,7 @@ from ..formats.atomic_write import atomic_write
 from ..formats.npz_member import write_member
 from ..problem import Excluded, Problem
 from . import layout
+from .inertial import inertial_arrays, inertial_scalars
 
 
 def write_problem(problem: Problem, folder: Path) -> None:
@@ -55,6 +56,7 @@ def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
         "excluded": problem.excluded,
         "n_landmarks": np.array(sequence.n_landmarks),
         "features": problem.features,
+        **inertial_arrays(problem),
     }
     if prior is not None:
         numbers |= {"landmark_prior_mean": prior.mean, "landmark_prior_covariance": prior.covariance}
@@ -90,27 +92,38 @@ def scalars(problem: Problem) -> dict[str, Any]:
         "huber_threshold": None if problem.kernel is None else problem.kernel.threshold,
         "landmark_prior_covariance": None if prior is None else prior.covariance.tolist(),
         "excluded": {reason.name.lower(): reason.value for reason in Excluded},
+        **inertial_scalars(problem),
     }
 
 
 def _tables(problem: Problem, folder: Path) -> None:
     sequence, o, prior = problem.sequence, problem.sequence.observations, problem.landmark_prior
-    steps = len(problem.increment)
-    velocities = [*sequence.linear_velocity.T, *sequence.angular_velocity.T]
-    covariance = np.asarray(problem.increment_covariance).reshape(steps, 36)
+    frames = [np.arange(sequence.n_frames), sequence.t]
     taking_part = problem.observations().counts(sequence.n_landmarks)[problem.features]
     mean = np.full((len(problem.features), 3), np.nan) if prior is None else prior.mean
     for name, titles, columns in (
-        (layout.FRAMES, layout.FRAME_COLUMNS, [np.arange(sequence.n_frames), sequence.t, *velocities]),
-        (
-            layout.INCREMENTS,
-            layout.INCREMENT_COLUMNS,
-            [np.arange(steps), sequence.dt, *problem.increment.T, *covariance.T],
-        ),
+        *_motion_tables(problem, frames),
         (layout.OBSERVATIONS, layout.OBSERVATION_COLUMNS, [o.frame, o.landmark, *o.pixel.T, problem.excluded]),
         (layout.LANDMARKS, layout.LANDMARK_COLUMNS, [problem.features, taking_part, *mean.T]),
     ):
         _table(folder / name, titles, columns)
+
+
+def _motion_tables(
+    problem: Problem, frames: list[NDArray[Any]]
+) -> list[tuple[str, tuple[str, ...], list[NDArray[Any]]]]:
+    """Tables of frames and increments, or of frames and raw inertial samples."""
+    sequence, imu, steps = problem.sequence, problem.sequence.imu, len(problem.increment)
+    if imu is not None:
+        samples = [imu.t, *imu.angular_velocity.T, *imu.specific_force.T]
+        return [(layout.FRAMES, layout.FRAME_COLUMNS[:2], frames), (layout.SAMPLES, layout.SAMPLE_COLUMNS, samples)]
+    velocities = [*sequence.linear_velocity.T, *sequence.angular_velocity.T]
+    covariance = np.asarray(problem.increment_covariance).reshape(steps, 36)
+    increments = [np.arange(steps), sequence.dt, *problem.increment.T, *covariance.T]
+    return [
+        (layout.FRAMES, layout.FRAME_COLUMNS, [*frames, *velocities]),
+        (layout.INCREMENTS, layout.INCREMENT_COLUMNS, increments),
+    ]
 
 
 def _table(path: Path, titles: tuple[str, ...], columns: list[NDArray[Any]]) -> None:

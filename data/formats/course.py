@@ -3,8 +3,8 @@
 | key | shape | form |
 |---|---|---|
 | `time_stamps` | (1, T) or (T,) s | all |
-| `linear_velocity` | (3, T) m/s | all |
-| `angular_velocity` | (3, T) rad/s | later, own |
+| `linear_velocity` | (3, T) m/s | all, unless there are raw inertial samples |
+| `angular_velocity` | (3, T) rad/s | later, own, unless there are raw inertial samples |
 | `rotational_velocity` | (3, T) rad/s | 2020 |
 | `features` | (4, N, T) px, -1 unobserved; may be absent | all |
 | `K`, `b` | (3, 3) px, scalar m | all |
@@ -13,6 +13,8 @@
 | `ground_truth` | (T, 4, 4) world_T_imu, a frame all NaN where unknown; may be absent | own |
 | `landmarks` | (3, N) m in the world, NaN where unknown; may be absent | own |
 | `up_imu` | (3,) unit vector, up in the IMU's frame at frame 0; may be absent | own |
+
+`imu_arrays` lists the keys of raw inertial samples, which may stand in place of the velocities.
 """
 
 import numpy as np
@@ -24,9 +26,12 @@ from ..sequence import Sequence, Truth
 from .feature_block import read_features
 from .fields import extrinsic, positive, vectors
 from .frame_stamps import read_stamps
+from .imu_arrays import STAMPS, read_imu_arrays, read_state_truth
+from .imu_attachment import attach_imu
 from .npz_archive import NpzArchive
 
-OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu"})
+OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS})
+VELOCITY_KEYS = frozenset({"linear_velocity", "angular_velocity", "rotational_velocity"})
 EXACT = 1e-9
 """how far from 0 or 1 the entries may be that have to be 0 or 1"""
 WORLD_TOLERANCE = 1e-6
@@ -42,6 +47,7 @@ _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can
 def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
     form = course_form(archive.keys)
+    inertial = STAMPS in archive.keys
     stamps = read_stamps("time_stamps", archive.array("time_stamps"))
     T = len(stamps.kept)
     rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
@@ -55,14 +61,18 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
         remarks.append(_NO_FEATURES)
     if form == "course-2020":
         remarks.append(_ODD_EXTRINSIC)
-    truth, moved = _truth(archive, T, n_landmarks)
+    truth, moved = _truth(archive, T, n_landmarks, inertial=inertial)
     if moved:
         remarks.append(moved)
-    return Sequence(
+    velocity, turned = np.zeros((T, 3)), np.zeros((T, 3))
+    if not inertial or archive.keys & VELOCITY_KEYS:
+        velocity = vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))
+        turned = vectors(rate, _shaped(archive, rate, (3, T)))
+    sequence = Sequence(
         name=name,
         t=stamps.t,
-        linear_velocity=vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))[stamps.kept],
-        angular_velocity=vectors(rate, _shaped(archive, rate, (3, T)))[stamps.kept],
+        linear_velocity=velocity[stamps.kept],
+        angular_velocity=turned[stamps.kept],
         camera=_camera(archive),
         imu_T_cam=_extrinsic(archive, form),
         observations=stamps.observations(observations),
@@ -75,6 +85,9 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
         findings=findings,
         left_out=stamps.left_out,
     )
+    if not inertial:
+        return sequence
+    return attach_imu(sequence, read_imu_arrays(archive), source, velocities=bool(archive.keys & VELOCITY_KEYS))
 
 
 def course_form(keys: frozenset[str]) -> str:
@@ -135,7 +148,7 @@ def _up(archive: NpzArchive) -> FloatArray | None:
     return up
 
 
-def _truth(archive: NpzArchive, T: int, n_landmarks: int) -> tuple[Truth | None, str]:
+def _truth(archive: NpzArchive, T: int, n_landmarks: int, *, inertial: bool) -> tuple[Truth | None, str]:
     """The truth in the file, if any, and a remark where it had to be moved to the world of frame 0's IMU."""
     if "ground_truth" not in archive.keys:
         if "landmarks" in archive.keys:
@@ -157,6 +170,8 @@ def _truth(archive: NpzArchive, T: int, n_landmarks: int) -> tuple[Truth | None,
     landmarks = None
     if "landmarks" in archive.keys:
         landmarks = np.ascontiguousarray(_shaped(archive, "landmarks", (3, n_landmarks)).T)
+    if inertial:
+        return read_state_truth(archive, Truth(poses, landmarks, up=np.array([0.0, 0.0, 1.0]))), ""
     if not known[0] or np.abs(poses[0] - np.eye(4)).max() <= WORLD_TOLERANCE:
         return Truth(poses, landmarks), ""
     moved = "ground_truth does not begin at the identity: it is re-expressed from the IMU at frame 0."

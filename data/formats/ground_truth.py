@@ -1,6 +1,8 @@
 """Ground truth from a trajectory file, brought to the recording's frames and to its world."""
 
 from dataclasses import replace
+from functools import reduce
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -8,9 +10,11 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import IntArray
+from ..problem.inertial import imu_intervals
 from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
 from .columns import Order
+from .inertial_truth import inertial_truth
 from .named_file import FilePath, reading, shown
 from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
@@ -30,6 +34,8 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
     end have no truth. In a file with stamps the pose of a frame is the one nearest in time, if it lies within half the
     median interval of the frames; one pose belongs to one frame. Frames without truth are NaN and counted in a remark.
 
+    With raw inertial samples the poses keep the axes of the file's world, and frame 0 may be without one.
+
     It replaces what truth the recording has. Raises InputError naming file and line for bad text, and when `frame` is
     missing, the file has more lines than the recording has frames (KITTI), no stamp fits (TUM), or frame 0 has no pose.
     """
@@ -41,7 +47,9 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
         poses, remarks = _poses_of_frames(sequence, path, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
-        truth = Truth.from_any_world(poses, source=shown(path))
+        source = shown(path)
+        inertial = sequence.imu is not None
+        truth = inertial_truth(poses, source) if inertial else Truth.from_any_world(poses, source=source)
         missing = sequence.n_frames - int(truth.known.sum())
         if missing:
             remarks.append(f"{missing} of {sequence.n_frames} frames have no ground truth in {shown(path)}.")
@@ -91,10 +99,7 @@ def _order(
     """The order of quaternions with which the truth turns as the gyroscope measured, clearly; else the usual one."""
     if len(file.orders) == 1 or len(frames) <= STEP:
         return file.orders[0]
-    increments = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
-    turned = np.tile(np.eye(3), (sequence.n_frames, 1, 1))
-    for k, increment in enumerate(increments):
-        turned[k + 1] = turned[k] @ increment
+    turned = _turned(sequence)
     body_R_imu = sequence.imu_T_cam[:3, :3].T if frame == "camera" else np.eye(3)
 
     def over_steps(R: FloatArray) -> FloatArray:
@@ -108,6 +113,21 @@ def _order(
         true = over_steps(rotation[nearest] @ body_R_imu)
         misfits.append(float(np.rad2deg(np.median(so3.rotation_angle(np.swapaxes(measured, 1, 2) @ true)))))
     return file.orders[int(fits_clearly_better(misfits[1], misfits[0]))]
+
+
+def _turned(sequence: Sequence) -> FloatArray:
+    """(T, 3, 3) rotations of the frames since frame 0, by the gyroscope."""
+    if sequence.imu is None:
+        increments = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
+    else:
+        pieces = imu_intervals(sequence.imu, sequence.t)
+        steps = so3.exp_so3(pieces.angular_velocity * pieces.dt[:, None])
+        ends = pieces.starts.tolist()
+        increments = np.array([reduce(np.matmul, steps[a:b], np.eye(3)) for a, b in pairwise(ends)])
+    turned = np.tile(np.eye(3), (sequence.n_frames, 1, 1))
+    for k, increment in enumerate(increments):
+        turned[k + 1] = turned[k] @ increment
+    return turned
 
 
 def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArray]:
@@ -137,6 +157,8 @@ def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArra
 
 def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
     """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
+    if sequence.imu is not None:
+        return  # its speed is not known yet
     n = len(file.position)
     steps = np.linalg.norm(sequence.linear_velocity[:-1], axis=1) * sequence.dt
     recorded = np.median(steps[: n - 1]) if n > 1 else 0

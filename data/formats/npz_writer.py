@@ -11,6 +11,7 @@ from ..observations import IntArray
 from ..sequence import Sequence
 from .atomic_write import atomic_write
 from .feature_block import CHUNK, UNOBSERVED
+from .imu_arrays import imu_arrays, state_truth_arrays
 from .named_file import FilePath
 from .npz_member import write_member
 
@@ -35,18 +36,24 @@ def _arrays(s: Sequence) -> dict[str, FloatArray]:
     camera = s.camera
     arrays = {
         "time_stamps": s.t[None, :],
-        "linear_velocity": s.linear_velocity.T,
-        "angular_velocity": s.angular_velocity.T,
+        **_measured(s),
         "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
         "b": np.array(camera.baseline),
         "imu_T_cam": s.imu_T_cam,
-        "up_imu": s.up,
+        "up_imu": s.up if s.up_imu is None else s.up_imu,
     }
     if s.truth is not None:
         arrays["ground_truth"] = s.truth.world_T_imu
         if s.truth.landmarks is not None:
             arrays["landmarks"] = s.truth.landmarks.T
+        arrays |= state_truth_arrays(s.truth)
     return arrays
+
+
+def _measured(s: Sequence) -> dict[str, FloatArray]:
+    if s.imu is not None:
+        return imu_arrays(s.imu)
+    return {"linear_velocity": s.linear_velocity.T, "angular_velocity": s.angular_velocity.T}
 
 
 def _feature_chunks(s: Sequence) -> Iterator[FloatArray]:

@@ -7,12 +7,17 @@ import numpy as np
 
 from fgbaseline.geometry import InputError
 
+from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ..sequence import Sequence
 from ..time_unit import TimeUnit, in_seconds
 from .course import read_course
 from .ground_truth import BodyFrame, attach_truth
+from .imu_arrays import assumed_noise
+from .imu_attachment import attach_imu
+from .imu_csv import read_imu_csv
+from .imu_yaml import ImuCalibration, read_imu_calibration
 from .mat_file import MatFile
-from .named_file import FilePath, reading, regular_file
+from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
 from .utias import read_utias
 
@@ -27,17 +32,34 @@ def read(
     truth: FilePath | None = None,
     truth_frame: BodyFrame | None = None,
     time_unit: TimeUnit | None = None,
+    imu: FilePath | None = None,
+    imu_calibration: FilePath | None = None,
 ) -> Sequence:
     """The recording in the file `path`: a course file, one of our own, or a UTIAS `.mat`.
 
     `time_unit` is that of its stamps; without it they are in seconds, unless they show another unit (`time_unit.py`).
+
+    `imu` is a CSV of raw inertial samples, `imu_calibration` the YAML of their noise: they replace the velocities.
 
     `truth` is a KITTI or TUM file with the poses of `truth_frame`, "camera" or "imu" (see `attach_truth`); without it
     the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
     """
     with reading(path), np.errstate(all="ignore"):  # absurd numbers are judged, not computed with
         sequence = in_seconds(_read(regular_file(path), os.fspath(path)), time_unit)
+    if imu is not None:
+        sequence = _with_imu(sequence, imu, imu_calibration)
+    elif imu_calibration is not None:
+        raise InputError(f"imu-calibration: {shown(imu_calibration)} is given without samples; add --imu FILE")
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
+
+
+def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -> Sequence:
+    found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),))
+    if calibration is not None:
+        found = read_imu_calibration(calibration)
+    raw = read_imu_csv(imu, found.noise, found.gravity)
+    with reading(imu):
+        return attach_imu(sequence, raw._replace(remarks=(*found.remarks, *raw.remarks)), shown(imu))
 
 
 def _read(file: Path, source: str) -> Sequence:

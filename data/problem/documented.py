@@ -26,6 +26,11 @@ def documented(
     W is added once per step; V = I for mapping and 15 I for SLAM; every one of the `features` most often seen
     landmarks (None: all) has the prior 0.01 I at the average of its back-projections along the dead-reckoned path.
     """
+    if sequence.imu is not None:
+        raise InputError(
+            "documented: the preset poses the report's problem, which has body velocities and no raw inertial data; "
+            "use --preset calibrated"
+        )
     o = sequence.observations
     chosen = most_observed(o, sequence.n_landmarks, features)
     step = increments(sequence, Shift.AFTER)

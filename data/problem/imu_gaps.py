@@ -1,7 +1,7 @@
 """Noise over gaps between inertial samples, from how much the samples change over as long a time elsewhere.
 
-Interpolated over a gap of G seconds, a random walk of spectral density q errs by a Brownian bridge, whose integral has a
-variance of q G^3 / 12. White noise of density s gives s^2 G, so s^2 grows by q G^2 / 12. q is the mean square of
+Interpolated over a gap of G seconds, a random walk of spectral density q errs by a Brownian bridge, whose integral has
+q G^3 / 12 of variance. White noise of density s gives s^2 G, so s^2 grows by q G^2 / 12. q is the mean square of
 x(t + G) - x(t) over G, less twice the variance of the noise, for the angular velocity and the specific force.
 """
 

@@ -1,6 +1,7 @@
 """Repair of a recording by the significant estimates of its diagnosis."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,25 +81,44 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     if diagnosis.shift != 0.0:
         done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
     path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)
-    split, gate = _split(sequence, path, mask, tracks)
-    observations, excluded = _renumbered(sequence, split)
-    pieces = split.n_landmarks - sequence.n_landmarks
-    n_landmarks = sequence.n_landmarks + pieces
-    if pieces:
-        done.append(f"{pieces} tracks that jump to another point split off as landmarks of their own")
-    tracked = replace(sequence, observations=observations, n_landmarks=n_landmarks, truth=None)
     sigma = GATE_RANGE[0] if diagnosis.sigmas is None else diagnosis.sigmas.pixel
-    excluded = exclude_landmarks(tracked, path, excluded, sigma)
+    found = repaired_tracks(sequence, path, mask, tracks, sigma)
+    done += found.repairs
     repaired = replace(
         sequence,
         linear_velocity=velocity,
         angular_velocity=rate,
         imu_T_cam=imu_T_cam,
-        observations=observations,
-        n_landmarks=n_landmarks,
-        truth=_with_landmarks(sequence.truth, n_landmarks),
+        observations=found.observations,
+        n_landmarks=found.n_landmarks,
+        truth=truth_of_landmarks(sequence.truth, found.n_landmarks),
     )
-    return Repaired(repaired, excluded, gate, tuple(done))
+    return Repaired(repaired, found.excluded, found.gate, tuple(done))
+
+
+class RepairedTracks(NamedTuple):
+    """Observations under their new landmarks, and the mask."""
+
+    observations: Observations
+    n_landmarks: int
+    excluded: NDArray[np.uint8]
+    """(n,) an `Excluded` for each observation"""
+    gate: float
+    """px: how far from its prediction an observation may lie"""
+    repairs: tuple[str, ...]
+
+
+def repaired_tracks(
+    sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs, sigma: float
+) -> RepairedTracks:
+    """Tracks split where they jump, and the mask, along a path (T, 4, 4) that is right locally; `sigma` px of noise."""
+    split, gate = _split(sequence, path, mask, tracks)
+    observations, excluded = _renumbered(sequence, split)
+    pieces = split.n_landmarks - sequence.n_landmarks
+    done = (f"{pieces} tracks that jump to another point split off as landmarks of their own",) if pieces else ()
+    tracked = replace(sequence, observations=observations, n_landmarks=split.n_landmarks, truth=None)
+    excluded = exclude_landmarks(tracked, path, excluded, sigma)
+    return RepairedTracks(observations, split.n_landmarks, excluded, gate, done)
 
 
 def _without_offset(sequence: Sequence, offset: float) -> Sequence:
@@ -149,7 +169,7 @@ def _renumbered(sequence: Sequence, split: SplitTracks) -> tuple[Observations, N
     return moved, split.excluded[order]
 
 
-def _with_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
+def truth_of_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
     """The truth, with landmarks of unknown position for the tracks that were split off."""
     if truth is None or truth.landmarks is None:
         return truth

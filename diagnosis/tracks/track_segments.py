@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity
 from fgbaseline.geometry.measurement import measured_rows
@@ -98,3 +98,18 @@ def track_segments(sequence: Sequence) -> TrackSegments:
         point=sequence.camera.triangulate(o.pixel[before]),
         pixel=measured_rows(o.pixel[after]),
     )
+
+
+def track_chains(before: IntArray, after: IntArray, inlier: BoolArray, o: Observations) -> IntArray:
+    """(n,) a number for each observation: equal for those that inlier segments join, -1 where none does.
+
+    `before` and `after` (m,) are the observations of the segments, `inlier` (m,) those that agree with the motion.
+    """
+    n = len(o)
+    linked, joined = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    joined[after[inlier]] = True
+    linked[after[inlier]] = linked[before[inlier]] = True
+    order = o.by_track()
+    chain = np.empty(n, dtype=np.int64)
+    chain[order] = np.cumsum(~joined[order])
+    return np.where(linked, chain, -1)

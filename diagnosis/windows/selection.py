@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from fgbaseline.data.observations import IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..odometry.stereo_odometry import Odometry
+from ..tracks.track_segments import track_chains
 from .residuals import Window, WindowData
 
 FRAMES = 25
@@ -46,7 +46,7 @@ def unbroken_spans(odometry: Odometry) -> list[Span]:
 def windows_of(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]) -> list[Window]:
     """Data, initial poses and initial points of each window that has enough observations."""
     o, dt = sequence.observations, sequence.dt
-    chain = _chains(odometry, o.landmark, o.frame)
+    chain = track_chains(odometry.links.before, odometry.links.after, odometry.inlier, o)
     known = odometry.known[:, None, None]
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
     starts, before = o.frame_starts(sequence.n_frames), 0
@@ -76,17 +76,3 @@ def windows_of(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans:
     points = triangulate_tracks(unit, np.concatenate(views), row, pixel, before).position
     ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
     return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]
-
-
-def _chains(odometry: Odometry, landmark: IntArray, frame: IntArray) -> IntArray:
-    """(n,) a number for each observation: equal for those that inlier links join, -1 where none does."""
-    n = len(landmark)
-    linked = np.zeros(n, dtype=np.bool_)
-    joined = np.zeros(n, dtype=np.bool_)
-    inlier = odometry.inlier
-    joined[odometry.links.after[inlier]] = True
-    linked[odometry.links.after[inlier]] = linked[odometry.links.before[inlier]] = True
-    order = np.lexsort((frame, landmark))
-    chain = np.empty(n, dtype=np.int64)
-    chain[order] = np.cumsum(~joined[order])
-    return np.where(linked, chain, -1)

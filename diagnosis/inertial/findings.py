@@ -1,0 +1,80 @@
+"""Findings on raw inertial data, in sentences."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fgbaseline.data.finding import Finding
+from fgbaseline.data.plural import plural
+from fgbaseline.data.problem.imu_gaps import sample_gaps
+from fgbaseline.data.sequence import Sequence
+
+from ..estimation.result import Diagnosis
+from ..findings.track_findings import track_findings
+from ..findings.track_statistics import TrackStatistics, track_statistics
+from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
+from ..tracks.observation_mask import MaskSettings
+from .result import InertialDiagnosis
+from .sensor_findings import sensor_findings
+from .units import imu_unit_findings
+
+MIN_DROPPED = 0.001
+"""share of the samples"""
+DROPPED = 1.5
+"""sample periods from one sample to the next, from which on one is missing"""
+
+
+def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> tuple[Finding, ...]:
+    """Faults of the samples, then of the tracks; none for a clean recording. `tracks` are computed where not given."""
+    findings = (*found.sequence.findings, *imu_unit_findings(found.units), *_gaps(found.sequence))
+    if found.sensors is not None:
+        noise = found.recorded.imu.noise if found.recorded.imu is not None else None
+        stated = None if noise is None else (noise.gyroscope_density, noise.accelerometer_density)
+        findings += sensor_findings(found.sensors, stated)
+    if found.odometry is None:
+        return findings
+    return findings + track_findings(found.sequence, found.repeated, inertial_track_statistics(found, tracks))
+
+
+def inertial_track_statistics(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> TrackStatistics:
+    """Statistics of the tracks, before and after the mask."""
+    sequence = found.sequence
+    alone = Diagnosis(sequence, odometry=found.odometry, repeated=found.repeated)
+    if found.path is None:
+        return track_statistics(replace(alone, odometry=None))
+    if tracks is None:
+        tracks = repaired_tracks(sequence, found.path.states.pose, MaskSettings(), TrackRepairs(), found.pixel)
+    masked = replace(sequence, observations=tracks.observations, n_landmarks=tracks.n_landmarks, truth=None)
+    return track_statistics(alone, Repaired(masked, tracks.excluded, tracks.gate, tracks.repairs))
+
+
+def inertial_repairs(found: InertialDiagnosis) -> tuple[str, ...]:
+    """What was done to the samples, one sentence each."""
+    named = (("angular velocities", found.units.rate), ("specific forces", found.units.force))
+    return tuple(
+        f"{name} of the inertial samples multiplied by {factor:.6g}" for name, factor in named if factor != 1.0
+    )
+
+
+def _gaps(sequence: Sequence) -> tuple[Finding, ...]:
+    """Gaps between samples, and single samples that are missing."""
+    imu = sequence.imu
+    assert imu is not None
+    step, gaps = np.diff(imu.t), sample_gaps(imu)
+    findings = []
+    if len(gaps):
+        longest = int(gaps[np.argmax(step[gaps])])
+        text = (
+            f"{plural(len(gaps), 'gap')} between inertial samples, the longest {step[longest]:.3g} s from "
+            f"{imu.t[longest]:.6f} s on: nothing is measured there, and the uncertainty grows."
+        )
+        findings.append(Finding("imu_gaps", text, len(gaps), len(gaps), "gaps", "counted"))
+    short = step[np.setdiff1d(np.arange(len(step)), gaps)]
+    missing = int(np.sum(np.round(short[short > DROPPED * imu.period] / imu.period) - 1))
+    if missing > MIN_DROPPED * len(imu):
+        text = (
+            f"{missing:,} inertial samples are missing beside {len(imu):,} (intervals above {DROPPED:g} times the "
+            f"median, {1e3 * imu.period:.3g} ms): they are interpolated."
+        )
+        findings.append(Finding("dropped_samples", text, missing, missing, "samples", "counted"))
+    return tuple(findings)

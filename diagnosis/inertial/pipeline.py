@@ -1,0 +1,85 @@
+"""The pipeline of a diagnosis of raw inertial data: units, odometry, start, path, pixel noise, sensors."""
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fgbaseline.data.plural import plural
+from fgbaseline.data.problem.inertial import imu_intervals
+from fgbaseline.data.sequence import Sequence
+
+from ..inertial_start.path import InertialPath, inertial_path
+from ..inertial_start.start import Start, inertial_start
+from ..noise.calibration_fit import fit_windows
+from ..odometry.stereo_odometry import Odometry, odometry
+from ..tracks.track_segments import repeated
+from ..tracks.unusable import unusable
+from .result import InertialDiagnosis
+from .sensors import sensor_checks
+from .units import imu_units, rescaled_samples
+
+BEGINNING = 3.0
+"""s, in which the odometry's misfit is compared with that of the whole recording"""
+MIN_BEGINNING = 5
+"""intervals of it"""
+
+
+def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnosis:
+    """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _diagnose(sequence, processes)
+
+
+def found_start(sequence: Sequence, pixel: float) -> tuple[Start, InertialPath, Odometry]:
+    """Start, path and odometry of samples in SI units at `pixel` px of noise, for a recording taken as it is.
+
+    Raises ValueError with the reason where there is no start.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        assert sequence.imu is not None
+        seen, imu = odometry(sequence), imu_intervals(sequence.imu, sequence.t)
+        start = inertial_start(sequence, seen, imu, pixel)
+        if start is None:
+            raise ValueError(no_start(seen))
+        return start, inertial_path(sequence, seen, imu, start), seen
+
+
+def no_start(seen: Odometry) -> str:
+    """The reason for which there is no start."""
+    known = int(seen.known.sum())
+    return (
+        f"the start of raw inertial data needs frames whose motion the cameras show, and there are too few at the "
+        f"beginning ({plural(known, 'interval')} of {len(seen.known):,} in all)"
+    )
+
+
+def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
+    seen = odometry(recorded) if len(recorded.observations) else None
+    units = imu_units(recorded, seen)
+    sequence = rescaled_samples(recorded, units)
+    assert sequence.imu is not None
+    imu = imu_intervals(sequence.imu, sequence.t)
+    reason = unusable(sequence)
+    if reason or seen is None:
+        return InertialDiagnosis(sequence, recorded, reason, units, imu)
+    copies = repeated(sequence)
+    first = inertial_start(sequence, seen, imu, max(seen.pixel_sigma, np.finfo(float).tiny))
+    if first is None:
+        return InertialDiagnosis(sequence, recorded, no_start(seen), units, imu, seen, copies)
+    path = inertial_path(sequence, seen, imu, first)
+    fit = fit_windows(sequence, seen, path.twist(sequence), processes)
+    pixel = seen.pixel_sigma * path.inflation if fit is None else fit.sigmas.pixel
+    start = inertial_start(sequence, seen, imu, pixel * misfit_of_beginning(sequence, seen, path))
+    sensors = sensor_checks(sequence, seen, path, start)
+    return InertialDiagnosis(sequence, recorded, "", units, imu, seen, copies, start, path, fit, sensors)
+
+
+def misfit_of_beginning(sequence: Sequence, seen: Odometry, path: InertialPath) -> float:
+    """How much larger the odometry's misfit is at the beginning than in the whole recording, at least 1.
+
+    Tracks that lag behind in the first seconds do so together, as where a tracker starts on a moving vehicle.
+    """
+    known = np.flatnonzero(seen.known)
+    early = sequence.t[known] < sequence.t[0] + BEGINNING
+    if int(early.sum()) < MIN_BEGINNING:
+        return 1.0
+    return max(1.0, float(np.sqrt(np.median(path.whitened[early]) / np.median(path.whitened))))

@@ -1,0 +1,133 @@
+"""The `calibrated` problem of a recording with raw inertial samples."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.data.plural import plural
+from fgbaseline.data.problem import Excluded, Problem
+from fgbaseline.data.problem.documented import most_observed
+from fgbaseline.data.problem.imu_gaps import sample_gaps
+from fgbaseline.data.problem.inertial import imu_intervals
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, HuberKernel, InputError
+
+from ..inertial_start.start import Start
+from ..odometry.stereo_odometry import odometry
+from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
+from ..tracks.observation_mask import MaskSettings, exclusions
+from .findings import inertial_findings, inertial_repairs
+from .pipeline import found_start
+from .result import InertialDiagnosis
+from .truth_tie import path_from, tied_truth
+from .units import imu_units, require_si
+
+
+def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
+    """The problem of a diagnosed recording: tracks split and masked, samples in SI units, noise of the IMU as given.
+
+    Raises InputError where no start is found.
+    """
+    sequence = found.sequence
+    if found.start is None or found.path is None:
+        raise InputError(f"{_source(sequence)}: {found.cannot_tell or 'no start is found'}")
+    path = found.path.states.pose
+    tracks = repaired_tracks(sequence, path, MaskSettings(), TrackRepairs(), found.pixel)
+    repaired = replace(
+        sequence,
+        observations=tracks.observations,
+        n_landmarks=tracks.n_landmarks,
+        truth=truth_of_landmarks(sequence.truth, tracks.n_landmarks),
+    )
+    origin = "found in the recording" if found.fit is not None else "assumed, not estimated from the recording"
+    remarks = (f"pixel noise {origin}: {found.pixel:.2f} px", *_imu_remarks(sequence))
+    problem = _posed(repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks)
+    return replace(
+        problem,
+        diagnosed=True,
+        findings=inertial_findings(found, tracks),
+        repairs=(*inertial_repairs(found), *tracks.repairs),
+    )
+
+
+def as_recorded_inertial(
+    sequence: Sequence, features: int | None, pixel: float, mask: MaskSettings, kernel: HuberKernel | None
+) -> Problem:
+    """The problem of a recording taken as it is, with the noise of its calibration and `pixel` px.
+
+    Raises InputError where no start is found, and for samples in other units than rad/s and m/s^2.
+    """
+    require_si(sequence, imu_units(sequence, odometry(sequence) if len(sequence.observations) else None))
+    try:
+        start, path, _ = found_start(sequence, pixel)
+    except ValueError as error:
+        raise InputError(f"{_source(sequence)}: {error}") from error
+    excluded = exclusions(sequence, path.states.pose, mask)
+    remarks = (
+        f"not diagnosed: {pixel:g} px is assumed, not estimated from the recording",
+        *_imu_remarks(sequence),
+    )
+    return _posed(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
+
+
+def _source(sequence: Sequence) -> str:
+    return sequence.source or sequence.name
+
+
+def _imu_remarks(sequence: Sequence) -> tuple[str, ...]:
+    imu = sequence.imu
+    assert imu is not None
+    n = imu.noise
+    remarks = [
+        f"noise of the inertial samples as given: gyroscope {n.gyroscope_density:.3g} rad/s/sqrt(Hz), walk "
+        f"{n.gyroscope_walk:.3g}; accelerometer {n.accelerometer_density:.3g} m/s^2/sqrt(Hz), walk "
+        f"{n.accelerometer_walk:.3g}; gravity {imu.gravity:g} m/s^2"
+    ]
+    gaps = sample_gaps(imu)
+    if len(gaps):
+        longest = float(np.diff(imu.t)[gaps].max())
+        remarks.append(
+            f"over {plural(len(gaps), 'gap')} between inertial samples (the longest {longest:.3g} s) they are "
+            "interpolated, and their noise is that of as long a time elsewhere"
+        )
+    return tuple(remarks)
+
+
+def _posed(
+    sequence: Sequence,
+    excluded: NDArray[np.uint8],
+    features: int | None,
+    pixel: float,
+    kernel: HuberKernel | None,
+    start: Start,
+    path: FloatArray,
+    remarks: tuple[str, ...],
+) -> Problem:
+    assert sequence.imu is not None
+    imu = imu_intervals(sequence.imu, sequence.t)
+    usable = sequence.observations.select(excluded == Excluded.NO)
+    chosen = most_observed(usable, sequence.n_landmarks, features)
+    left_out = (excluded == Excluded.NO) & ~np.isin(sequence.observations.landmark, chosen)
+    excluded[left_out] = Excluded.FEATURE_NOT_CHOSEN
+    remarks = (*remarks, f"start: {start.state.source}")
+    if sequence.truth is not None:
+        truth, how = tied_truth(sequence.truth, path_from(start.pose, path), 1.0 / float(np.median(sequence.dt)))
+        sequence, remarks = replace(sequence, truth=truth), (*remarks, how)
+    sequence = replace(sequence, up_imu=start.pose[2, :3].copy())
+    return Problem(
+        preset="calibrated",
+        findings=sequence.findings,
+        sequence=sequence,
+        increment=np.empty((0, 6)),
+        increment_covariance=np.empty((0, 6, 6)),
+        pixel_variance=pixel**2,
+        features=chosen,
+        excluded=excluded,
+        initial_pose=start.pose,
+        initial_covariance=np.asarray(start.state.covariance[:6, :6], dtype=np.float64),
+        imu=imu,
+        start=start.state,
+        kernel=kernel,
+        remarks=remarks,
+    )

@@ -1,0 +1,43 @@
+"""The result of a diagnosis of raw inertial data."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.data.problem.inertial import ImuIntervals
+from fgbaseline.data.sequence import Sequence
+
+from ..inertial_start.path import InertialPath
+from ..inertial_start.start import Start
+from ..noise.calibration_fit import CalibrationFit
+from ..odometry.stereo_odometry import Odometry
+from .sensors import SensorChecks
+from .units import ImuUnits
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class InertialDiagnosis:
+    """Start, path, noise and faults of a recording with raw inertial samples."""
+
+    sequence: Sequence
+    """in rad/s and m/s^2"""
+    recorded: Sequence
+    cannot_tell: str = ""
+    """reason for which no start is found, in a sentence without its full stop; empty otherwise"""
+    units: ImuUnits = field(default_factory=ImuUnits)
+    imu: ImuIntervals | None = None
+    odometry: Odometry | None = None
+    repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    """(T-1,) intervals whose tracks are copies"""
+    start: Start | None = None
+    path: InertialPath | None = None
+    fit: CalibrationFit | None = None
+    sensors: SensorChecks | None = None
+    """of gyroscope and accelerometer against the cameras"""
+
+    @property
+    def pixel(self) -> float:
+        """px, noise of each of the four rows; assumed where it is not found."""
+        return NoiseSettings().pixel if self.fit is None else self.fit.sigmas.pixel

@@ -1,0 +1,120 @@
+"""Gyroscope and accelerometer against the cameras: bias, extrinsic rotation, time offset, scale, gravity, range."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray, so3
+
+from ..conventions.robust_regression import regress
+from ..inertial_start.path import InertialPath
+from ..inertial_start.start import Start
+from ..odometry.stereo_odometry import Odometry
+from .rest_noise import RestNoise, rest_noise
+from .units import mean_rates
+
+MIN_INTERVALS = 20
+PRIOR = np.array([0.2] * 3 + [0.2] * 3 + [0.1, 0.1])
+"""rad/s, rad, s and share: wide beside what a recording determines"""
+CORRELATED = 2.0
+"""on standard errors, since errors of neighboring intervals are correlated"""
+SATURATED = 5
+"""samples in succession at the largest value of a component"""
+SATURATED_TIMES = 2
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SensorChecks:
+    """What the samples show against the motion that the cameras see; standard errors second."""
+
+    gyroscope_bias: tuple[FloatArray, FloatArray]
+    """(3,) rad/s"""
+    misalignment: tuple[FloatArray, FloatArray]
+    """(3,) rad, rotation vector by which imu_T_cam is turned against the gyroscope"""
+    time_offset: tuple[float, float]
+    """s: positive where the samples are stamped too late"""
+    gyroscope_scale: tuple[float, float]
+    """recorded over seen"""
+    rate_error: tuple[float, float]
+    """rad/s, median against the cameras: as recorded, and without bias, misalignment and offset"""
+    accelerometer_bias: FloatArray
+    """(3,) m/s^2, of the path at its middle"""
+    gravity: tuple[float, float]
+    """m/s^2, as measured along the vertical of the path, and as given"""
+    saturated: tuple[tuple[str, float, int], ...]
+    """component, value and number of samples at the end of a sensor's range"""
+    rest: RestNoise | None
+    """noise of a standing start"""
+
+    @property
+    def determined(self) -> bool:
+        """Whether the cameras show enough intervals."""
+        return bool(np.isfinite(self.time_offset[1]))
+
+
+def sensor_checks(sequence: Sequence, seen: Odometry, path: InertialPath, start: Start | None) -> SensorChecks:
+    """The checks of a recording in SI units with its path."""
+    assert sequence.imu is not None
+    known = seen.known
+    rate, dt = mean_rates(sequence), sequence.dt
+    bias, turn, offset, scale = _nothing(3), _nothing(3), (0.0, np.inf), (1.0, np.inf)
+    before = after = np.nan
+    if int(known.sum()) >= MIN_INTERVALS:
+        y = rate[known] - seen.twist(dt)[known, 3:]
+        slope = np.diff(_rates_at_frames(sequence), axis=0)[known] / dt[known, None]
+        w = rate[known]
+        design = np.concatenate(
+            [np.tile(np.eye(3), (len(y), 1, 1)), so3.hat3(w), -slope[:, :, None], w[:, :, None]], axis=2
+        )
+        fit = regress(y, design, PRIOR)
+        deviation = CORRELATED * np.sqrt(np.diag(fit.covariance))
+        bias, turn = (fit.theta[:3], deviation[:3]), (fit.theta[3:6], deviation[3:6])
+        offset = float(fit.theta[6]), float(deviation[6])
+        scale = 1.0 + float(fit.theta[7]), float(deviation[7])
+        before = float(np.median(np.linalg.norm(y, axis=1)))
+        after = float(np.median(np.linalg.norm(y - design @ fit.theta, axis=1)))
+    middle = path.states.accelerometer_bias[len(path.states) // 2]
+    rest = None if start is None or not start.standing else rest_noise(sequence, start.standing)
+    return SensorChecks(
+        bias, turn, offset, scale, (before, after), middle, _gravity(sequence, path), tuple(_saturated(sequence)), rest
+    )
+
+
+def _nothing(n: int) -> tuple[FloatArray, FloatArray]:
+    return np.zeros(n), np.full(n, np.inf)
+
+
+def _rates_at_frames(sequence: Sequence) -> FloatArray:
+    """(T, 3) angular velocity at the frames."""
+    imu = sequence.imu
+    assert imu is not None
+    return np.stack([np.interp(sequence.t, imu.t, column) for column in imu.angular_velocity.T], axis=1)
+
+
+def _gravity(sequence: Sequence, path: InertialPath) -> tuple[float, float]:
+    """Gravity as measured along the vertical, and as given.
+
+    The path holds gravity to its given magnitude, so that an excess shows in the bias along the vertical.
+    """
+    imu = sequence.imu
+    assert imu is not None
+    vertical = path.states.pose[:, 2, :3]
+    excess = np.einsum("ni,ni->n", vertical, path.states.accelerometer_bias)
+    return imu.gravity + float(excess.mean()), imu.gravity
+
+
+def _saturated(sequence: Sequence) -> list[tuple[str, float, int]]:
+    """Components that stay at one largest value for several samples, as a sensor at the end of its range does."""
+    imu = sequence.imu
+    assert imu is not None
+    found = []
+    for name, values in (("angular velocity", imu.angular_velocity), ("specific force", imu.specific_force)):
+        for axis, column in zip("xyz", values.T, strict=True):
+            for limit in (float(column.max()), float(column.min())):
+                at = np.concatenate([[False], column == limit, [False]])
+                edges = np.flatnonzero(np.diff(at.astype(np.int8)))
+                long = (edges[1::2] - edges[::2]) >= SATURATED
+                if int(long.sum()) >= SATURATED_TIMES and abs(limit) > 0.0 and float(np.ptp(column)) > 0.0:
+                    found.append((f"{name} {axis}", limit, int((column == limit).sum())))
+    return found

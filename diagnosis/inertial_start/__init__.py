@@ -1,0 +1,1 @@
+"""Initial state of raw inertial data, from stereo odometry and inertial samples by least squares."""
