@@ -57,7 +57,7 @@ class EventKind(StrEnum):
     """observations rejected by a chi-square gate"""
     FRAME_DISAGREES = "frame disagrees"
     """all observations of a frame rejected, since most of them are beyond a chi-square quantile"""
-    ENTRY_PUT_OFF = "entry put off"
+    INITIALIZATION_DEFERRED = "entry put off"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
     STATE_FULL = "state full"
     """observations of landmarks that the state has no room for"""
@@ -159,7 +159,7 @@ class Estimate:
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further answers that the same run gave at no cost, by the name they are registered under"""
 
-    def moved(self, motion: FloatArray) -> "Estimate":
+    def transformed(self, motion: FloatArray) -> "Estimate":
         """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
         R, landmarks, state_covariance = motion[:3, :3], self.landmarks, self.state_covariance
         if state_covariance is not None:  # the velocity's error is in world axes
@@ -173,7 +173,7 @@ class Estimate:
             landmarks=Landmarks(landmarks.index, se3.transform(motion, landmarks.position), covariance),
             velocity=None if self.velocity is None else self.velocity @ R.T,
             state_covariance=state_covariance,
-            by_products={name: other.moved(motion) for name, other in self.by_products.items()},
+            by_products={name: other.transformed(motion) for name, other in self.by_products.items()},
         )
 
     @staticmethod

@@ -24,7 +24,7 @@ class Shift(float, Enum):
         return format(float(self), form)
 
 
-def held_twist(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
+def zero_order_hold(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
     """(T-1, 6) recorded velocity [v, w] of each interval, each sample held for one interval.
 
     Sample k is held from `shift` intervals after its stamp on; between the whole ones, two neighbours share an interval
@@ -39,7 +39,7 @@ def held_twist(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
 
 def increments(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArray:
     """(T-1, 6) twists [v, w] times dt (m, rad), each the motion from one frame to the next (tau u of equation 9)."""
-    return held_twist(sequence, shift) * sequence.dt[:, None]
+    return zero_order_hold(sequence, shift) * sequence.dt[:, None]
 
 
 def dead_reckoned_path(increment: FloatArray, initial_pose: FloatArray | None = None) -> FloatArray:

@@ -166,7 +166,7 @@ def check_sequence(s: Sequence) -> None:
         raise InputError(
             f"time_stamps: stamps must rise, but frame {k + 1} ({s.t[k + 1]!r} s) is not after frame {k} ({s.t[k]!r} s)"
         )
-    defect = float(so3.rotation_defect(s.imu_T_cam[:3, :3])) if s.imu_T_cam.shape == (4, 4) else np.inf
+    defect = float(so3.orthogonality_error(s.imu_T_cam[:3, :3])) if s.imu_T_cam.shape == (4, 4) else np.inf
     if not (defect <= ROTATION_TOLERANCE and measurable(s.imu_T_cam).all()):
         raise InputError(
             f"imu_T_cam: its upper left 3x3 is no rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
@@ -192,7 +192,7 @@ def check_sequence(s: Sequence) -> None:
 
 
 def _check_truth(truth: Truth, T: int, n_landmarks: int) -> None:
-    defect = so3.rotation_defect(truth.world_T_imu[truth.known][:, :3, :3])
+    defect = so3.orthogonality_error(truth.world_T_imu[truth.known][:, :3, :3])
     if defect.size and defect.max() > ROTATION_TOLERANCE:
         k = int(np.flatnonzero(truth.known)[defect.argmax()])
         raise InputError(f"ground_truth: the pose of frame {k} is no rigid motion (rotation off by {defect.max():.3g})")

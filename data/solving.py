@@ -19,12 +19,12 @@ Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
 ROTATION_TOLERANCE = 1e-6
 
 
-def unwatched(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
+def no_progress(name: str) -> AbstractContextManager[Progress | None]:  # noqa: ARG001
     """Progress is not reported."""
     return nullcontext(None)
 
 
-def solve_all(problem: Problem, names: Iterable[str], watch: Watch = unwatched) -> dict[str, Estimate]:
+def solve_all(problem: Problem, names: Iterable[str], watch: Watch = no_progress) -> dict[str, Estimate]:
     """Answer of each named estimator, in the order of the names; a failure is an answer and stops nothing.
 
     A by-product (`isam2-online` of `isam2`) is not solved again, and an estimator that has a parameter `given`
@@ -119,7 +119,7 @@ def _require_path(answer: Estimate) -> None:
         raise FgbaselineError("it gave no pose at all")
     defect = np.where(np.isfinite(poses).all(axis=(1, 2)), 0.0, np.inf)
     rigid = known & (defect == 0.0)
-    defect[rigid] = so3.rotation_defect(poses[rigid, :3, :3])
+    defect[rigid] = so3.orthogonality_error(poses[rigid, :3, :3])
     wrong = np.flatnonzero(known & ~(defect <= ROTATION_TOLERANCE))
     if len(wrong):
         k = int(wrong[0])

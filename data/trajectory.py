@@ -122,7 +122,7 @@ def check_trajectory(path: Trajectory) -> FloatArray:
     )
     with np.errstate(over="ignore", invalid="ignore"):
         last_row = [np.abs(poses[:, 3, i] - float(i == 3)) for i in range(4)]
-        defect = np.maximum.reduce([so3.rotation_defect(poses[:, :3, :3]), *last_row])
+        defect = np.maximum.reduce([so3.orthogonality_error(poses[:, :3, :3]), *last_row])
     _require(
         defect <= ROTATION_TOLERANCE,
         path,

@@ -17,7 +17,7 @@ from .pose_update import (
     PoseInnovation,
     pose_innovation,
     pose_posterior,
-    printed_covariance,
+    standard_form_covariance,
 )
 
 SUSPECT_CONDITION = 1.0 / np.sqrt(np.finfo(np.float64).eps)
@@ -84,7 +84,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                 )
                 body, covariance = body.corrected(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:
-                    lost = _printed_form_failure(predicted, innovation, weight[known])
+                    lost = _standard_form_failure(predicted, innovation, weight[known])
                     if lost:
                         events.append(_singular_event(k, posterior.innovation_condition, lost))
         if not (np.isfinite(body.pose).all() and np.isfinite(covariance).all()):
@@ -113,10 +113,10 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     )
 
 
-def _printed_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
+def _standard_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
     """Failure of (I - K H) Sigma in the printed form; empty where it stays positive definite."""
     try:
-        printed = printed_covariance(covariance, innovation, weight)
+        printed = standard_form_covariance(covariance, innovation, weight)
         smallest = float(np.linalg.eigvalsh(0.5 * (printed + printed.T))[0])
     except np.linalg.LinAlgError:
         return "has no inverse in double precision"

@@ -51,7 +51,7 @@ class IndependentLandmarks:
             self.mean[row[fresh]] = se3.transform(world_T_cam, model.camera.triangulate(pixel[fresh]))
             self.known[row[fresh]] = True
         predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
-        residual, rows, variance = model.documented_rows(pixel, predicted.pixel)
+        residual, rows, variance = model.documented_innovation(pixel, predicted.pixel)
         H = predicted.point_jacobian()[:, rows, :3]
         if weight is None:
             weight = np.ones(len(row))

@@ -39,10 +39,10 @@ def pose_innovation(
 ) -> PoseInnovation:
     """Residuals and Jacobians of world points (n, 3) seen at pixels (n, 4) from a pose (4, 4) (equation 13).
 
-    In the rows of `StereoMeasurement.documented_rows`.
+    In the rows of `StereoMeasurement.documented_innovation`.
     """
     predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
-    residual, rows, variance = measurement.documented_rows(pixel, predicted.pixel)
+    residual, rows, variance = measurement.documented_innovation(pixel, predicted.pixel)
     return PoseInnovation(residual, predicted.pose_jacobian()[:, rows], variance)
 
 
@@ -89,7 +89,7 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
     return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2, float(left @ left))
 
 
-def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
+def standard_form_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
     """Posterior covariance (n, n) as equation 13 prints it, (I - K H) Sigma, with its rounding errors.
 
     Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.

@@ -16,7 +16,7 @@ import numpy as np
 
 from . import se3, so3
 from .so3 import FloatArray
-from .stereo import PRINTED, StereoCamera, StereoRows
+from .stereo import PIXEL_ROWS, StereoCamera, StereoRows
 
 ROWS = ("uL", "uR", "v")
 ROW_VARIANCE = np.array([1.0, 1.0, 0.5])
@@ -64,7 +64,7 @@ class HuberKernel:
         k = self.threshold
         return np.where(squared > k**2, 2.0 * k * np.sqrt(squared) - k**2, squared)
 
-    def flattening(self, squared: FloatArray) -> FloatArray:
+    def curvature_correction(self, squared: FloatArray) -> FloatArray:
         """c of squared whitened norms (...): half the loss has the second derivative w J^T J - c (w J^T r)(w J^T r)^T.
 
         w is the weight, J is taken as constant: 1 / (k norm) beyond k, 0 up to it.
@@ -108,24 +108,24 @@ class StereoMeasurement:
         """The kernel's loss of squared whitened norms (...): these themselves without a kernel."""
         return squared if self.kernel is None else self.kernel.loss(squared)
 
-    def flattening(self, squared: FloatArray) -> FloatArray:
-        """The kernel's `HuberKernel.flattening`; 0 without a kernel."""
-        return np.zeros_like(squared) if self.kernel is None else self.kernel.flattening(squared)
+    def curvature_correction(self, squared: FloatArray) -> FloatArray:
+        """The kernel's `HuberKernel.curvature_correction`; 0 without a kernel."""
+        return np.zeros_like(squared) if self.kernel is None else self.kernel.curvature_correction(squared)
 
-    def documented_rows(self, pixel: FloatArray, predicted: FloatArray) -> "DocumentedRows":
+    def documented_innovation(self, pixel: FloatArray, predicted: FloatArray) -> "DocumentedInnovation":
         """What the report's filter takes from pixels (n, 4) predicted at rows (n, 3): the four rows as printed, or the
         three where a kernel asks for their norm."""
         if self.kernel is None:
-            rows = list(PRINTED)
-            return DocumentedRows(pixel - predicted[:, rows], rows, np.full(4, self.variance))
-        return DocumentedRows(measured_rows(pixel) - predicted, [0, 1, 2], self.row_variance)
+            rows = list(PIXEL_ROWS)
+            return DocumentedInnovation(pixel - predicted[:, rows], rows, np.full(4, self.variance))
+        return DocumentedInnovation(measured_rows(pixel) - predicted, [0, 1, 2], self.row_variance)
 
     def with_variance(self, variance: float) -> "StereoMeasurement":
         """The same model with another V, px^2."""
         return replace(self, variance=variance)
 
 
-class DocumentedRows(NamedTuple):
+class DocumentedInnovation(NamedTuple):
     """n observations in r rows each, four or three."""
 
     residual: FloatArray
@@ -141,7 +141,7 @@ class Prediction:
     """n world points as a pair sees them from one pose."""
 
     camera: StereoCamera
-    seen: StereoRows
+    rows: StereoRows
     cam_T_imu: FloatArray
     """(4, 4)"""
     imu_T_world: FloatArray
@@ -152,24 +152,24 @@ class Prediction:
     @property
     def pixel(self) -> FloatArray:
         """(n, 3) uL, uR and v, px."""
-        return np.ascontiguousarray(self.seen.pixel.T)
+        return np.ascontiguousarray(self.rows.pixel.T)
 
     @property
     def depth(self) -> FloatArray:
         """(n,) z in m, of points at a finite distance."""
-        return np.asarray(1.0 / self.seen.near, dtype=np.float64)
+        return np.asarray(1.0 / self.rows.inverse_depth, dtype=np.float64)
 
     @property
     def cosine(self) -> FloatArray:
         """(n,) of the angle between the optical axis and the ray to the point; not positive behind the camera."""
-        x, y, _ = self.seen.slope
-        return np.asarray(np.copysign(1.0 / np.sqrt(x * x + y * y + 1.0), self.seen.near), dtype=np.float64)
+        x, y, _ = self.rows.normalized
+        return np.asarray(np.copysign(1.0 / np.sqrt(x * x + y * y + 1.0), self.rows.inverse_depth), dtype=np.float64)
 
     @cached_property
     def _by_camera_point(self) -> FloatArray:
         """(3n, 4) derivatives by the homogeneous point in the left camera's frame, one row after the other."""
-        along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.seen.near.size))
-        return np.ascontiguousarray(self.camera.rows_along(self.seen, along).transpose(2, 0, 1)).reshape(-1, 4)
+        along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.rows.inverse_depth.size))
+        return np.ascontiguousarray(self.camera.row_derivatives(self.rows, along).transpose(2, 0, 1)).reshape(-1, 4)
 
     def pose_jacobian(self) -> FloatArray:
         """(n, 3, 6) derivatives by the right perturbation [v, w] of world_T_imu: H of equation 13.
@@ -190,7 +190,7 @@ class Prediction:
 
 
 def predict(camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray) -> Prediction:
-    """How world points, (n, 3) in m or homogeneous (n, 4), are seen from a pose (4, 4)."""
+    """How world points, (n, 3) in m or homogeneous (n, 4), are rows from a pose (4, 4)."""
     imu_T_world = se3.inverse(world_T_imu)
     if points.shape[1] == 3:  # the difference first: far from the origin it keeps the digits that sums would lose
         s = np.ones((4, len(points)))

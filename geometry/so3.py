@@ -121,7 +121,7 @@ def rotation_angle(rotation: ArrayLike) -> FloatArray:
     return np.asarray(np.arctan2(twice_sine, twice_cosine))
 
 
-def turn_about(axis: ArrayLike, rotation: ArrayLike) -> FloatArray:
+def twist_angle(axis: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Angles (...,) in radians, -pi to pi, by which rotation matrices (..., 3, 3) turn about a unit axis (3,).
 
     That of the rotation about the axis which is nearest to them: their twist. Zero where they turn by pi about an axis
@@ -145,7 +145,7 @@ def rotation_to_z(vector: ArrayLike) -> FloatArray:
     return exp_so3(np.arctan2(sine, z) / sine * np.array([y, -x, 0.0]))
 
 
-def rotation_defect(matrix: ArrayLike) -> FloatArray:
+def orthogonality_error(matrix: ArrayLike) -> FloatArray:
     """How far matrices (..., 3, 3) are from proper rotations: the largest entry of |R^T R - I| and |det R - 1|."""
     # Columns apart: ten times as fast as stacked products, determinants and reductions over axes of three.
     a, b, c = np.moveaxis(np.asarray(matrix, dtype=np.float64), (-1, -2), (0, 1)).copy()

@@ -4,7 +4,7 @@ The pair sees the homogeneous point q = (x, y, z, w), w being 1 for a point at a
 
     uL = fu x/z + cu,    uR = uL - fu b w/z,    v = fv y/z + cv,
 
-with vL = vR = v. `StereoCamera.rows` and `rows_along` are these three rows and their derivatives; every prediction and
+with vL = vR = v. `StereoCamera.rows` and `row_derivatives` are these three rows and their derivatives; every prediction and
 every Jacobian of the toolkit is made of them. Coordinates are the first axis: with stacks of small matrices what runs
 over many observations takes several times as long.
 """
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .so3 import FloatArray
 
-PRINTED = (0, 2, 1, 2)
+PIXEL_ROWS = (0, 2, 1, 2)
 """which of the three rows (uL, uR, v) predicts each of the printed four, uL, vL, uR, vR"""
 MIN_DEPTH = 0.5
 """baselines: a nearer point is in both images only of cameras that see more than 90 degrees; at the camera's plane the
@@ -64,17 +64,17 @@ class StereoCamera:
         pixel[2] = self.fv * slope[1] + self.cv
         return StereoRows(pixel, slope, near)
 
-    def rows_along(self, seen: StereoRows, along: FloatArray) -> FloatArray:
+    def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
         """Derivatives (3, k, ...) of the rows along k motions of the points, `along` (3 or 4, k, ...) in m.
 
         `along[i]` is how the coordinate i of q changes with each of the k parameters; a point at a finite distance has
         three coordinates, its w does not change.
         """
-        x, y, w = seen.slope
-        left = (self.fu * seen.near) * (along[0] - x * along[2])
+        x, y, w = seen.normalized
+        left = (self.fu * seen.inverse_depth) * (along[0] - x * along[2])
         farther = -w * along[2] if len(along) == 3 else along[3] - w * along[2]
-        right = left - (self.fu * self.baseline * seen.near) * farther
-        return np.stack([left, right, (self.fv * seen.near) * (along[1] - y * along[2])])
+        right = left - (self.fu * self.baseline * seen.inverse_depth) * farther
+        return np.stack([left, right, (self.fv * seen.inverse_depth) * (along[1] - y * along[2])])
 
     def project(self, points: ArrayLike) -> FloatArray:
         """Pixels (..., 4), uL, vL, uR, vR, of points (..., 3) in the left camera's frame, m (equation 10).
@@ -83,14 +83,14 @@ class StereoCamera:
         in front.
         """
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
-        return np.ascontiguousarray(np.moveaxis(self.rows(q).pixel[list(PRINTED)], 0, -1))
+        return np.ascontiguousarray(np.moveaxis(self.rows(q).pixel[list(PIXEL_ROWS)], 0, -1))
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
         """Derivatives (..., 4, 3) of `project` with respect to points (..., 3): K_s dpi/dq in equations 11, 13."""
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         identity = np.eye(3).reshape(3, 3, *([1] * (q.ndim - 1)))
         along = np.broadcast_to(identity, (3, 3, *q.shape[1:]))
-        J = self.rows_along(self.rows(q), along)[list(PRINTED)]
+        J = self.row_derivatives(self.rows(q), along)[list(PIXEL_ROWS)]
         return np.ascontiguousarray(np.moveaxis(J, (0, 1), (-2, -1)))
 
     def triangulate(self, pixels: ArrayLike) -> FloatArray:

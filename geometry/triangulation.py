@@ -92,11 +92,11 @@ def triangulate_tracks(
     # Points at a camera's plane divide by zero; they cost infinitely much and nothing else comes of it.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         damping = np.full(len(place), 1e-6)
-        sums = _linearised(measurement, observed, p)
+        sums = _linearized(measurement, observed, p)
         arrived = near = np.zeros(len(place), dtype=np.bool_)
         for _ in range(MAX_ITERATIONS):
             step = _damped_step(sums, damping, near, least)
-            trial = _linearised(measurement, observed, p + step)
+            trial = _linearized(measurement, observed, p + step)
             better = trial[0] <= sums[0]
             p, sums = np.where(better, p + step, p), np.where(better, trial, sums)
             length = np.sqrt((step * step).sum(axis=0) / (p * p).sum(axis=0))
@@ -148,14 +148,14 @@ def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate([[True], row[1:] != row[:-1]]))
 
 
-def _linearised(measurement: StereoMeasurement, observed: _Observed, p: FloatArray) -> FloatArray:
+def _linearized(measurement: StereoMeasurement, observed: _Observed, p: FloatArray) -> FloatArray:
     """(16, m) of points p (3, m): cost, then the upper triangle of J^T W J row by row, each row followed by its entry
     of J^T W r, then the upper triangle of what the kernel's curvature takes off J^T W J."""
     camera, axes = measurement.camera, observed.axes
     q = (axes * (p[:, observed.row] - observed.centre)[:, None]).sum(axis=0)
     seen, white = camera.rows(q), measurement.white_scale[:, None]
     A = np.empty((3, 4, q.shape[1]))
-    A[:, :3] = camera.rows_along(seen, axes.transpose(1, 0, 2)) * white[:, None]
+    A[:, :3] = camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
     A[:, 3] = (observed.measured - seen.pixel) * white
     squared = (A[:, 3] * A[:, 3]).sum(axis=0)
     squared[~(q[2] > 0.0)] = np.inf
@@ -168,7 +168,7 @@ def _linearised(measurement: StereoMeasurement, observed: _Observed, p: FloatArr
     terms[5:8] = (A[:, 1:2] * A[:, 1:]).sum(axis=0)
     terms[8:10] = (A[:, 2:3] * A[:, 2:]).sum(axis=0)
     pull = terms[[4, 7, 9]]
-    along = measurement.flattening(squared) * pull
+    along = measurement.curvature_correction(squared) * pull
     terms[10:13], terms[13:15], terms[15] = along[0] * pull, along[1] * pull[1:], along[2] * pull[2]
     return np.add.reduceat(terms, observed.start, axis=1)
 

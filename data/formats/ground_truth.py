@@ -18,7 +18,7 @@ from .inertial_truth import inertial_truth, with_state
 from .named_file import FilePath, reading, shown
 from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
-from .trajectory_file import TrajectoryFile, settled
+from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]
@@ -97,7 +97,7 @@ def _poses_of_frames(
     return poses, _lines(file, sequence.n_frames, frames, nearest), remarks
 
 
-def _lines(file: TrajectoryFile, n_frames: int, frames: IntArray, index: IntArray) -> IntArray:
+def _lines(file: ParsedTrajectory, n_frames: int, frames: IntArray, index: IntArray) -> IntArray:
     """(T,) the line of the file that each frame's pose stands on; -1 where there is none."""
     line = np.full(n_frames, -1, dtype=np.int64)
     if file.line is not None:
@@ -106,7 +106,7 @@ def _lines(file: TrajectoryFile, n_frames: int, frames: IntArray, index: IntArra
 
 
 def _order(
-    sequence: Sequence, file: TrajectoryFile, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
+    sequence: Sequence, file: ParsedTrajectory, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
 ) -> Order:
     """The order of quaternions with which the truth turns as the gyroscope measured, clearly; else the usual one."""
     if len(file.orders) == 1 or len(frames) <= STEP:
@@ -142,7 +142,7 @@ def _turned(sequence: Sequence) -> FloatArray:
     return turned
 
 
-def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArray]:
+def _frames(sequence: Sequence, file: ParsedTrajectory) -> tuple[IntArray, IntArray]:
     """The frames (n,) of poses without stamps, by their numbers, else line by line, and which poses (n,) they are.
 
     Frames of the recording's file that it leaves out count, and their poses are left out.
@@ -167,7 +167,7 @@ def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArra
     return frame[frame >= 0], np.flatnonzero(frame >= 0)
 
 
-def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
+def _require_same_speed(sequence: Sequence, file: ParsedTrajectory) -> None:
     """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
     if sequence.imu is not None:
         return  # its speed is not known yet
@@ -183,13 +183,13 @@ def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
         )
 
 
-def _unit(sequence: Sequence, file: TrajectoryFile) -> TimeUnit:
+def _unit(sequence: Sequence, file: ParsedTrajectory) -> TimeUnit:
     """The unit of the stamps, by the time that they share with the recording where they leave it open."""
     assert file.stamps is not None
     spans = {unit: (float(t[0]), float(t[-1])) for unit in file.units for t in (file.stamps.seconds(unit),)}
     found = units_in_common({TimeUnit.S: (float(sequence.t[0]), float(sequence.t[-1]))}, spans)
     if found is None:
-        unit, _ = settled(file, None, None)
+        unit, _ = unit_and_order(file, None, None)
         return unit
     return found[1]
 

@@ -28,7 +28,7 @@ def gaps(dt: FloatArray) -> BoolArray:
     return np.asarray(dt > GAP * np.median(dt), dtype=np.bool_)
 
 
-def admit_gaps(problem: Problem) -> Problem:
+def inflate_gap_covariance(problem: Problem) -> Problem:
     """The problem with the covariance of increments over gaps enlarged by the velocity's random walk.
 
     A problem without gaps is returned unchanged.

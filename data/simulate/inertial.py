@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..axis_conventions import axes_matrix
 from ..imu import ImuNoise, ImuSamples
-from .chance import Concern, generator
+from .random_streams import RandomStream, generator
 from .path import Path
 from .settings import Simulation
 
@@ -81,7 +81,7 @@ def recorded_samples(path: Path, t: FloatArray, settings: Simulation) -> Inertia
     R = spline.poses(when)[:, :3, :3]
     force = np.einsum("nji,nj->ni", R, spline.acceleration(when) + np.array([0.0, 0.0, imu.gravity]))
     biases = _biases(len(at), settings)
-    noise = generator(settings.seed, Concern.IMU_NOISE).standard_normal((len(at), 6)) * np.sqrt(imu.rate)
+    noise = generator(settings.seed, RandomStream.IMU_NOISE).standard_normal((len(at), 6)) * np.sqrt(imu.rate)
     angular = spline.angular_velocity(when) @ axes_matrix(settings.angular_axes) + biases[:, :3]
     linear = settings.velocity_scale * force @ axes_matrix(settings.linear_axes) + biases[:, 3:]
     samples = ImuSamples(
@@ -106,7 +106,7 @@ def _biases(n: int, settings: Simulation) -> FloatArray:
     """Biases (n, 6) of gyroscope and accelerometer: random walks from their values at the first sample."""
     imu = settings.imu
     assert imu is not None
-    steps = generator(settings.seed, Concern.IMU_BIAS).standard_normal((n, 6)) / np.sqrt(imu.rate)
+    steps = generator(settings.seed, RandomStream.IMU_BIAS).standard_normal((n, 6)) / np.sqrt(imu.rate)
     steps *= np.repeat([imu.gyroscope_walk, imu.accelerometer_walk], 3)
     steps[0] = [*settings.gyro_bias, *imu.accelerometer_bias]
     return np.cumsum(steps, axis=0)

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, se3
 
 from ..observations import BoolArray, IntArray
 from .path import Path
-from .scenery import Scenery
+from .street_objects import StreetObjects
 
 _LANE = 1.6
 """m, from the middle of the car's lane to the middle of the street, to the left"""
@@ -26,7 +26,7 @@ class Street:
     """The street a path follows; `rng` builds what stands along it."""
 
     def __init__(self, path: Path, imu_above_ground: float, highway: bool, rng: np.random.Generator) -> None:
-        self._scenery = Scenery(8.0 if highway else 0.0, rng)
+        self._scenery = StreetObjects(8.0 if highway else 0.0, rng)
         forward = np.einsum("ni,ni->n", path.poses[:-1, :3, 0], np.diff(path.poses[:, :3, 3], axis=0))
         travelled = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(forward)]))
         rising = np.concatenate([[True], np.diff(np.maximum.accumulate(travelled)) > 1e-9])

@@ -80,7 +80,7 @@ class JointFilter:
         if self.settings.coordinates is LandmarkRepresentation.WORLD:  # where nothing is at infinity
             wanted &= self.measured[index, 0] > self.measured[index, 1]
         if (wanted != new).any():
-            self._reject(k, EventKind.ENTRY_PUT_OFF, ~wanted[new])
+            self._reject(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
         selected = self._select(k, index, wanted)
         if selected.any():
             self._initialize_from_observation(index[selected])

@@ -37,7 +37,7 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     """
     with threadpool_limits(limits=1, user_api="blas"):
         posed, world_T_solver = in_solver_frame(problem)
-        return _solve(posed, progress, settings or FixedLagSettings()).moved(world_T_solver)
+        return _solve(posed, progress, settings or FixedLagSettings()).transformed(world_T_solver)
 
 
 def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:

@@ -22,7 +22,7 @@ HELD_VARIANCE = 1e-9
 
 
 def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
-    """The problem in the frame of its first pose, and that pose (4, 4); `Estimate.moved` by it undoes the change.
+    """The problem in the frame of its first pose, and that pose (4, 4); `Estimate.transformed` by it undoes the change.
 
     GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
     depend on how the world is turned. With raw inertial data z stays up, and the frame is that of the first pose but

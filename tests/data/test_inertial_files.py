@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.exchange import layout, write_problem
+from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.data.formats.imu_csv import read_imu_csv
 from fgbaseline.data.formats.imu_yaml import read_imu_calibration
 from fgbaseline.data.imu import ASSUMED_NOISE, ImuNoise

@@ -94,7 +94,7 @@ def test_the_smallest_rotation_to_z_takes_a_direction_there_and_turns_about_no_v
     R = so3.rotation_to_z(vector)
     np.testing.assert_allclose(R @ vector / np.linalg.norm(vector), [0.0, 0.0, 1.0], atol=1e-12)
     assert abs(so3.log_so3(R)[2]) < 1e-12
-    assert so3.rotation_defect(R) < 1e-12
+    assert so3.orthogonality_error(R) < 1e-12
 
 
 def test_the_command_writes_inertial_samples_and_reads_them_back(tmp_path: Path) -> None:

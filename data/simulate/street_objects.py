@@ -15,7 +15,7 @@ from ..observations import BoolArray, IntArray
 _Points = tuple[FloatArray, FloatArray, FloatArray]
 
 
-class Scenery:
+class StreetObjects:
     """The things of one town, drawn once; `margin` m more between the middle of the street and what stands there."""
 
     def __init__(self, margin: float, rng: np.random.Generator) -> None:

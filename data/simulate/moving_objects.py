@@ -12,7 +12,7 @@ _SLOT = 4.0
 """s after which another thing comes along"""
 
 
-class Traffic:
+class MovingObjects:
     """One thing at a time, in a straight line at constant speed; points on its surface share its velocity."""
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
