@@ -48,13 +48,13 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         taken[stage] = time.perf_counter() - start
 
     with watch("imports"):
-        from fgbaseline.data.parallel import cores, shared
+        from fgbaseline.data.parallel import background_map, cores
         from fgbaseline.reports import progress  # noqa: F401
         from fgbaseline.reports.run.problem import RunSettings, load_estimators, pose_problem, read_sequence
     settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = read_sequence(settings)
-    with watch(POSING), shared(lambda _: pose_problem(sequence, settings, cores()), 1, cores()) as posed:
+    with watch(POSING), background_map(lambda _: pose_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.compare.estimate_comparison import compare_all
         from fgbaseline.data.solving import solve_all
         from fgbaseline.reports import figures

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fgbaseline import compare
 from fgbaseline.data import Estimate, HeldOut, Problem, Status
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.parallel import shared
+from fgbaseline.data.parallel import background_map
 from fgbaseline.geometry import FloatArray
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
@@ -174,7 +174,7 @@ def compare_all(
         trusted = compare.trust(problem, estimates[reference], estimates.get("batch"))
     origin = None if reference is None else estimates[reference]
     names = list(estimates)
-    with shared(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
+    with background_map(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
         parts = compared()
     results = {name: Result(estimates[name], **part) for name, part in zip(names, parts, strict=True)}
     divergences = {n: r.divergence for n, r in results.items() if r.answered and r.divergence is not None}

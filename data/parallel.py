@@ -1,7 +1,7 @@
-"""Parallel map with forks of this process, each of which takes the next open item.
+"""Parallel map in forks of this process, with dynamic scheduling.
 
-Forks share memory and imports, so that nothing is sent to them. Only Linux forks safely; elsewhere this process does
-all items. Items of a fork that fails or dies are computed here again, so that an error is raised in this process.
+Forks share memory and imports, so that no arguments are sent. Only Linux forks safely; elsewhere this process computes
+all items. Items of a fork that fails or dies are computed again here, so that an exception is raised in this process.
 """
 
 import os
@@ -19,32 +19,32 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 def cores() -> int:
-    """The number of cores of this process that `shared` can use."""
+    """The number of cores of this process that `background_map` can use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
 
 
 @contextmanager
-def shared(work: Callable[[int], T], n: int, processes: int) -> Iterator[Callable[[], list[T]]]:
-    """Starts `work` on the numbers 0 to n - 1 (at most 256) in `processes` - 1 forks, the last numbers first.
+def background_map(work: Callable[[int], T], n: int, processes: int) -> Iterator[Callable[[], list[T]]]:
+    """Maps `work` over 0 to n - 1 (at most 256) in the background, in `processes` - 1 forks, last numbers first.
 
-    The yielded function joins the work until it is done, and returns all results in the order of their numbers. This
-    process may do something else first. All forks have ended when the block ends, also by an exception.
+    The yielded function joins the work and returns all results in order. The caller may do something else first. All
+    forks have ended when the block ends, also by an exception.
     """
     helpers = min(processes - 1, n) if sys.platform == "linux" else 0
-    with _taken_in_turn(n) as numbers, _helping(work, numbers, helpers) as answers:
+    with _work_queue(n) as numbers, _workers(work, numbers, helpers) as answers:
 
-        def gathered() -> list[T]:
+        def join() -> list[T]:
             done = _done(work, numbers)
             for answer in answers:
                 with suppress(EOFError):  # it died, or failed
                     done |= answer.recv()
             return [done[i] if i in done else work(i) for i in range(n)]
 
-        yield gathered
+        yield join
 
 
 def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
-    """Results by number of the items that this process takes."""
+    """Results by number of the items that this process computes."""
     done = {}
     while number := os.read(numbers, 1):
         done[number[0]] = work(number[0])
@@ -52,8 +52,8 @@ def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
 
 
 @contextmanager
-def _taken_in_turn(n: int) -> Iterator[int]:
-    """A pipe of the bytes n - 1 to 0; a process takes the number that it reads."""
+def _work_queue(n: int) -> Iterator[int]:
+    """Queue of the items: a pipe of the bytes n - 1 to 0, of which a process reads one at a time."""
     numbers, into = os.pipe()
     os.write(into, bytes(reversed(range(n))))
     os.close(into)
@@ -64,15 +64,15 @@ def _taken_in_turn(n: int) -> Iterator[int]:
 
 
 @contextmanager
-def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[list[Connection]]:
-    """The pipes of results of so many forks."""
+def _workers(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[list[Connection]]:
+    """Pipes with the results of the forks."""
     answers, started = [], list[ForkProcess]()
     try:
         for _ in range(helpers):
             context = get_context("fork")
             answer, into = context.Pipe(duplex=False)
-            process = context.Process(target=_help, args=(work, numbers, answer, into))
-            with _interrupts_held_back():
+            process = context.Process(target=_worker, args=(work, numbers, answer, into))
+            with _interrupts_blocked():
                 process.start()
             into.close()
             started.append(process)
@@ -87,8 +87,8 @@ def _helping(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
 
 
 @contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Interrupts delayed to the end of the block: Python swallows exceptions in its hooks around a fork."""
+def _interrupts_blocked() -> Iterator[None]:
+    """Interrupts blocked until the end of the block, because Python swallows exceptions in its fork hooks."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
@@ -96,8 +96,8 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _help(work: Callable[[int], T], numbers: int, answer: Connection, into: Connection) -> None:
-    """The body of a fork. The parent handles interrupts; where the parent is gone, sending fails."""
+def _worker(work: Callable[[int], T], numbers: int, answer: Connection, into: Connection) -> None:
+    """Body of a fork. The parent handles interrupts; if the parent has ended, sending fails silently."""
     answer.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

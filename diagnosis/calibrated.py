@@ -9,7 +9,7 @@ from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import Excluded, NoiseSettings, Problem
 from fgbaseline.data.problem.documented import most_observed
-from fgbaseline.data.problem.velocity_gaps import admit_gaps
+from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
@@ -30,7 +30,7 @@ class Calibration:
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     shift: float = Shift.AFTER
-    """intervals: see `motion.held_twist`; as recorded, the velocity of frame k moves frame k to k + 1"""
+    """intervals: see `motion.zero_order_hold`; as recorded, the velocity of frame k moves frame k to k + 1"""
     mask: MaskSettings = field(default_factory=MaskSettings)
     kernel: HuberKernel | None = field(default_factory=HuberKernel)
 
@@ -62,7 +62,7 @@ def calibrated(
         sequence = diagnosis.sequence
         if diagnosis.sigmas is not None or repairs is not None:
             return _diagnosed(diagnosis, features, repairs or Repairs())
-    problem = admit_gaps(_as_recorded(sequence, features, settings or Calibration()))
+    problem = inflate_gap_covariance(_as_recorded(sequence, features, settings or Calibration()))
     if diagnosis is None or not diagnosis.cannot_tell:
         return problem
     return replace(
@@ -85,7 +85,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     )
     problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
     return replace(
-        admit_gaps(_bridged(problem, diagnosis, noise)),
+        inflate_gap_covariance(_bridged(problem, diagnosis, noise)),
         diagnosed=not found.cannot_tell,
         findings=findings_of(found, track_statistics(found, repaired if repairs == Repairs() else None)),
         repairs=(*override_sentences(repairs), *rescalings(found), *repaired.repairs),

@@ -14,10 +14,10 @@ from .pose_update import predicted_covariance
 
 
 def dead_reckoning(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Path of the increments with its covariance (equation 9).
+    """Dead-reckoned path with its covariance (equation 9), without corrections by observations.
 
-    No observation corrects it. Its landmarks are those of the prior where the problem has one (the average of their
-    back-projections), else triangulated along the path.
+    Landmarks are at their prior where the problem has one (the average of their back-projections), else triangulated
+    along the path.
     """
     start = time.perf_counter()
     world_T_imu = dead_reckoned_path(problem.increment, problem.initial_pose)

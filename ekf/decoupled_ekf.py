@@ -1,4 +1,4 @@
-"""Decoupled EKF: the documented visual-inertial SLAM (part c of the report), equations 9, 11, 12 and 13."""
+"""Decoupled EKF: the visual-inertial SLAM of the source paper (part c), equations 9, 11, 12 and 13."""
 
 import time
 
@@ -18,7 +18,7 @@ from .pose_update import (
     pose_innovation,
     pose_posterior,
     predicted_covariance,
-    printed_covariance,
+    standard_form_covariance,
 )
 
 SUSPECT_CONDITION = 1.0 / np.sqrt(np.finfo(np.float64).eps)
@@ -27,12 +27,13 @@ eigenvalue: eps times the condition against one over the condition."""
 
 
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Documented filter: pose and landmarks with separate covariances.
+    """EKF SLAM of the source paper, with separate covariances of pose and landmarks.
 
-    At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9), update the pose with
-    the landmarks as they stand (13), update the landmarks with the updated pose (11, 12; skipped where the problem's
-    reading holds them at the mapping's). Frames where the covariance as printed is no longer positive definite (a
-    numerically singular innovation covariance) become events, and the status is then `recovered`.
+    Frame 0 updates the landmarks. Frame k >= 1 predicts with u_(k-1) (equation 9), updates the pose with the current
+    landmarks (13), then the landmarks with the updated pose (11, 12). `LandmarkMode.FIXED` skips the landmark updates.
+
+    A frame becomes an event, and the status `recovered`, where the covariance as printed is no longer positive
+    definite because the innovation covariance is numerically singular.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("ekf", "no observations", problem.n_frames, len(problem.excluded))
@@ -85,7 +86,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                 )
                 pose, covariance = pose @ se3.exp_one(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:
-                    lost = _printed_form_failure(predicted, innovation, weight[known])
+                    lost = _standard_form_failure(predicted, innovation, weight[known])
                     if lost:
                         events.append(_singular_event(k, posterior.innovation_condition, lost))
         if not (np.isfinite(pose).all() and np.isfinite(covariance).all()):
@@ -115,10 +116,10 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     )
 
 
-def _printed_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
-    """Failure of (I - K H) Sigma in the printed form; empty where it stays positive definite."""
+def _standard_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
+    """Failure of the standard form (I - K H) Sigma; empty where it stays positive definite."""
     try:
-        printed = printed_covariance(covariance, innovation, weight)
+        printed = standard_form_covariance(covariance, innovation, weight)
         smallest = float(np.linalg.eigvalsh(0.5 * (printed + printed.T))[0])
     except np.linalg.LinAlgError:
         return "has no inverse in double precision"

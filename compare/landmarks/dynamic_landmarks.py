@@ -155,7 +155,7 @@ def _linearized(observations: _Observations, state: FloatArray) -> tuple[FloatAr
     p_cam[:, ~front] = [[0.0], [0.0], [1.0]]
     seen, white = model.camera.rows(p_cam), model.white_scale[:, None]
     A = np.empty((3, 4, len(s)))  # columns are d/dp, then the residual
-    A[:, :3] = model.camera.rows_along(seen, R) * white[:, None]
+    A[:, :3] = model.camera.row_derivatives(seen, R) * white[:, None]
     A[:, 3] = (observations.measured - seen.pixel) * white
     squared = np.where(front, (A[:, 3] * A[:, 3]).sum(axis=0), np.inf)
     products = np.concatenate([(A[:, i : i + 1] * A[:, i:]).sum(axis=0) for i in range(3)])

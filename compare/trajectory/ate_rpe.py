@@ -151,7 +151,8 @@ def matched_pairs(
 ) -> IntArray:
     """Pairs (m, 2) of `pose_pairs` on the reference, hence equal for every estimate, or on the estimate itself.
 
-    Raises InputError for seconds without time stamps."""
+    Raises InputError for seconds without time stamps.
+    """
     path = matched.reference if from_reference else matched.estimate
     if Unit(unit) is Unit.SECONDS:
         require_stamps(matched)

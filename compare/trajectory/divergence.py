@@ -53,7 +53,7 @@ def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.D
     angle, heading = np.full((2, len(poses)), np.nan)
     turned = poses[finite, :3, :3] @ np.swapaxes(reference[finite, :3, :3], 1, 2)
     angle[finite] = np.rad2deg(so3.rotation_angle(turned))
-    heading[finite] = np.rad2deg(so3.turn_about(upward, turned))
+    heading[finite] = np.rad2deg(so3.twist_angle(upward, turned))
     return pd.DataFrame(
         {
             "position": np.linalg.norm(difference, axis=1),

@@ -9,13 +9,13 @@ from fgbaseline import compare
 from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import TimeUnit, Trajectory
-from fgbaseline.data.formats import Order, TrajectoryFile
+from fgbaseline.data.formats import Order, ParsedTrajectory
+from fgbaseline.data.formats.parsed_trajectory import bends, unit_ambiguity
 from fgbaseline.data.formats.quaternion_order import fits_clearly_better, in_words
 from fgbaseline.data.formats.shared_clock import Spans, units_in_common
-from fgbaseline.data.formats.trajectory_file import bends, in_doubt
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-Source = TrajectoryFile | Trajectory
+Source = ParsedTrajectory | Trajectory
 Times = Sequence[FloatArray]
 """stamps of frames, s, for files without: each takes those that have one for each of its poses"""
 FEWEST = 10
@@ -39,24 +39,24 @@ class Resolved:
 
     def trajectory(self, times: Times, order: Order | None = None) -> Trajectory:
         """The trajectory, with its quaternions in another order if one is given."""
-        if isinstance(self.source, TrajectoryFile):
+        if isinstance(self.source, ParsedTrajectory):
             return self.source.trajectory(self.unit, order or self.order, times, oriented=self.oriented)
         return replace(self.source, oriented=self.source.oriented and self.oriented)
 
     @property
     def covariance(self) -> FloatArray | None:
         """(n, 6, 6) of the right perturbation of each pose, where the file has them."""
-        return self.source.covariance(self.order) if isinstance(self.source, TrajectoryFile) else None
+        return self.source.covariance(self.order) if isinstance(self.source, ParsedTrajectory) else None
 
     @property
     def up(self) -> FloatArray | None:
         """(3,) what points up in its world, where the format defines it."""
-        return self.source.up if isinstance(self.source, TrajectoryFile) else None
+        return self.source.up if isinstance(self.source, ParsedTrajectory) else None
 
     @property
     def orders(self) -> tuple[Order, ...]:
         """The orders that its quaternions may have, the likeliest first."""
-        return self.source.orders if isinstance(self.source, TrajectoryFile) else ("xyzw",)
+        return self.source.orders if isinstance(self.source, ParsedTrajectory) else ("xyzw",)
 
     def remarked(self, remark: str) -> "Resolved":
         """The input with one more remark."""
@@ -76,7 +76,7 @@ def resolve(sources: Sequence[Source], times: Times, settings: Settings) -> list
 
 def _require_same_frames(sources: Sequence[Source], times: Times) -> None:
     """Raises InputError where files without stamps and numbers of frames differ in length."""
-    bare = [s for s in sources if isinstance(s, TrajectoryFile) and s.stamps is None and s.frame is None]
+    bare = [s for s in sources if isinstance(s, ParsedTrajectory) and s.stamps is None and s.frame is None]
     for other in () if times else bare[1:]:
         if len(other.position) != len(bare[0].position):
             raise InputError(
@@ -106,7 +106,7 @@ def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
         return {TimeUnit.S: (float(source.t[0]), float(source.t[-1]))} if source.stamped else {}
     if source.stamps is None:
         return {}
-    units = (wanted,) if wanted is not None and not source.unit_settled else source.units
+    units = (wanted,) if wanted is not None and not source.unit_known else source.units
     return {u: (float(t[0]), float(t[-1])) for u in units for t in (source.stamps.seconds(u),)}
 
 
@@ -114,11 +114,11 @@ def _only(source: Source, spans: Spans) -> TimeUnit:
     """The only possible unit. Raises InputError where there are several, or none although there are stamps."""
     if isinstance(source, Trajectory) or source.stamps is None or len(spans) == 1:
         return next(iter(spans), TimeUnit.S)
-    raise InputError(in_doubt(source, list(spans)))
+    raise InputError(unit_ambiguity(source, list(spans)))
 
 
 def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
-    remarks = source.remarks if isinstance(source, TrajectoryFile) else ()
+    remarks = source.remarks if isinstance(source, ParsedTrajectory) else ()
     found = Resolved(source, unit, remarks=remarks)
     if unit is TimeUnit.S or isinstance(source, Trajectory) or source.stamps is None or source.stamps.unit is not None:
         return found

@@ -25,7 +25,7 @@ class Readable(Protocol):
 
 
 @contextmanager
-def damage_told(key: str) -> Iterator[None]:
+def damage_as_input_error(key: str) -> Iterator[None]:
     """Parsers and decompressors raise a dozen types on damaged input: here they become one InputError."""
     try:
         yield
@@ -78,7 +78,7 @@ class ArrayStream:
     def take(self, n: int) -> FloatArray:
         """The next n values (n,) as native float64. Raises InputError where the data end before them."""
         wanted = n * self.dtype.itemsize
-        with damage_told(self.key):
+        with damage_as_input_error(self.key):
             raw = self.source.read(wanted)
         if len(raw) < wanted:
             raise InputError(

@@ -4,8 +4,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from ..finite import LARGEST, measurable
 from ..sequence import ROTATION_TOLERANCE
+from ..value_range import LARGEST, measurable
 
 
 def finite_stamps(key: str, array: FloatArray) -> FloatArray:
@@ -52,7 +52,7 @@ def extrinsic(key: str, imu_R_cam: FloatArray, position: FloatArray) -> FloatArr
         raise InputError(
             f"{key}: it has entries that are not finite or beyond {LARGEST:g}; write the extrinsic as a rigid motion"
         )
-    defect = float(so3.rotation_defect(imu_R_cam))
+    defect = float(so3.orthogonality_error(imu_R_cam))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(
             f"{key}: its 3x3 block {imu_R_cam.tolist()} is no rotation (off by {defect:.3g}, allowed "

@@ -12,9 +12,9 @@ from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
 from .columns import Order
 from .named_file import FilePath, reading, shown
+from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
-from .trajectory_file import TrajectoryFile, settled
 from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]
@@ -86,7 +86,7 @@ def _poses_of_frames(sequence: Sequence, path: FilePath, frame: BodyFrame | None
 
 
 def _order(
-    sequence: Sequence, file: TrajectoryFile, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
+    sequence: Sequence, file: ParsedTrajectory, frame: BodyFrame | None, frames: IntArray, nearest: IntArray
 ) -> Order:
     """The order of quaternions with which the truth turns as the gyroscope measured, clearly; else the usual one."""
     if len(file.orders) == 1 or len(frames) <= STEP:
@@ -110,7 +110,7 @@ def _order(
     return file.orders[int(fits_clearly_better(misfits[1], misfits[0]))]
 
 
-def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArray]:
+def _frames(sequence: Sequence, file: ParsedTrajectory) -> tuple[IntArray, IntArray]:
     """The frames (n,) of poses without stamps, by their numbers, else line by line, and which poses (n,) they are.
 
     Frames of the recording's file that it leaves out count, and their poses are left out.
@@ -135,7 +135,7 @@ def _frames(sequence: Sequence, file: TrajectoryFile) -> tuple[IntArray, IntArra
     return frame[frame >= 0], np.flatnonzero(frame >= 0)
 
 
-def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
+def _require_same_speed(sequence: Sequence, file: ParsedTrajectory) -> None:
     """Raises InputError where the recording moves much less from frame to frame than the file from line to line."""
     n = len(file.position)
     steps = np.linalg.norm(sequence.linear_velocity[:-1], axis=1) * sequence.dt
@@ -149,13 +149,13 @@ def _require_same_speed(sequence: Sequence, file: TrajectoryFile) -> None:
         )
 
 
-def _unit(sequence: Sequence, file: TrajectoryFile) -> TimeUnit:
+def _unit(sequence: Sequence, file: ParsedTrajectory) -> TimeUnit:
     """The unit of the stamps, by the time that they share with the recording where they leave it open."""
     assert file.stamps is not None
     spans = {unit: (float(t[0]), float(t[-1])) for unit in file.units for t in (file.stamps.seconds(unit),)}
     found = units_in_common({TimeUnit.S: (float(sequence.t[0]), float(sequence.t[-1]))}, spans)
     if found is None:
-        unit, _ = settled(file, None, None)
+        unit, _ = unit_and_order(file, None, None)
         return unit
     return found[1]
 

@@ -26,7 +26,7 @@ def kitti_poses(values: FloatArray, line: IntArray) -> FloatArray:
     """
     poses = np.tile(np.eye(4), (len(values), 1, 1))
     poses[:, :3, :] = values.reshape(-1, 3, 4)
-    defect = so3.rotation_defect(poses[:, :3, :3])
+    defect = so3.orthogonality_error(poses[:, :3, :3])
     wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
     if len(wrong):
         i = wrong[0]

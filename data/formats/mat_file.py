@@ -20,7 +20,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .array_stream import ArrayStream, Readable, Shape, damage_told, missing, require_room
+from .array_stream import ArrayStream, Readable, Shape, damage_as_input_error, missing, require_room
 
 HEADER = 128
 STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -78,7 +78,7 @@ class MatFile:
     def __init__(self, path: Path) -> None:
         self._file: IO[bytes] = path.open("rb")
         try:
-            with damage_told("MATLAB header"):
+            with damage_as_input_error("MATLAB header"):
                 self._order = "<" if self._file.read(HEADER)[-2:] == b"IM" else ">"
                 self._variables = dict(self._scan(path.stat().st_size))
         except InputError:
@@ -113,7 +113,7 @@ class MatFile:
         shape, variable = self.shape(key), self._variables[key]
         if variable.flags & 0xFF not in DENSE_CLASSES or variable.flags & COMPLEX:
             raise InputError(f"{key}: it is no dense array of real numbers; save it as double")
-        with damage_told(key):
+        with damage_as_input_error(key):
             source = self._open(variable)
             self._head(source)
             stored, n_bytes, inline = self._tag(source)
@@ -122,7 +122,7 @@ class MatFile:
         if math.prod(shape) * dtype.itemsize != n_bytes:
             raise InputError(f"{key}: {n_bytes} bytes of {dtype} do not fill the shape {shape}; save the file again")
         yield ArrayStream(key, shape, True, dtype, source if inline is None else io.BytesIO(inline))
-        with damage_told(key):
+        with damage_as_input_error(key):
             source.read(8)  # the padding, and with it the end and its checksum
 
     def array(self, key: str) -> FloatArray:

@@ -14,14 +14,14 @@ from numpy.lib import format as npy
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .array_stream import ArrayStream, Shape, damage_told, missing, require_room
+from .array_stream import ArrayStream, Shape, damage_as_input_error, missing, require_room
 
 
 class NpzArchive:
     """An open .npz file. Its methods raise InputError naming the key; the caller puts the file's name before it."""
 
     def __init__(self, path: Path) -> None:
-        with damage_told("zip directory"):
+        with damage_as_input_error("zip directory"):
             self._zip = zipfile.ZipFile(path)
         self._members: dict[str, zipfile.ZipInfo] = {}
         try:
@@ -64,10 +64,10 @@ class NpzArchive:
         if key not in self._members:
             raise missing(key, self.keys)
         info = self._members[key]
-        with damage_told(key):
+        with damage_as_input_error(key):
             member = self._zip.open(info)
         with member:
-            with damage_told(key):
+            with damage_as_input_error(key):
                 shape, fortran_order, dtype = _read_header(key, member)
                 require_room(key, shape, dtype)
                 promised = math.prod(shape) * dtype.itemsize

@@ -59,7 +59,7 @@ def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, Float
         raise InputError("the time stamps of a trajectory must be finite and rise")
     finite = np.isfinite(poses).all(axis=(1, 2))
     defect = np.full(len(stamps), np.inf)
-    defect[finite] = so3.rotation_defect(poses[finite, :3, :3])
+    defect[finite] = so3.orthogonality_error(poses[finite, :3, :3])
     if len(stamps) and defect.max() > ROTATION_TOLERANCE:
         i = int(defect.argmax())
         raise InputError(f"pose {i} (at {float(stamps[i])!r} s) is no rigid motion (rotation off by {defect[i]:.3g})")

@@ -77,7 +77,7 @@ def _rigid(key: str, poses: FloatArray, known: BoolArray) -> FloatArray:
     chosen: FloatArray = poses[known].copy()
     defect = np.where(np.isfinite(chosen).all(axis=(1, 2)), 0.0, np.inf)
     finite = defect == 0.0
-    defect[finite] = so3.rotation_defect(chosen[finite, :3, :3])
+    defect[finite] = so3.orthogonality_error(chosen[finite, :3, :3])
     defect[(chosen[:, 3] != [0.0, 0.0, 0.0, 1.0]).any(axis=1)] = np.inf
     wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
     if len(wrong):

@@ -13,10 +13,10 @@ from ..trajectory import Trajectory
 from .columns import Columns, Order, counted_columns, named_columns
 from .named_file import FilePath, reading, regular_file, shown
 from .number_table import Lines, read_lines
+from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
-from .trajectory_file import TrajectoryFile, settled
+from .trajectory_from_text import read_text
 from .trajectory_npz import read_trajectory_npz
-from .trajectory_text import read_text
 
 TrajectoryFormat = Literal["tum", "kitti", "euroc", "npz"]
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")
@@ -41,7 +41,7 @@ def read_trajectory(
     """
     file = read_trajectory_file(path, form, name)
     return file.trajectory(
-        *settled(file, time_unit, quaternion), () if times is None else (times[: max(len(file.position), 1)],)
+        *unit_and_order(file, time_unit, quaternion), () if times is None else (times[: max(len(file.position), 1)],)
     )
 
 
@@ -78,13 +78,13 @@ def read_kitti(path: FilePath) -> FloatArray:
 
 def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
-) -> TrajectoryFile:
+) -> ParsedTrajectory:
     """What a trajectory file holds and leaves open. Raises as `read_trajectory`."""
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
     with reading(path), np.errstate(all="ignore"):
         file = regular_file(path)
-        empty = TrajectoryFile(name or file.stem.removesuffix(".txt"), shown(path), np.empty((0, 3)), None)
+        empty = ParsedTrajectory(name or file.stem.removesuffix(".txt"), shown(path), np.empty((0, 3)), None)
         if form == "npz" or (form is None and _is_zip(file)):
             return _of_npz(empty, file)
         lines = read_lines(file)
@@ -103,17 +103,17 @@ def read_trajectory_file(
         return replace(read, remarks=(*read.remarks, f"no header names the order of its quaternions; {said} is usual"))
 
 
-def _of_npz(empty: TrajectoryFile, file: Path) -> TrajectoryFile:
+def _of_npz(empty: ParsedTrajectory, file: Path) -> ParsedTrajectory:
     t, poses, covariance, remarks = read_trajectory_npz(file)
     stamps = stamps_of([repr(stamp) for stamp in t.tolist()], t, None)
-    units, is_settled = possible_units(stamps)
+    units, is_known = possible_units(stamps)
     return replace(
         empty,
         position=poses[:, :3, 3],
         rotation=poses[:, :3, :3],
         stamps=stamps,
         units=units,
-        unit_settled=is_settled,
+        unit_known=is_known,
         covariance_numbers=covariance,
         remarks=tuple(remarks),
     )

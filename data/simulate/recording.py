@@ -9,16 +9,16 @@ from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
-from .chance import Concern, generator
-from .matches import displaced, noisy_pixels, wrong_matches
+from .camera_view import CameraView
+from .match_errors import displaced, noisy_pixels, wrong_matches
+from .moving_objects import MovingObjects
 from .path import Path, followed, handheld_path, path_along, time_grid
+from .random_streams import RandomStream, generator
 from .roads import drive, highway_road, loop_road, town_road
 from .room import Room
 from .settings import MAX_FRAMES, Simulation
-from .sight import Sight
 from .street import Street
 from .tracks import Tracking, Tracks, follow
-from .traffic import Traffic
 from .velocities import recorded_velocities
 
 
@@ -105,7 +105,7 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
         return t, path
     t = np.arange(round(settings.seconds * settings.rate)) / settings.rate
     grid = time_grid(float(t[-1]), settings.rate)
-    rng = generator(settings.seed, Concern.PATH)
+    rng = generator(settings.seed, RandomStream.PATH)
     if settings.path == "handheld":
         return t, handheld_path(grid, rng).of(se3.inverse(imu_T_body))
     seconds = float(grid[-1] - grid[0])
@@ -128,8 +128,8 @@ def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
         seeing &= (t < start) | (t > end)
     # so far inside that noise leaves no image; the same for every small noise, so that it does not change the tracks
     border = max(5.0, 5.0 * settings.sigma_pixel)
-    sight = Sight(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, border, seeing)
-    scenery = generator(settings.seed, Concern.SCENERY)
+    sight = CameraView(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, border, seeing)
+    scenery = generator(settings.seed, RandomStream.SCENERY)
     if settings.scene == "room":
         points: Callable[[FloatArray, np.random.Generator], FloatArray] = Room(body, rig).points
     else:
@@ -146,12 +146,17 @@ def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
         max(1, round(settings.return_after / float(np.median(np.diff(t))))),
     )
     static = follow(
-        standing, sight, t, how, generator(settings.seed, Concern.TRACKS), generator(settings.seed, Concern.RETURNS)
+        standing,
+        sight,
+        t,
+        how,
+        generator(settings.seed, RandomStream.TRACKS),
+        generator(settings.seed, RandomStream.RETURNS),
     )
-    traffic = generator(settings.seed, Concern.TRAFFIC)
+    traffic = generator(settings.seed, RandomStream.TRAFFIC)
     share = settings.moving_share
     how = Tracking(settings.features_per_frame * share / (1.0 - share), settings.track_length, farthest)
-    moving = follow(Traffic(body, t, settings.scene, traffic).points, sight, t, how, traffic, traffic)
+    moving = follow(MovingObjects(body, t, settings.scene, traffic).points, sight, t, how, traffic, traffic)
     return static, moving
 
 

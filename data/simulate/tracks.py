@@ -12,7 +12,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from ..observations import BoolArray, IntArray
-from .sight import Sight
+from .camera_view import CameraView
 
 SHORTEST = 3
 """frames; shorter tracks are not kept, as in the course's files"""
@@ -81,7 +81,12 @@ class _Candidates:
 
 
 def follow(
-    source: Source, sight: Sight, t: FloatArray, how: Tracking, rng: np.random.Generator, returns: np.random.Generator
+    source: Source,
+    sight: CameraView,
+    t: FloatArray,
+    how: Tracking,
+    rng: np.random.Generator,
+    returns: np.random.Generator,
 ) -> Tracks:
     """Tracks over the frames at times `t` (T,) s of points that `source` offers.
 
@@ -124,7 +129,7 @@ def _wanted(features: float, seeing: BoolArray, t: FloatArray, rng: np.random.Ge
     return np.where(seeing, np.floor(level + rng.random(n)), 0).astype(np.int64)
 
 
-def _born(source: Source, sight: Sight, how: Tracking, wanted: IntArray, rng: np.random.Generator) -> _Candidates:
+def _born(source: Source, sight: CameraView, how: Tracking, wanted: IntArray, rng: np.random.Generator) -> _Candidates:
     """More candidates than are wanted, all of them seen at birth; many where the detector starts anew."""
     anew = sight.seeing & ~np.concatenate([[False], sight.seeing[:-1]])
     offered = np.ceil(wanted * np.where(anew, _OFFERED, np.minimum(_OFFERED, 12.0 / how.length))) + 12 * (wanted > 0)
@@ -133,7 +138,7 @@ def _born(source: Source, sight: Sight, how: Tracking, wanted: IntArray, rng: np
     return _Candidates(birth, start, velocity).select(sight.visible(birth, start, how.farthest))
 
 
-def _held(candidates: _Candidates, begin: IntArray, life: IntArray, sight: Sight, t: FloatArray) -> IntArray:
+def _held(candidates: _Candidates, begin: IntArray, life: IntArray, sight: CameraView, t: FloatArray) -> IntArray:
     """(c,) for how many frames from `begin` (c,) on, at most `life` (c,), each candidate is seen without a break."""
     length = np.clip(np.minimum(life, len(t) - begin), 0, None)
     for start in range(0, len(length), _CHUNK):

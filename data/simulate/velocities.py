@@ -5,8 +5,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3
 
 from ..axis_conventions import axes_matrix
-from .chance import Concern, generator
 from .path import Path
+from .random_streams import RandomStream, generator
 from .settings import Simulation
 
 
@@ -28,7 +28,7 @@ def true_velocities(path: Path, t: FloatArray, settings: Simulation) -> FloatArr
 def recorded_velocities(path: Path, t: FloatArray, settings: Simulation) -> tuple[FloatArray, FloatArray]:
     """Linear (T, 3) m/s and angular (T, 3) rad/s velocity as recorded: scaled, in other axes, biased, noisy."""
     u = true_velocities(path, t, settings)
-    noise = generator(settings.seed, Concern.VELOCITIES).standard_normal(u.shape)
+    noise = generator(settings.seed, RandomStream.VELOCITIES).standard_normal(u.shape)
     linear = settings.velocity_scale * u[:, :3] @ axes_matrix(settings.linear_axes)
     angular = u[:, 3:] @ axes_matrix(settings.angular_axes) + np.asarray(settings.gyro_bias)
     return linear + settings.sigma_linear * noise[:, :3], angular + settings.sigma_angular * noise[:, 3:]

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from fgbaseline.data.finding import AS_GIVEN, Finding
-from fgbaseline.data.motion import held_twist
+from fgbaseline.data.motion import zero_order_hold
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.time_unit import TimeUnit, rescaled_time, usual
 
@@ -139,7 +139,7 @@ def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleR
     unknown = ScaleRatio(np.nan, known=False)
     if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
         return unknown, unknown
-    seen, recorded = seen_by_cameras.twist(sequence.dt), held_twist(sequence)
+    seen, recorded = seen_by_cameras.twist(sequence.dt), zero_order_hold(sequence)
     scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
     angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
     linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)

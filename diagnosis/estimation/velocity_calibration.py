@@ -3,7 +3,7 @@
 import numpy as np
 
 from fgbaseline.data.axis_conventions import twist_in_imu_axes
-from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
@@ -37,7 +37,7 @@ def _axes_of(sequence: Sequence, seen_by_cameras: Odometry) -> tuple[Axes, Axes]
     """The axis conventions of angular and linear velocity."""
     seen, recorded, known = (
         seen_by_cameras.twist(sequence.dt),
-        held_twist(sequence, Shift.MIDDLE),
+        zero_order_hold(sequence, Shift.MIDDLE),
         seen_by_cameras.known,
     )
     angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
@@ -61,7 +61,7 @@ def calibrate_with_axes(
     when = timing(seen[:, 3:], sequence.angular_velocity[:-1] @ angular.matrix.T, known, dt)
 
     def twist(shift: float) -> FloatArray:
-        return twist_in_imu_axes(held_twist(sequence, shift), linear.name, angular.name)
+        return twist_in_imu_axes(zero_order_hold(sequence, shift), linear.name, angular.name)
 
     fit = None
     if not when.identifiable and given_shift is None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
@@ -92,7 +92,7 @@ def rate_error(diagnosis: Diagnosis, shift: float, bias: FloatArray, convention:
     """Median error in rad/s of the angular velocity against odometry, with this shift, bias and convention."""
     assert diagnosis.odometry is not None
     known = diagnosis.odometry.known
-    recorded = held_twist(diagnosis.sequence, shift)
+    recorded = zero_order_hold(diagnosis.sequence, shift)
     recorded[:, 3:] -= bias
     difference = twist_in_imu_axes(recorded, IDENTITY, convention) - diagnosis.odometry.twist(diagnosis.sequence.dt)
     return float(np.median(np.linalg.norm(difference[known, 3:], axis=1)))

@@ -146,7 +146,7 @@ def _whitened_block(camera: StereoCamera, links: _Block, R: FloatArray, p: Float
     behind = ~(moved[2] > camera.min_depth)
     moved[:, behind] = [[0.0], [0.0], [1.0]]
     along, seen = np.empty((3, 4, len(x))), camera.rows(moved)
-    along[:, :3] = camera.rows_along(seen, R)
+    along[:, :3] = camera.row_derivatives(seen, R)
     along[:, 3] = links.pixel - seen.pixel
     along[:, 3, behind] = 1e6
     whitened = _lowered(_cholesky(_deviations(links, along)), along)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.data.axis_conventions import twist_in_imu_axes
-from fgbaseline.data.motion import dead_reckoned_path, held_twist
+from fgbaseline.data.motion import dead_reckoned_path, zero_order_hold
 from fgbaseline.data.observations import Observations
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence, Truth
@@ -110,7 +110,7 @@ def _path(diagnosis: Diagnosis, seen_by_cameras: Odometry | None) -> FloatArray:
     """(T, 4, 4) a path that is right locally, which is all it is for: what the cameras see, and between two intervals
     that they see what lies in their middle; elsewhere the velocities."""
     sequence = diagnosis.sequence
-    twist = twist_in_imu_axes(held_twist(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
+    twist = twist_in_imu_axes(zero_order_hold(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
     twist[:, :3] /= significant_scale(diagnosis)
     twist[:, 3:] -= diagnosis.angular.matrix @ significant_bias(diagnosis)
     if seen_by_cameras is not None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.data.parallel import shared as shared_work
+from fgbaseline.data.parallel import background_map
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, StereoMeasurement, se3
 
@@ -66,7 +66,7 @@ def fit_windows_alike(
         chosen = [windows[i] for i in group]
         return _fitted(camera, imu_T_cam, chosen, sigmas, np.array([shared[i] for i in group]), iterations)
 
-    with shared_work(lambda number: fitted(groups[number]), len(groups) if windows else 0, processes) as gathered:
+    with background_map(lambda number: fitted(groups[number]), len(groups) if windows else 0, processes) as gathered:
         return [fit for fits in gathered() for fit in fits]
 
 

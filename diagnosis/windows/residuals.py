@@ -150,7 +150,7 @@ def pixel_terms(
     front = q[2] > model.camera.min_depth
     q[:, ~front] = [[0.0], [0.0], [1.0]]
     seen, white = model.camera.rows(q), model.white_scale[:, None]
-    by_point = model.camera.rows_along(seen, axes.transpose(1, 0, 2)) * white[:, None]
+    by_point = model.camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
     residual = data.pixel.T - seen.pixel
     residual[1] -= np.repeat(shared[:, OFFSET], [o.stop - o.start for o in data.observations])
     residual *= white

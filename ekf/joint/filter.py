@@ -79,7 +79,7 @@ class JointFilter:
         if self.settings.coordinates is LandmarkRepresentation.WORLD:  # where nothing is at infinity
             wanted &= self.measured[index, 0] > self.measured[index, 1]
         if (wanted != new).any():
-            self._reject(k, EventKind.ENTRY_PUT_OFF, ~wanted[new])
+            self._reject(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
         selected = self._select(k, index, wanted)
         if selected.any():
             self._initialize_from_observation(index[selected])
@@ -120,7 +120,7 @@ class JointFilter:
         state.predict(step, F, Q)
 
     def _update(self, k: int, index: IntArray) -> bool:
-        """Update with observations `index` (n,) of active landmarks; False where the whole frame is rejected."""
+        """Update with observations `index` (n,) of active landmarks; False if the whole frame is rejected."""
         if len(index) == 0:
             return True
         seen = self._reject_behind_camera(k, self._linearize(index))

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
-from fgbaseline.data.parallel import cores, shared
+from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.plural import plural
 from fgbaseline.reports.run.problem import (
     MARK,
@@ -48,7 +48,7 @@ def report(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: 
         progress.say(f"{plural(held.n_tracks, 'track')} held out, {plural(len(held.observations), 'observation')}")
     if settings.preset == "calibrated" and not settings.as_recorded:
         progress.say("diagnosing the recording")
-    with shared(lambda _: pose_problem(kept, settings, cores()), 1, cores()) as posed:
+    with background_map(lambda _: pose_problem(kept, settings, cores()), 1, cores()) as posed:
         # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
         from fgbaseline.reports.phrases.run import verdict
         from fgbaseline.reports.run.folder import as_dict, write_run

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline.data.axis_conventions import IDENTITY, twist_in_imu_axes
-from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.data.plural import plural
 from fgbaseline.diagnosis import Diagnosis, TrackStatistics
 from fgbaseline.diagnosis.repairs.significance import significant_bias
@@ -46,8 +46,8 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     assert diagnosis.odometry is not None
     sequence, odometry = diagnosis.sequence, diagnosis.odometry
     bias = significant_bias(diagnosis)
-    recorded = held_twist(sequence, Shift.AFTER)[:, 3:]
-    repaired = held_twist(sequence, diagnosis.shift)
+    recorded = zero_order_hold(sequence, Shift.AFTER)[:, 3:]
+    repaired = zero_order_hold(sequence, diagnosis.shift)
     repaired[:, 3:] -= bias
     repaired = twist_in_imu_axes(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
     seen = odometry.twist(sequence.dt)[:, 3:]

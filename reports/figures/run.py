@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from fgbaseline.data.parallel import shared
+from fgbaseline.data.parallel import background_map
 
 from .accuracy import held_out, map_difference
 from .consistency import consistency, nees, three_sigma
@@ -122,7 +122,7 @@ def being_drawn(run: "Run", processes: int) -> Iterator[Callable[[], dict[str, W
     """
     each = drawings(of_run(run))
     names = list(each)
-    with shared(lambda number: _one(each[names[number]]), len(names), processes) as gathered:
+    with background_map(lambda number: _one(each[names[number]]), len(names), processes) as gathered:
         yield lambda: {name: one for name, one in zip(names, gathered(), strict=True) if one is not None}
 
 

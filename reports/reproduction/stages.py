@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.data import Excluded, Observations, Sequence
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix
-from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.diagnosis import Diagnosis, repair
 from fgbaseline.diagnosis.repairs.significance import significant_bias
@@ -90,7 +90,7 @@ def _turned(sequence: Sequence, angular: str, linear: str) -> Sequence:
 
 def _restamped(sequence: Sequence, shift: float) -> Sequence:
     """The recording in which sample k is what moved frame k to k + 1."""
-    twist = held_twist(sequence, shift)
+    twist = zero_order_hold(sequence, shift)
     twist = np.concatenate([twist, twist[-1:]])
     return replace(sequence, linear_velocity=twist[:, :3], angular_velocity=twist[:, 3:])
 

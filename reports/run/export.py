@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 
 from fgbaseline.data import Excluded, Problem
-from fgbaseline.data.exchange import layout, write_problem
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.plural import plural
+from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.reports.run.problem import RunSettings, pose_problem, read_sequence, split
 
 

@@ -19,7 +19,7 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.solving import Watch, solve_all, unwatched
+from fgbaseline.data.solving import Watch, no_progress, solve_all
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
@@ -166,7 +166,7 @@ def _require_units(sequence: Sequence) -> None:
 def solve(
     problem: Problem,
     settings: RunSettings,
-    watch: Watch = unwatched,
+    watch: Watch = no_progress,
     held: HeldOut | None = None,
     processes: int = 1,
 ) -> "Run":

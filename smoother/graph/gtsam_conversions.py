@@ -18,10 +18,10 @@ ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 
 
 def in_first_pose_frame(problem: Problem) -> Problem:
-    """Express the problem in the frame of its first pose; `Estimate.moved` by that pose undoes it.
+    """Express the problem in the frame of its first pose; `Estimate.transformed` by that pose reverts it.
 
-    GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
-    depend on how the world is turned.
+    GTSAM tests relinearization per world coordinate, so that an incremental solution would depend on the orientation of
+    the world.
     """
     world_T_first, prior = problem.initial_pose, problem.landmark_prior
     if np.array_equal(world_T_first, np.eye(4)):
@@ -34,9 +34,9 @@ def in_first_pose_frame(problem: Problem) -> Problem:
 
 
 def pose_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
-    """Covariances (n, 6, 6) of the poses of the frames from `first` on, from GTSAM's order to ours.
+    """Covariances (n, 6, 6) of the poses from frame `first` on, in the order [v, w].
 
-    That of a first pose that the problem holds is zero, and not what stands for zero in the graph.
+    A fixed first pose has covariance zero, not the small one of its prior in the graph.
     """
     matrix = reorder_tangent(covariance)
     if first == 0 and not problem.initial_covariance.any():
@@ -45,13 +45,13 @@ def pose_covariances(problem: Problem, covariance: Any, first: int = 0) -> Float
 
 
 def reorder_tangent(covariance: Any) -> FloatArray:
-    """A covariance or information matrix (..., 6, 6) from [v, w] to [w, v], or back."""
+    """Covariance or information matrix (..., 6, 6) reordered from [v, w] to [w, v], or back."""
     matrix = np.asarray(covariance, dtype=np.float64)
     return matrix[..., ROTATION_FIRST[:, None], ROTATION_FIRST[None, :]]
 
 
 def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
-    """Poses world_T_imu (n, 4, 4) of the frames, renormalized: GTSAM's lose that by rounding in long descents."""
+    """Poses world_T_imu (n, 4, 4) of the frames, renormalized because GTSAM's rotations drift by rounding."""
     poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
     poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
     return poses

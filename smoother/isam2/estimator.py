@@ -30,7 +30,7 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
     """
     with threadpool_limits(limits=1, user_api="blas"):
         answer = _solve(in_first_pose_frame(problem), progress, settings or ISAM2Settings())
-        return answer.moved(problem.initial_pose)
+        return answer.transformed(problem.initial_pose)
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:

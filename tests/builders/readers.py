@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from fgbaseline import data, diagnosis
-from fgbaseline.data.exchange import read_problem, write_problem
 from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read_trajectory
 from fgbaseline.data.formats.trajectory_reader import read_pose_covariances
+from fgbaseline.data.problem_export import read_problem, write_problem
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.checking.limits_file import read_limits
 from fgbaseline.reports.comparing.run_folder import read_run_folder

@@ -116,7 +116,7 @@ def test_no_other_motion_of_its_kind_fits_better(seed: int, kind: Align, name: s
     reference = path(name, seed)
     estimate = motion(seed + 2) @ disturbed(reference, seed + 1, position=0.5)
     best = compare.align(estimate, reference, kind)
-    assert so3.rotation_defect(best.rotation) < 1e-12
+    assert so3.orthogonality_error(best.rotation) < 1e-12
     random = np.random.default_rng(seed + 3)
     x, y = estimate[:, :3, 3], reference[:, :3, 3]
     lowest = np.sum((best.apply(estimate)[:, :3, 3] - y) ** 2)

@@ -94,7 +94,7 @@ def test_no_small_motion_fits_better_and_swapping_the_paths_inverts_the_alignmen
     random = np.random.default_rng(seed)
     there, here = 3.0 * random.normal(size=(n, 3)), 3.0 * random.normal(size=(n, 3))
     best = compare.align_se3(there, here)
-    assert so3.rotation_defect(best[:3, :3]) < 1e-9
+    assert so3.orthogonality_error(best[:3, :3]) < 1e-9
     lowest = np.sum((se3.transform(best, there) - here) ** 2)
     for _ in range(10):
         other = best @ se3.exp(0.1 * random.normal(size=6))
@@ -124,7 +124,7 @@ def test_degenerate_paths_get_a_finite_proper_rotation(name: str, target: str) -
     }[target]
     T = compare.align_se3(path, reference)
     assert np.isfinite(T).all()
-    assert so3.rotation_defect(T[:3, :3]) < 1e-9
+    assert so3.orthogonality_error(T[:3, :3]) < 1e-9
     if target in ("itself", "turned"):
         np.testing.assert_allclose(se3.transform(T, path), reference, atol=1e-9)
 

@@ -7,7 +7,7 @@ import pytest
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data.motion import Shift
-from fgbaseline.data.problem.velocity_gaps import admit_gaps, gaps, random_walk_density
+from fgbaseline.data.problem.velocity_gaps import gaps, inflate_gap_covariance, random_walk_density
 from fgbaseline.geometry import se3
 
 from ..builders.hostile import gap
@@ -39,7 +39,7 @@ def test_noise_alone_is_no_wandering() -> None:
 
 def test_a_recording_without_gaps_is_left_alone() -> None:
     problem = wandering_problem(1.0, frames=50)
-    assert admit_gaps(problem) is problem
+    assert inflate_gap_covariance(problem) is problem
 
 
 def test_only_the_gap_is_made_uncertain_and_a_longer_one_more_so() -> None:
@@ -47,7 +47,7 @@ def test_only_the_gap_is_made_uncertain_and_a_longer_one_more_so() -> None:
     k = int(np.argmax(gaps(short.sequence.dt)))
     added = []
     for problem in (short, long):
-        admitted = admit_gaps(problem)
+        admitted = inflate_gap_covariance(problem)
         extra = admitted.increment_covariance - problem.increment_covariance
         assert np.array_equal(np.flatnonzero(np.abs(extra).max(axis=(1, 2))), [k])
         assert (np.linalg.eigvalsh(extra[k]) > 0.0).all()

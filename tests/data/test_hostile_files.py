@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fgbaseline import data, diagnosis
-from fgbaseline.data.exchange import read_problem
+from fgbaseline.data.problem_export import read_problem
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.comparing.run_folder import read_run_folder
 from fgbaseline.reports.results.reader import read_measured, value_of

@@ -9,7 +9,7 @@ from types import FrameType
 
 import pytest
 
-from fgbaseline.data.parallel import shared
+from fgbaseline.data.parallel import background_map
 
 FORKS = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
 
@@ -22,22 +22,22 @@ def children() -> set[str]:
 @pytest.mark.parametrize("processes", [1, 2, 3, 20])
 def test_results_come_in_the_order_of_their_numbers_and_no_fork_is_left(processes: int) -> None:
     before = children() if sys.platform == "linux" else set()
-    with shared(lambda i: i * i, 10, processes) as gathered:
-        assert gathered() == [i * i for i in range(10)]
+    with background_map(lambda i: i * i, 10, processes) as join:
+        assert join() == [i * i for i in range(10)]
     assert sys.platform != "linux" or children() <= before
 
 
 def test_there_may_be_nothing_to_share() -> None:
-    with shared(lambda i: i, 0, 2) as gathered:
-        assert gathered() == []
+    with background_map(lambda i: i, 0, 2) as join:
+        assert join() == []
 
 
 @FORKS
 def test_a_fork_works_while_this_process_does_something_else() -> None:
     came, told = os.pipe()
-    with shared(lambda _: os.write(told, b"!"), 1, 2) as gathered:
+    with background_map(lambda _: os.write(told, b"!"), 1, 2) as join:
         assert os.read(came, 1) == b"!"
-        assert gathered() == [1]
+        assert join() == [1]
 
 
 @FORKS
@@ -49,8 +49,8 @@ def test_what_a_fork_had_taken_when_it_died_is_done_here() -> None:
             os._exit(9)
         return number
 
-    with shared(die, 5, 3) as gathered:
-        assert gathered() == list(range(5))
+    with background_map(die, 5, 3) as join:
+        assert join() == list(range(5))
 
 
 @FORKS
@@ -58,8 +58,8 @@ def test_what_a_fork_fails_at_is_told_here_and_only_here(capfd: pytest.CaptureFi
     def fail(number: int) -> int:
         raise ValueError(f"no {number}")
 
-    with shared(fail, 1, 2) as gathered, pytest.raises(ValueError, match="no 0"):
-        gathered()
+    with background_map(fail, 1, 2) as join, pytest.raises(ValueError, match="no 0"):
+        join()
     assert capfd.readouterr().err == ""
 
 
@@ -68,13 +68,13 @@ def test_a_fork_whose_parent_was_killed_ends() -> None:
     """What it computes fits into no pipe, so it would wait for a reader for ever."""
     script = """
 import os, signal, time
-from fgbaseline.data.parallel import shared
+from fgbaseline.data.parallel import background_map
 
 def large(_):
     time.sleep(0.5)
     return bytes(10_000_000)
 
-with shared(large, 1, 2):
+with background_map(large, 1, 2):
     os.kill(os.getpid(), signal.SIGKILL)
 """
     # The fork has the pipe open as well: that it closes says that the fork has ended.
@@ -91,8 +91,8 @@ def test_an_interrupt_that_comes_while_a_process_forks_is_not_lost() -> None:
     os.register_at_fork(after_in_parent=lambda: signal.raise_signal(due.pop()) if due else None)
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
-        with pytest.raises(KeyboardInterrupt), shared(lambda i: i, 2, 2) as gathered:
-            gathered()
+        with pytest.raises(KeyboardInterrupt), background_map(lambda i: i, 2, 2) as join:
+            join()
     finally:
         signal.signal(signal.SIGTERM, before)
     assert due == []

@@ -66,7 +66,7 @@ def test_rotations_that_are_nearly_so_are_made_exact(seed: int, size: float) -> 
     path = Trajectory(np.arange(5.0), off)
     U, _, Vt = np.linalg.svd(off[:, :3, :3])
     np.testing.assert_allclose(path.rotation, U @ Vt, rtol=0, atol=2e-12)
-    assert so3.rotation_defect(path.rotation).max() < 2e-12
+    assert so3.orthogonality_error(path.rotation).max() < 2e-12
     np.testing.assert_array_equal(path.position, off[:, :3, 3])
 
 

@@ -124,7 +124,7 @@ def test_kitti_rotations_are_made_exact(tmp_path):
     np.savetxt(tmp_path / "a.txt", poses[:, :3].reshape(-1, 12), fmt="%.5f")
     back = read_kitti(tmp_path / "a.txt")
     np.testing.assert_allclose(back, poses, atol=2e-5)
-    assert so3.rotation_defect(back[:, :3, :3]).max() < 1e-14
+    assert so3.orthogonality_error(back[:, :3, :3]).max() < 1e-14
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.axis_conventions import axes_matrix
-from fgbaseline.data.motion import Shift, held_twist
+from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.diagnosis.conventions.axes import linear_axes
 from fgbaseline.diagnosis.conventions.robust_regression import regress
@@ -37,7 +37,7 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
     o, truth = sequence.observations, sequence.truth
     assert truth is not None
     assert truth.landmarks is not None
-    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), held_twist(sequence), sequence.dt)
+    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), zero_order_hold(sequence), sequence.dt)
     random = np.random.default_rng(seed)
     off = 0.01 * random.normal(size=(frames, 6))
     off[0] = 0.0
@@ -215,9 +215,9 @@ def test_noise_has_no_delay() -> None:
 def test_held_velocities_at_the_usual_shifts() -> None:
     sequence = Scene(frames=8).sequence()
     u = np.concatenate([sequence.linear_velocity, sequence.angular_velocity], axis=1)
-    assert np.array_equal(held_twist(sequence, Shift.AFTER), u[:-1])
-    assert np.array_equal(held_twist(sequence, Shift.BEFORE), u[1:])
-    assert np.allclose(held_twist(sequence, Shift.MIDDLE), 0.5 * (u[:-1] + u[1:]))
+    assert np.array_equal(zero_order_hold(sequence, Shift.AFTER), u[:-1])
+    assert np.array_equal(zero_order_hold(sequence, Shift.BEFORE), u[1:])
+    assert np.allclose(zero_order_hold(sequence, Shift.MIDDLE), 0.5 * (u[:-1] + u[1:]))
 
 
 def test_a_track_that_jumps_is_cut_and_both_pieces_take_part() -> None:

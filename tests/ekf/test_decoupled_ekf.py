@@ -12,7 +12,7 @@ from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Estimate, LandmarkMode, Problem, Status
 from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
-from fgbaseline.ekf.decoupled_ekf import _printed_form_failure
+from fgbaseline.ekf.decoupled_ekf import _standard_form_failure
 from fgbaseline.ekf.landmark_mapping import map_landmarks
 from fgbaseline.ekf.landmark_update import IndependentLandmarks
 from fgbaseline.geometry import FloatArray, HuberKernel, se3
@@ -203,11 +203,11 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
 def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
     weight = np.ones(12)
-    assert _printed_form_failure(1e-6 * np.eye(6), innovation, weight) == ""
+    assert _standard_form_failure(1e-6 * np.eye(6), innovation, weight) == ""
     # So small beside the noise of the pixels that the gain changes nothing.
     lost = "leaves (I - K H) Sigma as printed with an eigenvalue of -1.0e-12"
-    assert _printed_form_failure(-1e-12 * np.eye(6), innovation, weight) == lost
-    assert _printed_form_failure(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
+    assert _standard_form_failure(-1e-12 * np.eye(6), innovation, weight) == lost
+    assert _standard_form_failure(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
 
 
 def test_a_singular_innovation_is_told_in_words_and_figures() -> None:

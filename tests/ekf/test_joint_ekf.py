@@ -467,7 +467,7 @@ def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it
 def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
     said = (f"2 of {2 if k else 12} observations take no part" for k in range(10))
-    put_off = [data.Event(k, EventKind.ENTRY_PUT_OFF, text) for k, text in enumerate(said)]
+    put_off = [data.Event(k, EventKind.INITIALIZATION_DEFERRED, text) for k, text in enumerate(said)]
     never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no frame that was believed saw it", j) for j in (0, 1)]
     assert list(estimate.events) == [*put_off, *never]
 

@@ -15,7 +15,7 @@ from fgbaseline.ekf.pose_update import (
     pose_innovation,
     pose_posterior,
     predicted_covariance,
-    printed_covariance,
+    standard_form_covariance,
 )
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
 
@@ -114,13 +114,16 @@ def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite()
     random = np.random.default_rng(5)
     innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
     sigma, weight = covariance_of(random, 0.01), np.ones(8)
-    ours, printed = pose_posterior(sigma, innovation, weight).covariance, printed_covariance(sigma, innovation, weight)
+    ours, printed = (
+        pose_posterior(sigma, innovation, weight).covariance,
+        standard_form_covariance(sigma, innovation, weight),
+    )
     np.testing.assert_allclose(printed, ours, rtol=0.0, atol=1e-9 * sigma.max())
     innovation.jacobian[0] *= 1e8
     ours = pose_posterior(sigma, innovation, weight).covariance
     assert np.linalg.eigvalsh(ours)[0] > -1e-16 * sigma.max()
     try:
-        printed = printed_covariance(sigma, innovation, weight)
+        printed = standard_form_covariance(sigma, innovation, weight)
     except np.linalg.LinAlgError:
         return  # on some processors rounding leaves H Sigma H^T + V no inverse at all
     assert np.linalg.eigvalsh(0.5 * (printed + printed.T))[0] < 0.0

@@ -95,7 +95,7 @@ def random_motion(seed: int, distance: float) -> FloatArray:
 
 def assert_is_moved(estimate: Estimate, original: Estimate, motion: FloatArray, tolerance: float) -> None:
     """`tolerance` in m on poses, and on landmarks as a share of their distance from the path besides."""
-    back = estimate.moved(se3.inverse(motion))
+    back = estimate.transformed(se3.inverse(motion))
     path = original.world_T_imu[:, :3, 3]
     assert np.abs(back.world_T_imu[:, :3, 3] - path).max() < tolerance
     np.testing.assert_allclose(back.world_T_imu[:, :3, :3], original.world_T_imu[:, :3, :3], atol=1e-6)
@@ -156,7 +156,7 @@ def test_metrics_do_not_depend_on_the_world(seed: int) -> None:
         )
 
     here = metrics(ekf, reference, truth, up)
-    there = metrics(ekf.moved(motion), reference.moved(motion), far, motion[:3, :3] @ up)
+    there = metrics(ekf.transformed(motion), reference.transformed(motion), far, motion[:3, :3] @ up)
     np.testing.assert_allclose(there, here, rtol=1e-6, atol=1e-7)
 
 

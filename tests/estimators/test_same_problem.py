@@ -16,7 +16,7 @@ from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
 from fgbaseline.geometry.measurement import measured_rows, predict, squared_norm
-from fgbaseline.geometry.stereo import PRINTED
+from fgbaseline.geometry.stereo import PIXEL_ROWS
 from fgbaseline.geometry.triangulation import triangulate_tracks
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.factors import FactorBuilder
@@ -136,7 +136,7 @@ def test_three_rows_and_the_printed_four_weigh_a_residual_alike_but_for_what_no_
     # r^T (H Sigma H^T + V)^-1 r of four rows is that of three plus (vL - vR)^2 / (2 V).
     random = np.random.default_rng(seed)
     H, residual, half = random.normal(size=(5, 3, 6)), random.normal(size=(5, 4)), random.normal(size=(6, 6))
-    sigma, four = half @ half.T, H[:, list(PRINTED)]
+    sigma, four = half @ half.T, H[:, list(PIXEL_ROWS)]
     S = four @ sigma @ np.swapaxes(four, 1, 2) + V * np.eye(4)
     whole = np.einsum("ni,ni->n", residual, np.linalg.solve(S, residual[:, :, None])[:, :, 0])
     three = H @ sigma @ np.swapaxes(H, 1, 2) + np.diag(V * np.array([1.0, 1.0, 0.5]))

@@ -131,9 +131,9 @@ def test_the_rotation_angle_is_the_length_of_the_rotation_vector(phi: FloatArray
 @given(rotation_vectors(), st.floats(1e-6, 1.0))
 def test_the_defect_of_a_rotation_is_zero_and_of_anything_else_is_not(phi: FloatArray, scale: float) -> None:
     R = so3.exp_so3(phi)
-    assert so3.rotation_defect(R) < 1e-14
-    assert so3.rotation_defect((1.0 + scale) * R) > scale
-    assert so3.rotation_defect(R @ np.diag([1.0, 1.0, -1.0])) == pytest.approx(2.0)
+    assert so3.orthogonality_error(R) < 1e-14
+    assert so3.orthogonality_error((1.0 + scale) * R) > scale
+    assert so3.orthogonality_error(R @ np.diag([1.0, 1.0, -1.0])) == pytest.approx(2.0)
 
 
 @given(st.lists(twists(), min_size=1, max_size=5))

@@ -94,8 +94,8 @@ def pose_jacobian(patch: pytest.MonkeyPatch) -> None:
 
 def camera_jacobian(patch: pytest.MonkeyPatch) -> None:
     """Of the pixels by the point in the camera's frame."""
-    right = StereoCamera.rows_along
-    patch.setattr(StereoCamera, "rows_along", lambda camera, seen, along: -right(camera, seen, along))
+    right = StereoCamera.row_derivatives
+    patch.setattr(StereoCamera, "row_derivatives", lambda camera, seen, along: -right(camera, seen, along))
 
 
 def joint_jacobian(patch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from evo.core.trajectory import PoseTrajectory3D
 
 from fgbaseline import data
 from fgbaseline.data import Trajectory
-from fgbaseline.data.exchange import write_problem
+from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparing import compare
 from fgbaseline.reports.results.comparison import json_schema

@@ -15,7 +15,7 @@ from ..observations import BoolArray, IntArray
 _Points = tuple[FloatArray, FloatArray, FloatArray]
 
 
-class Scenery:
+class StreetObjects:
     """The things of one town, drawn once; `margin` m more between the middle of the street and what stands there."""
 
     def __init__(self, margin: float, rng: np.random.Generator) -> None:
@@ -31,7 +31,7 @@ class Scenery:
         )
 
     def points(self, station: IntArray, rng: np.random.Generator) -> tuple[FloatArray, BoolArray]:
-        """One point (n, 3) about each station (n,) in whole metres, NaN where nothing stands; and which stand up."""
+        """One point (n, 3) about each station (n,) in whole meters, NaN where nothing stands; and which stand up."""
         kind = rng.choice(len(self._kinds), len(station), p=[share for share, _ in self._kinds])
         side = rng.choice([-1.0, 1.0], len(station))
         local = np.empty((len(station), 3))

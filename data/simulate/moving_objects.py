@@ -12,7 +12,7 @@ _SLOT = 4.0
 """s after which another thing comes along"""
 
 
-class Traffic:
+class MovingObjects:
     """One thing at a time, in a straight line at constant speed; points on its surface share its velocity."""
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
@@ -38,7 +38,7 @@ class Traffic:
             sideways = np.where(kind == 2, -rng.uniform(4.0, 8.0, n), 0.0)
             speed = np.stack([forward, sideways, np.zeros(n)], axis=1)
             self._size = np.array([2.1, 0.9, 0.6])
-        self._centre = poses[:, :3, 3] + np.einsum("nij,nj->ni", self._axes, local)
+        self._center = poses[:, :3, 3] + np.einsum("nij,nj->ni", self._axes, local)
         self._velocity = np.einsum("nij,nj->ni", self._axes, speed)
 
     def points(self, birth: IntArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -50,4 +50,4 @@ class Traffic:
         surface[np.arange(len(birth)), face] = np.sign(surface[np.arange(len(birth)), face])
         offset = np.einsum("nij,nj->ni", self._axes[slot], surface * self._size)
         velocity = self._velocity[slot]
-        return self._centre[slot] + offset + velocity * (t - self._begin[slot])[:, None], velocity
+        return self._center[slot] + offset + velocity * (t - self._begin[slot])[:, None], velocity

@@ -10,10 +10,10 @@ from ..observations import BoolArray, IntArray
 from .columns import Columns
 from .kitti import kitti_poses
 from .number_table import Lines, NumberTable, numbers_of
+from .parsed_trajectory import ParsedTrajectory
 from .quaternion_order import xyzw
 from .stamped_poses import require_rising, rotations_of_quaternions
 from .stamps import equal_stamps, possible_units, stamps_of
-from .trajectory_file import TrajectoryFile
 
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
@@ -21,7 +21,7 @@ FORWARD = 0.9
 """the cosine of the angle to the body's x axis: a body that travels so is no camera"""
 
 
-def read_text(empty: TrajectoryFile, lines: Lines, columns: Columns) -> TrajectoryFile:
+def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> ParsedTrajectory:
     """The trajectory file `empty`, which has name and source, with what its columns hold. Raises InputError."""
     places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
     stamp = columns.time if columns.time is not None else columns.number
@@ -89,8 +89,8 @@ def _known(
 
 
 def _with_stamps(
-    file: TrajectoryFile, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
-) -> tuple[TrajectoryFile, IntArray]:
+    file: ParsedTrajectory, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
+) -> tuple[ParsedTrajectory, IntArray]:
     """The file with the stamps or frame numbers of the lines `kept`, and which of these (m,) are left."""
     place = columns.time if columns.time is not None else columns.number
     assert place is not None
@@ -118,8 +118,8 @@ def _with_stamps(
         raise InputError(
             f"line {line[i]}: the time stamp {words[kept[left[i]]]} is no whole number of nanoseconds; write those"
         )
-    units, is_settled = possible_units(stamps)
-    return replace(file, stamps=stamps, units=units, unit_settled=is_settled, remarks=remarks), left
+    units, is_known = possible_units(stamps)
+    return replace(file, stamps=stamps, units=units, unit_known=is_known, remarks=remarks), left
 
 
 def _covariance_remark(columns: Columns) -> tuple[str, ...]:

@@ -5,14 +5,14 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from ..observations import BoolArray, IntArray
-from .chance import Concern, generator
+from .random_streams import RandomStream, generator
 from .rig import Rig
 from .settings import Simulation
 
 
 def noisy_pixels(pixel: FloatArray, settings: Simulation) -> FloatArray:
     """Pixels (n, 4) with noise of `sigma_pixel` on every row, that of vL and vR with `row_correlation`."""
-    noise: FloatArray = generator(settings.seed, Concern.PIXELS).standard_normal(pixel.shape)
+    noise: FloatArray = generator(settings.seed, RandomStream.PIXELS).standard_normal(pixel.shape)
     shared = settings.row_correlation
     if shared:
         noise[:, 3] = shared * noise[:, 1] + np.sqrt(1.0 - shared**2) * noise[:, 3]
@@ -27,7 +27,7 @@ def wrong_matches(
     Half of `wrong_share` are single observations. The other half belongs to tracks that slip onto another point at
     some frame and stay there, displaced by one constant amount. In a burst every observation is wrong by chance.
     """
-    rng = generator(settings.seed, Concern.WRONG_MATCHES)
+    rng = generator(settings.seed, RandomStream.WRONG_MATCHES)
     n, m = len(frame), int(track.max(initial=-1)) + 1
     single = rng.random(n) < 0.5 * settings.wrong_share
     offset = displacements(n, rng)
@@ -40,7 +40,7 @@ def wrong_matches(
     wrong = single | slipped
     offset[slipped] = slip_offset[track[slipped]]
 
-    rng = generator(settings.seed, Concern.BURSTS)
+    rng = generator(settings.seed, RandomStream.BURSTS)
     chance, burst_offset = rng.random(n), displacements(n, rng)
     for start, end, share in settings.bursts:
         hit = (t[frame] >= start) & (t[frame] <= end) & (chance < share) & ~wrong

@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 
 
-class Concern(IntEnum):
+class RandomStream(IntEnum):
     """What random numbers are drawn for; the values are part of what makes a seed repeat, so only ever append."""
 
     PATH = 0
@@ -19,6 +19,6 @@ class Concern(IntEnum):
     RETURNS = 8
 
 
-def generator(seed: int, concern: Concern) -> np.random.Generator:
+def generator(seed: int, concern: RandomStream) -> np.random.Generator:
     """The generator of one concern: an independent child of `seed`."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(int(concern),))))

@@ -1,4 +1,4 @@
-"""`TrajectoryFile`: the poses of a trajectory file, and the unit, order and times that it leaves open."""
+"""`ParsedTrajectory`: the poses of a trajectory file, and the unit, order and times that it leaves open."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ STRAIGHT = 1e-3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class TrajectoryFile:
+class ParsedTrajectory:
     """What a trajectory file holds, and what it leaves open: n poses."""
 
     name: str
@@ -40,7 +40,7 @@ class TrajectoryFile:
     """None where the file has none"""
     units: tuple[TimeUnit, ...] = (TimeUnit.S,)
     """that the stamps may have, the likeliest first; none where no unit makes their rate a recorder's"""
-    unit_settled: bool = True
+    unit_known: bool = True
     """whether header or size of the stamps show their unit"""
     frame: IntArray | None = None
     """(n,) the number of each pose's frame, where there are no stamps but numbers"""
@@ -124,18 +124,18 @@ def bends(position: FloatArray) -> bool:
     return bool(extent[1] > STRAIGHT * extent[0])
 
 
-def settled(file: TrajectoryFile, unit: TimeUnit | None, order: Order | None) -> tuple[TimeUnit, Order]:
+def unit_and_order(file: ParsedTrajectory, unit: TimeUnit | None, order: Order | None) -> tuple[TimeUnit, Order]:
     """The unit and order that a file has, or else the given ones, or else the likeliest.
 
     Raises InputError where the stamps may have several units, and seconds are not among them.
     """
     if unit is None and TimeUnit.S not in file.units and len(file.units) != 1:
-        raise InputError(in_doubt(file))
-    chosen = file.units[0] if unit is None or file.unit_settled else unit
+        raise InputError(unit_ambiguity(file))
+    chosen = file.units[0] if unit is None or file.unit_known else unit
     return chosen, (file.orders[0] if order is None or len(file.orders) == 1 else order)
 
 
-def in_doubt(file: TrajectoryFile, units: Sequence[TimeUnit] | None = None) -> str:
+def unit_ambiguity(file: ParsedTrajectory, units: Sequence[TimeUnit] | None = None) -> str:
     """What to say where the stamps of a file may have several units, or have none that fits a recorder."""
     assert file.stamps is not None
     possible = file.units if units is None else units

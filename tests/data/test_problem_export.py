@@ -10,7 +10,7 @@ import pytest
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Problem, read_problem
-from fgbaseline.data.exchange import layout, write_problem
+from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import everything_in, fgbaseline

@@ -13,7 +13,7 @@ _CHUNK = 200_000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Sight:
+class CameraView:
     """A rig carried along frames: `cam_T_world` (T, 4, 4)."""
 
     rig: Rig
