@@ -81,11 +81,11 @@ def measured(recording: Path, runs: int, estimators: str) -> list[dict[str, floa
     """The stages of so many runs, one after another, each in a process of its own."""
     root = Path(__file__).resolve().parents[1]
     command = [sys.executable, "-m", "benchmarks.rest_of_run", str(recording.resolve()), "--estimators", estimators]
-    told = [
+    outputs = [
         subprocess.run([*command, "--stages"], stdout=subprocess.PIPE, text=True, check=True, cwd=root).stdout
         for _ in range(runs)
     ]
-    return [json.loads(text) for text in told]
+    return [json.loads(text) for text in outputs]
 
 
 def rest(taken: Mapping[str, float]) -> float:
@@ -100,8 +100,8 @@ def rows(recording: Path, runs: int, estimators: str = DEFAULT_ESTIMATORS) -> li
     rests = [rest(taken) for taken in every]
     claim = f"`run {recording.name}` beside its estimators"
     shown = [Row(claim, f"under {WANTED:g} s", *_seconds(rests, whole), statistics.median(rests) < WANTED)]
-    told = [rest(taken) - taken[POSING] for taken in every]
-    shown.append(Row("of that, all but the diagnosis", "", *_seconds(told, whole), None))
+    seconds = [rest(taken) - taken[POSING] for taken in every]
+    shown.append(Row("of that, all but the diagnosis", "", *_seconds(seconds, whole), None))
     for stage in every[0]:
         shown.append(Row(stage, "", *_seconds([taken[stage] for taken in every], whole), None))
     return shown

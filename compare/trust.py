@@ -98,7 +98,7 @@ def trust(
         share = untied / (problem.n_frames - 1)
         text = (
             f"over {untied:,} of {problem.n_frames - 1:,} intervals no landmark ties what lies on both sides: only the "
-            "velocities tell the motion there, and a jump would not show"
+            "velocities give the motion there, and a jump would not show"
         )
         findings.append((_above(share, limit.untied_intervals), text))
     if not problem.diagnosed:

@@ -1,4 +1,4 @@
-"""What a recording's fields must be, said by the names they have in the file (`Sequence` knows only its own names)."""
+"""Checks of a recording's fields, with error messages that use the names in the file."""
 
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""Time stamps of a recording's frames: repeated ones are left out, and what cannot be mended is refused with its cause.
+"""Time stamps of a recording's frames: repeated ones are left out, other faults are rejected with their cause.
 
-The stamps of a long clock that lost their digits repeat each other (`time_unit.lost_digits`), or jump by the rounding.
+Stamps of a long clock that lost digits repeat each other (`time_unit.lost_digits`), or jump by the rounding.
 """
 
 from typing import NamedTuple
@@ -22,21 +22,21 @@ STRAY = 1000.0
 
 
 class FrameStamps(NamedTuple):
-    """The frames of a file that have a stamp of their own."""
+    """Frames of a file with a time stamp of their own."""
 
     t: FloatArray
     """(T,) as recorded, strictly rising"""
     kept: BoolArray
-    """(m,) which of the file's frames these are"""
+    """(m,) mask of these frames in the file"""
     findings: tuple[Finding, ...]
 
     @property
     def left_out(self) -> tuple[int, ...]:
-        """The other frames of the file."""
+        """Frames of the file that are left out."""
         return tuple(np.flatnonzero(~self.kept).tolist())
 
     def observations(self, o: Observations) -> Observations:
-        """Those of the kept frames, the frames numbered anew."""
+        """Observations of the kept frames, renumbered."""
         if self.kept.all():
             return o
         number = np.cumsum(self.kept) - 1
@@ -44,7 +44,7 @@ class FrameStamps(NamedTuple):
         return Observations(number[o.frame[chosen]], o.landmark[chosen], o.pixel[chosen])
 
     def truth(self, truth: Truth | None) -> Truth | None:
-        """That of the kept frames."""
+        """Ground truth of the kept frames."""
         return truth if truth is None else Truth(truth.world_T_imu[self.kept], truth.landmarks, truth.source)
 
 

@@ -1,4 +1,4 @@
-"""Ground truth from a trajectory file, brought to the recording's frames and to its world."""
+"""Ground truth from a trajectory file, associated with the recording's frames and transformed to its world."""
 
 from dataclasses import replace
 from typing import Literal, get_args

@@ -1,4 +1,4 @@
-"""The poses of a trajectory in text; lines without a pose and repeated stamps are left out and counted."""
+"""Parser of text trajectories; lines without a pose and repeated stamps are left out and counted."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ FORWARD = 0.9
 
 
 def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> ParsedTrajectory:
-    """The trajectory file `empty`, which has name and source, with what its columns hold. Raises InputError."""
+    """Trajectory `empty`, which has name and source, filled from the columns. Raises InputError."""
     places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
     stamp = columns.time if columns.time is not None else columns.number
     table = numbers_of(lines, places if stamp is None else [stamp, *places], nan=True)

@@ -1,4 +1,4 @@
-"""Things that move: cars ahead, oncoming and crossing, or people in a room, each for a few seconds."""
+"""Moving objects: cars ahead, oncoming and crossing, or people in a room, each for a few seconds."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from .path import Path
 from .settings import WorldName
 
 _SLOT = 4.0
-"""s after which another thing comes along"""
+"""s between the appearance of objects"""
 
 
 class MovingObjects:
-    """One thing at a time, in a straight line at constant speed; points on its surface share its velocity."""
+    """Moving object, one at a time, with constant velocity, which its surface points share."""
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
         self._t = t

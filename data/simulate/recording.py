@@ -1,4 +1,4 @@
-"""A simulated recording: a path, what it sees, what its sensors make of it."""
+"""Simulated recording: path, tracks and sensor data."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -24,7 +24,7 @@ from .velocities import recorded_velocities
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Labels:
-    """What is wrong with each of the n observations of a simulated sequence."""
+    """Labels of the errors of n simulated observations."""
 
     wrong: BoolArray
     """(n,) wrong matches"""
@@ -33,16 +33,16 @@ class Labels:
 
 
 def simulate(settings: Simulation) -> Sequence:
-    """A recording with its truth: poses and landmarks in the IMU's frame at frame 0. Same settings, same bytes.
+    """Simulated recording with ground truth in the IMU frame at frame 0; equal settings give equal bytes.
 
-    Landmarks on things that move have no true position: their rows are NaN. Raises InputError where `along` cannot be
+    Landmarks on moving objects have no true position: their rows are NaN. Raises InputError where `along` cannot be
     followed.
     """
     return simulate_with_labels(settings)[0]
 
 
 def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
-    """The same, and which observations are wrong or moving."""
+    """Simulated recording, and labels of wrong and moving observations."""
     rig = settings.mount
     t, level = _path(settings)
     origin = se3.inverse(level.at(t[:1])[0])

@@ -1,4 +1,4 @@
-"""What is mounted on what: stereo camera, image size and where the left camera sits on the IMU."""
+"""Stereo rig: camera, image size and extrinsic."""
 
 from dataclasses import dataclass, field
 

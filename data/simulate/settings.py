@@ -1,4 +1,4 @@
-"""What a simulated recording is to be like."""
+"""Settings of a simulated recording."""
 
 import math
 from dataclasses import dataclass

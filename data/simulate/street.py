@@ -1,7 +1,7 @@
-"""What stands along a street: where points that a camera can track lie, relative to the way the car takes.
+"""Street along the path of a car, with the positions of trackable points.
 
-The street follows the path. Beyond a corner it also goes on straight ahead, as a crossing does, and what lies round the
-corner is only seen from near it.
+The street follows the path. Beyond a corner it also continues straight ahead, as at a crossing. Objects around the
+corner are visible only near it.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What the velocity sensor records of a path."""
+"""Velocities recorded along a path."""
 
 import numpy as np
 

@@ -96,7 +96,7 @@ def _disparities(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     if tracks.tiny > MIN_TINY * n:
         text = (
             f"{plural(tracks.tiny, 'observation')} ({tracks.tiny / n:.1%}) have a disparity of at most "
-            f"{MIN_DISPARITY:g} px, too little to tell a depth."
+            f"{MIN_DISPARITY:g} px, too small to determine a depth."
         )
         found.append(_counted("disparity_tiny", text, tracks.tiny, 0, "observations"))
     return found
@@ -119,7 +119,7 @@ def _few_features(tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"{plural(len(frames), 'frame')} of {len(tracks.usable):,} have fewer than {MIN_USABLE} usable features "
-        f"({spans(frames)}): only the velocities tell the motion there."
+        f"({spans(frames)}): only the velocities give the motion there."
     )
     return [_counted("few_features", text, len(frames), len(frames), "frames")]
 
@@ -133,7 +133,7 @@ def _cuts(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
-        "tracker started anew, or the recording is cut there. Only the velocities tell the motion."
+        "tracker started anew, or the recording is cut there. Only the velocities give the motion."
     )
     return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
 

@@ -42,7 +42,7 @@ class CalibrationFit:
     """white noise within a window: `sigmas` without time-correlated errors"""
     motion: FloatArray
     """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
-    unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
+    unit normal distribution where the noise is as found; NaN where the cameras determine nothing"""
 
 
 def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> CalibrationFit | None:

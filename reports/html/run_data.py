@@ -10,7 +10,7 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike
 
 from fgbaseline.compare import chi_square_bounds, reprojection_by
-from fgbaseline.compare.departure import departure, far
+from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
@@ -273,9 +273,9 @@ def _jumps(run: Run) -> list[dict[str, Any]]:
     """The frames that a person will want to see first."""
     jumps: list[dict[str, Any]] = []
     for result in run.compared:
-        left = departure(run, result)
+        left = divergence_onset(run, result)
         if left is not None:
-            text = f"{result.name} first {far(result):.3g} m from {run.reference}"
+            text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
             jumps.append({"frame": left.frame, "text": text})
     worst = _most_excluded(run.problem)
     return jumps if worst is None else [*jumps, {"frame": worst, "text": "most matches found wrong"}]

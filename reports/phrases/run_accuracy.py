@@ -10,7 +10,7 @@ from pathlib import PurePath
 import numpy as np
 
 from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
-from fgbaseline.compare.departure import path_length
+from fgbaseline.compare.divergence_onset import path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.sample_sizes import insufficient_truth
 from fgbaseline.reports.formatting import listed, number, per_cent

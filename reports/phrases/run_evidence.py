@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline.compare import CovarianceState, divergence_summary, held_out_ranking
-from fgbaseline.compare.departure import AROUND, departure, far, worst_second, wrong_share
+from fgbaseline.compare.divergence_onset import (
+    AROUND,
+    divergence_onset,
+    divergence_threshold,
+    worst_second,
+    wrong_share,
+)
 from fgbaseline.compare.estimate_comparison import Run, known
 from fgbaseline.reports.formatting import counted, listed, number, per_cent
 from fgbaseline.reports.results.evidence import frame_ranges
@@ -23,7 +29,7 @@ def departure_sentences(run: Run) -> list[str]:
     for result in run.compared:
         if result.divergence is None or result.name in run.by_products or not known(result.divergence).any():
             continue
-        limit, left = f"{far(result):.3g} m", departure(run, result)
+        limit, left = f"{divergence_threshold(result):.3g} m", divergence_onset(run, result)
         if left is None:
             most = number(divergence_summary(result.divergence)["max"])
             sentences.append(f"{result.name} stays within {limit} of {run.reference} throughout: {most} m at most.")

@@ -90,7 +90,7 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     farther = names_after(sentence, "farther than", "$")
     for name in rivals.keys() - {first}:
         d = compare.rmse_difference(rivals[name][both], rivals[first][both])
-        figures = [number(rmse(rivals[who][both])) for who in (name, first)]
+        figures = [number(rmse(rivals[rival][both])) for rival in (name, first)]
         assert (name in farther) == (d.low > 0.0 and figures[0] != figures[1])
     alone = set(farther) - {first} == rivals.keys() - {first} and len(rivals) > 1
     assert sentence.startswith(f"Nearest to isam2 is {first}") == alone

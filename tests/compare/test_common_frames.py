@@ -1,4 +1,4 @@
-"""Who is nearer is asked of the moments that all have; words and sign agree; coverage stands beside the ranks."""
+"""Rankings use the moments that all estimates have; words and sign agree; coverage stands beside the ranks."""
 
 import csv
 import json
@@ -124,7 +124,7 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
         assert "0.497" in text
         assert "RMSE over common moments, m" in text
     bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
-    assert len(bold) == 1  # what each has alone says nothing of who is best
+    assert len(bold) == 1  # frames that one estimate alone has do not decide the ranking
     assert "common moments" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
         rows = {row["estimate"]: row for row in csv.DictReader(file)}

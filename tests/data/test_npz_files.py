@@ -1,4 +1,4 @@
-"""The course files and our own npz: what is written comes back, and what is recorded is told apart by its keys."""
+"""The course files and our own npz: written recordings are read back, and the form is detected from the keys."""
 
 import contextlib
 import io

@@ -157,11 +157,11 @@ def test_words_that_are_not_ours_are_told(problems: dict[str, Problem], tmp_path
 
 def test_the_command_writes_the_problem_that_a_run_solves(tmp_path: Path) -> None:
     data.write_npz(drive(), tmp_path / "drive.npz")
-    told = fgbaseline(
+    finished = fgbaseline(
         "export", "drive.npz", "--out", "out/p", "--preset", "documented", "--features", "30", cwd=tmp_path
     )
-    assert told.returncode == 0, told.stderr
-    assert "observations of 30 landmarks; left out: " in told.stdout
+    assert finished.returncode == 0, finished.stderr
+    assert "observations of 30 landmarks; left out: " in finished.stdout
     exported = read_problem(tmp_path / "out/p")
     expected = data.documented(replace(data.read(tmp_path / "drive.npz"), truth=None, source="drive.npz"), 30)
     assert_equal(expected, exported, "problem")

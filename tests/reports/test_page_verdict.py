@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare.departure import departure
+from fgbaseline.compare.divergence_onset import divergence_onset
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.formatting import number
@@ -42,7 +42,7 @@ def test_the_nearest_estimator_comes_first_with_metres_and_share_of_the_path() -
 
 def test_a_departure_is_dated_to_the_first_frame_beyond_the_limit() -> None:
     run = standard_run()
-    left = departure(run, run.results["ekf"])
+    left = divergence_onset(run, run.results["ekf"])
     table = run.results["ekf"].divergence
     assert left is not None
     assert table is not None
@@ -64,7 +64,7 @@ def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> Non
     frame = problem.sequence.observations.frame
     run = run_of(problem, answer(problem, "ekf", (0.0, 3.0, 0.0)), answer(problem, "isam2"))
     assert "mask" not in told(run, "ekf is first more than")
-    left = departure(run, run.results["ekf"])
+    left = divergence_onset(run, run.results["ekf"])
     assert left is not None
     excluded = np.where(frame == left.frame, Excluded.PREDICTION, Excluded.NO).astype(np.uint8)
     t = problem.sequence.t

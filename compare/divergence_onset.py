@@ -1,4 +1,5 @@
-"""When an estimator first leaves the reference, and what the matches were like just then."""
+"""Onset of divergence: the first frame at which an estimate leaves the reference, and the share of wrong matches
+there."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,27 +13,27 @@ from fgbaseline.geometry import FloatArray
 from .estimate_comparison import Result, Run
 
 FAR = 5.0
-"""m, at most"""
+"""m, largest threshold"""
 FAR_SHARE = 0.01
-"""of the reference's path, at most"""
+"""largest threshold, as a share of the reference path"""
 AROUND = 1.0
-"""s before and after"""
+"""s before and after the onset"""
 
 
 @dataclass(frozen=True, slots=True)
-class Departure:
-    """The first frame farther from the reference than a distance."""
+class DivergenceOnset:
+    """First frame beyond the divergence threshold."""
 
     frame: int
     seconds: float
     beyond: float
-    """share of the frames with a pose from then on that are farther than that"""
+    """share of the later frames with a pose that are beyond the threshold"""
     wrong: float | None
-    """share of the matches within `AROUND` that the mask excluded as contradicting their tracks; None without a mask"""
+    """share of the matches within `AROUND` that the mask excluded as wrong; None without a mask"""
 
 
-def far(result: Result) -> float:
-    """From how many metres on an estimator has left the reference: 5 m, or 1 % of the path where that is less."""
+def divergence_threshold(result: Result) -> float:
+    """Position difference (m) at which an estimate has left the reference: 5 m, or 1 % of the path if less."""
     return min(FAR, FAR_SHARE * path_length(result)) or FAR
 
 
@@ -41,41 +42,41 @@ def path_length(result: Result) -> float:
     return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["travelled"].to_numpy()))
 
 
-def departure(run: Run, result: Result) -> Departure | None:
-    """When `result` leaves the reference; None where it never does."""
+def divergence_onset(run: Run, result: Result) -> DivergenceOnset | None:
+    """Onset of the divergence of `result`; None if it stays within the threshold."""
     if result.divergence is None:
         return None
     position = result.divergence["position"].to_numpy(dtype=np.float64)
-    beyond = position > far(result)
+    beyond = position > divergence_threshold(result)
     if not beyond.any():
         return None
     k = int(np.argmax(beyond))
     t = run.problem.sequence.t
     near = np.abs(t - t[k]) <= AROUND
     share = float(beyond[k:][~np.isnan(position[k:])].mean())
-    return Departure(k, float(t[k] - t[0]), share, wrong_share(run.problem, near))
+    return DivergenceOnset(k, float(t[k] - t[0]), share, wrong_share(run.problem, near))
 
 
 def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | None:
-    """Share of the matches of the chosen frames (T,) that the mask excluded as wrong; None without mask or match."""
+    """Share of wrong matches, as excluded by the mask, in the chosen frames (T,); None without mask or match."""
     wrong = np.isin(problem.excluded, WRONG_MATCH)
     there = frames[problem.sequence.observations.frame]
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
 
 
 class WrongSecond(NamedTuple):
-    """A whole second of the recording."""
+    """One second of the recording, with its share of wrong matches."""
 
     second: float
-    """counted from the first frame"""
+    """s from the first frame"""
     share: float
-    """of its matches that the mask excluded as wrong"""
+    """share of its matches that the mask excluded as wrong"""
 
 
 def worst_second(problem: Problem) -> WrongSecond | None:
-    """The (first) second with the largest share of wrong matches; None without a mask or a match.
+    """Second with the largest share of wrong matches (the first of equals); None without a mask or a match.
 
-    Only seconds that have a frame are looked at: a span in nanoseconds has a billion others between two of them.
+    Only seconds that contain a frame are visited, because stamps in wrong units may span billions of seconds.
     """
     wrong = np.isin(problem.excluded, WRONG_MATCH)
     if not wrong.any():
