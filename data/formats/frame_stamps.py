@@ -11,6 +11,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
+from ..plural import percent
 from ..sequence import Truth
 from ..time_unit import COARSE, lost_digits
 from .fields import finite_stamps
@@ -120,8 +121,8 @@ def _rounding(key: str, t: FloatArray) -> list[Finding]:
     if step < COARSE * usual:
         return []
     text = (
-        f"{key}: the stamps are multiples of {step:g}, {step / usual:.0%} of the median interval ({usual:g}){why}: "
-        "every interval, and with it every motion, is wrong by up to as much."
+        f"{key}: the stamps are multiples of {step:g}, {percent(step / usual)} of the median interval ({usual:g}){why}:"
+        " every interval, and with it every motion, is wrong by up to as much."
     )
     return [Finding("stamps_rounded", text, step / usual, step / usual, "share of the interval", "counted")]
 

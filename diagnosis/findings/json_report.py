@@ -16,7 +16,7 @@ from .track_statistics import TrackStatistics, track_statistics
 from .velocity_findings import findings_of, not_identifiable
 
 SCHEMA = "fgbaseline/diagnosis/1"
-"""raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
+"""incremented when a key is renamed, removed or changes its meaning; new keys do not change it"""
 
 
 def to_json(

@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift, zero_order_hold
+from fgbaseline.data.plural import percent
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
@@ -77,7 +78,7 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
     if (deviation > KNOWN_BIAS).any():
         sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
     if diagnosis.velocity_scale[1] > KNOWN_SCALE:
-        sentences.append(f"The scale of the velocities better than to {diagnosis.velocity_scale[1]:.1%}.")
+        sentences.append(f"The scale of the velocities better than to {percent(diagnosis.velocity_scale[1], 1)}.")
     angle = diagnosis.misalignment[1]
     loose = ["xyz"[i] for i in range(3) if angle[i] > KNOWN_ANGLE]
     if loose:
@@ -172,12 +173,12 @@ def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
     more = "larger" if scale > 1.0 else "smaller"
     return Finding(
         "velocity_scale",
-        f"Recorded speeds are {abs(scale - 1.0):.1%} {more} than the stereo speeds; the recording does not show "
-        "which of the two is wrong, so neither is changed without a user-specified repair.",
+        f"Recorded speeds are {percent(abs(scale - 1.0), 1)} {more} than the stereo speeds; the recording does not "
+        "show which of the two is wrong, so neither is changed without a user-specified repair.",
         scale,
         scale,
         "recorded over seen",
-        f"standard error {deviation:.1%}",
+        f"standard error {percent(deviation, 1)}",
     )
 
 

@@ -257,7 +257,7 @@ def true_answer(problem: Problem) -> Estimate:
 
 
 def test_six_observations_are_enough_for_a_frame_and_five_are_not() -> None:
-    for n, weak in ((6, "0.0%"), (5, "100.0%")):
+    for n, weak in ((6, "0.0 %"), (5, "100.0 %")):
         problem = plain_problem(Scene(n_points=n).sequence())
         reasons = compare.trust(problem, true_answer(problem)).reasons
         assert f"{weak} of the frames have fewer than 6 observations" in reasons
@@ -289,9 +289,9 @@ def test_what_was_found_is_said_in_figures() -> None:
     assert set(compare.trust(problem, reference()).reasons) == {
         f"normalized pixel residual RMS {pixel:.2g} (expected 1, robust)",
         f"normalized motion residual RMS {motion:.2g} (expected at most 1)",
-        f"it used {share:.0%} of the observations, far points aside",
-        "0.0% of the frames have fewer than 6 observations",
-        "the observations of 0.0% of the frames were given up",
+        f"it used {100.0 * share:.0f} % of the observations, far points aside",
+        "0.0 % of the frames have fewer than 6 observations",
+        "the observations of 0.0 % of the frames were given up",
         "the recording was not diagnosed: its noise is assumed",
         "not compared with a batch solution",
     }
