@@ -20,7 +20,7 @@ from .style import colors as colors_of
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results
-    from fgbaseline.reports.tables.bench_statistics import Metric
+    from fgbaseline.reports.results.metrics import Metric
 
 MARKS = "osD^vP*Xh<>p"
 MOST_CASES = 12

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.reports.figures import Written, encoded
 
 from ..formatting import counted, number
+from ..results.metrics import TERMS
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""
@@ -84,7 +85,7 @@ def environment() -> Environment:
         loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     jinja.filters |= {"number": number, "counted": counted, "flat": flat, "anchor": anchor}
-    jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT)}
+    jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
     return jinja
 
 

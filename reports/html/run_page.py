@@ -17,7 +17,6 @@ from ..figures import Written
 from ..figures.style import TRUTH, colors, on_dark
 from ..phrases.run import verdict
 from ..tables import run as tables
-from ..tables import run_details as details
 from .environment import asset, environment, picture
 from .run_data import TRUTH_LINE, embedded_json, payload
 
@@ -68,11 +67,11 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             trust_in_reference=run.trust.verdict.name.lower(),
             table=tables.main_table(run, estimators),
             evidence=tables.evidence_table(run, estimators),
-            long_tables=details.long_tables(run),
-            components=details.components_table(estimators),
-            findings=details.findings_table(run.problem.findings),
-            excluded=details.exclusions_table(summary),
-            events=details.events_tables(run),
+            long_tables=tables.long_tables(run),
+            components=tables.components_table(estimators),
+            findings=tables.findings_table(run.problem.findings),
+            excluded=tables.exclusions_table(summary),
+            events=tables.events_tables(run),
             pictures=pictures,
             bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
             stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))],

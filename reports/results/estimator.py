@@ -27,8 +27,8 @@ from .evidence import (
     evidence_notes,
     summarize_evidence,
 )
-from .statistics import Divergence, Number, Part, Reprojection, Spread
-from .tree import INFINITE, nulls
+from .metrics import MEASURED, measured, with_measured
+from .statistics import INFINITE, Divergence, Number, Part, Reprojection, Spread, nulls
 
 
 class Component(Part):
@@ -60,19 +60,18 @@ class CommonRmse(Part):
     frames: int
 
 
+@with_measured
 class EstimatorSummary(Part):
     """One estimator."""
 
     status: Literal["ok", "recovered", "failed"]
     reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
     seconds: Annotated[float, Field(description="for the whole answer, s")]
-    frames_per_second: Number
     reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
     reprojection_used: Annotated[Reprojection, Field(description="over those it used")]
     reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
     components: dict[str, Component]
     divergence: Divergence | None
-    coverage: Annotated[float, Field(description="share of the recording's time in which it has poses")]
     divergence_common: Annotated[
         CommonRmse | None, Field(description="over the frames that all ranked estimators have: what ranks it")
     ]
@@ -104,26 +103,24 @@ TOO_FEW = "it has too few frames in common with the other estimators to be ranke
 
 def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
     """Summary of an estimator, whose figures may be NaN or infinite."""
-    estimate, table, t = result.estimate, result.reprojection, run.problem.sequence.t
+    estimate, table = result.estimate, result.reprojection
     common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
     offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())
-    seconds = estimate.seconds_total
     values = {
         "status": str(estimate.status),
         "reason": estimate.reason,
-        "seconds": seconds,
-        "frames_per_second": run.problem.n_frames / seconds if seconds > 0 else math.nan,
+        "seconds": estimate.seconds_total,
         "reprojection": compare.reprojection_summary(table),
         "reprojection_used": compare.reprojection_summary(table[table["used"]]),
         "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
         "components": compare.component_summary(table),
         "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
-        "coverage": compare.time_coverage(t[np.isfinite(estimate.world_T_imu[:, 0, 0])], t),
         "divergence_common": None if result.divergence_common is None else asdict(result.divergence_common),
         "ate_common": None if result.ate_common is None else asdict(result.ate_common),
         "ate": None if result.truth_aligned is None else compare.summarized(result.truth_aligned["position"]),
         "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
         "truth": None if result.truth is None else _truth_count(result.truth),
+        **measured(run, result),
         **summarize_evidence(run, result),
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
@@ -160,7 +157,7 @@ def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict
         "ate_unaligned.rotation_final_deg": last,
         "truth": "the recording has no truth",
         **evidence_notes(run, result),
-        "frames_per_second": "it took no measurable time",
+        **{metric.key: metric.absent for metric in MEASURED},
         "observations.share": "the problem has no observations",
     }
     noted: dict[str, str] = {}

@@ -17,7 +17,7 @@ from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
-from .tree import INFINITE, leaves
+from .statistics import INFINITE, leaves
 
 if TYPE_CHECKING:
     import pandas as pd

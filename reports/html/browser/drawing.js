@@ -31,7 +31,7 @@ function quantity(value, unit = "") {
   let text;
   if (size === 0) text = "0";
   else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
-  else if (size >= 999.5) text = value.toFixed(0);
+  else if (size >= 999.5) text = Math.round(value).toLocaleString("en");
   else text = value.toPrecision(3);
   return text.replace("-", "−") + (unit === "°" ? "°" : unit ? "\u00a0" + unit : "");
 }
