@@ -11,7 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fgbaseline.reports.figures import Written, encoded
+from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..formatting import counted, number
 from ..results.metrics import TERMS
@@ -61,11 +61,11 @@ class Picture:
     height: int
 
 
-def picture(name: str, figure: Figure | Written) -> Picture:
+def picture(name: str, figure: Figure | EncodedFigure) -> Picture:
     """The figure as SVG, or as PNG where that would be too large."""
     svg = encoded(figure, "svg")
     form, content = ("svg+xml", svg) if len(svg) <= LARGEST_SVG else ("png", encoded(figure, "png"))
-    if isinstance(figure, Written):
+    if isinstance(figure, EncodedFigure):
         title, (width, height) = figure.title, figure.size
     else:
         title, (width, height) = str(figure.get_label()), figure.get_size_inches()

@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 
-from ..figures import Written
+from ..figures import EncodedFigure
 from ..figures.style import TRUTH, colors, on_dark
 from ..phrases.run import verdict
 from ..tables import run as tables
 from .environment import asset, environment, picture
-from .run_data import TRUTH_LINE, embedded_json, payload
+from .plot_data import TRUTH_LINE, embedded_json, payload
 
 FIRST_SENTENCES = 3
 """of the verdict that stand above the table"""
@@ -30,7 +30,7 @@ SCRIPTS = ("data.js", "state.js", "drawing.js", "chart.js", "path.js", "frame.js
 """the page's script in the order of its dependencies"""
 
 
-def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | Written]) -> str:
+def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
     """`report.html`: one file that needs no other and makes no request.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or

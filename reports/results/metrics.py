@@ -347,9 +347,9 @@ TERMS: Mapping[str, str] = {
 """term -> definition, in the glossary of every page; docs/glossary.md has the formulas"""
 
 
-def shown_in(tables: Tables, metrics: Iterable[Metric] = METRICS) -> list[Metric]:
-    """Metrics that are columns of these tables."""
-    return [metric for metric in metrics if tables & metric.tables]
+def shown_in(tables: Tables) -> list[Metric]:
+    """Metrics that are columns of one of these tables."""
+    return [metric for metric in METRICS if tables & metric.tables]
 
 
 def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric]:

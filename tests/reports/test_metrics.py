@@ -52,14 +52,14 @@ def test_a_path_that_leads_nowhere_is_noticed() -> None:
 def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     added = Metric(("divergence", "p95"), "divergence", "95th percentile", "m", Better.LOWER, MAIN | TERMINAL)
     added = replace(added, short="divergence, 95th percentile")
-    monkeypatch.setattr(metrics.shown_in, "__defaults__", ((*METRICS, added),))
+    monkeypatch.setattr(metrics, "METRICS", (*METRICS, added))
     run = standard_run()
     summary = as_dict(run)
     value = added.value(summary["estimators"]["ekf"]).text
     for table in (main_table(run, summary["estimators"]), terminal_table(summary["estimators"], run.reference)):
         (i,) = (i for i, column in enumerate(table.columns) if "95th percentile, m" in column.heading and i > 1)
         assert next(row for row in table.rows if row.name == "ekf").cells[i].text == value
-    assert re.search(rf"<td>{re.escape(value)}</td>", render(run, summary, {}))
+    assert re.search(rf"<td[^>]*>(<strong>)?{re.escape(value)}<", render(run, summary, {}))
 
 
 def test_every_heading_of_a_metric_links_to_a_term_that_the_docs_define_too() -> None:

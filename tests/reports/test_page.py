@@ -15,7 +15,7 @@ import pytest
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures
-from fgbaseline.reports.figures.style import OWN, REFERENCE, SPARE, TRUTH, on_dark
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.metrics import MAIN, shown_in
@@ -234,7 +234,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert number(np.float64(2.5)) == "2.50"
 
 
-@pytest.mark.parametrize("colour", [*OWN.values(), *SPARE, REFERENCE, TRUTH])
+@pytest.mark.parametrize("colour", [*ESTIMATOR_COLORS.values(), *EXTRA_COLORS, REFERENCE, TRUTH])
 def test_every_colour_stands_out_on_dark_ground(colour: str) -> None:
     """By the contrast that the accessibility guidelines (WCAG 2.2, 1.4.11) ask of lines: 3 to 1."""
     (ground,) = re.findall(r"--card: (#\w+);", standard_style().partition("prefers-color-scheme: dark")[2])[:1]

@@ -1,21 +1,27 @@
-"""Consistency: NEES against truth and reference, NIS, sigma ratios, and errors between three sigmas."""
+"""Evidence beside the paths: consistency (NEES, NIS, sigmas), held-out tracks, and landmarks of the reference."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from .over_time import Expected, Panel, over_time
-from .panels import CONSISTENT, DEGREES_OF_FREEDOM, chi_square_band
+from .over_time import Expected, Panel, time_panels
+from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
+from .reprojection import medians_by_class
 from .run_data import RunData
-from .style import GREEN, SCREEN, Style, head, plain
+from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
 
+MIN_LANDMARKS = 10
+"""of a class that has a median in sigmas: few of them have a covariance of the difference"""
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
-PRINTED = "95 % if consistent"
+PAPER_BAND = "95 % if consistent"
 
 
 def nees(run: RunData) -> Figure | None:
@@ -23,7 +29,7 @@ def nees(run: RunData) -> Figure | None:
     label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
     panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
     title = "NEES of each pose: its true error against the error it claims"
-    return over_time(run, [panel], title, SCREEN, linewidth=1.1)
+    return time_panels(run, [panel], title, SCREEN, linewidth=1.1)
 
 
 def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
@@ -32,14 +38,14 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
     On paper the NEES against the truth is with them.
     """
     if not style.titled:
-        pose, innovation = _pose_band(PRINTED, 0.6), _innovation_band(PRINTED, 0.6)
+        pose, innovation = _pose_band(PAPER_BAND, 0.6), _innovation_band(PAPER_BAND, 0.6)
         panels = [
             Panel("NEES", "nees", 0.95, 5.0, pose),
             Panel("NEES of diff.", "nees_reference", 0.95, 5.0, pose),
             Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
-        return over_time(run, panels, "", style)
+        return time_panels(run, panels, "", style)
     panels = [
         Panel("NEES of difference", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
         Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
@@ -47,7 +53,7 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
         Panel("rotation sigma\nover reference's", "sigma_ratio_rotation", 1.75, 5.0, _one),
     ]
     title = "Consistency without truth: overconfident above the band, conservative below it"
-    return over_time(run, panels, title, style, linewidth=1.0)
+    return time_panels(run, panels, title, style, linewidth=1.0)
 
 
 def _pose_band(label: str, width: float = 0.9) -> Expected:
@@ -102,7 +108,9 @@ def three_sigma_of(
     for panel in panels[-1]:
         panel.set_xlim(float(t[0]), float(t[-1]))
         panel.set_xlabel("time, s")
-    head(figure, f"{plain(name)}: error in its own body frame, and three of its sigmas (99.7 %)", handles)
+    title_and_legend(
+        figure, f"{safe_text(name)}: error in its own body frame, and three of its sigmas (99.7 %)", handles
+    )
     return figure
 
 
@@ -113,3 +121,70 @@ def _reach(error: FloatArray, sigma: FloatArray) -> float:
     most = float(np.percentile(e, 99)) if len(e) else 0.0
     band = float(np.percentile(s, 98)) if len(s) else 0.0
     return 1.15 * max(most, min(band, 30.0 * most), 1e-9)
+
+
+def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median distance of landmarks from the reference's by depth; None where none is shared."""
+    if not run.by_depth:
+        return None
+    classes = max(map(len, run.by_depth.values()))
+    return maps_by_depth(run.by_depth, run.line(style, classes), run.reference or "", style)
+
+
+def maps_by_depth(
+    tables: Mapping[str, pd.DataFrame], line: Line, reference: str, style: Style = SCREEN
+) -> Figure | None:
+    """Tables of `compare.map_by_depth` by name: in metres and sigmas, on paper only as the cameras see them."""
+    columns = {"distance": "in the world, m", "seen": "as seen by the cameras, m", "sigmas": "in the world, sigmas"}
+    if style.titled:
+        tables = {n: t.assign(sigmas=t["sigmas"].where(t["with_sigmas"] >= MIN_LANDMARKS)) for n, t in tables.items()}
+    else:
+        columns = {"seen": ""}
+    shown = {c: title for c, title in columns.items() if any(t[c].notna().any() for t in tables.values())}
+    if not shown:
+        return None
+    figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.7))
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    handles = []
+    for panel, (column, title) in zip(panels, shown.items(), strict=True):
+        medians = {name: table[column] for name, table in tables.items()}
+        handles += medians_by_class(panel, medians, line, style, _depth)
+        log_where_positive(panel)
+        panel.set_title(title)
+        panel.set_xlabel("depth, m")
+    if not style.titled:
+        panels[0].set_ylabel("distance, m")
+    title_and_legend(
+        figure, f"Landmarks: median distance from those of {safe_text(reference)}, by depth", handles, style
+    )
+    return figure
+
+
+def _depth(name: str) -> str:
+    return short(name.replace(" m and more", "+")).removesuffix(" m")
+
+
+def held_out(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median error of each path on held-out tracks, with its 95 % interval, best on top; None without any."""
+    table = run.held_out
+    if table is None:
+        return None
+    n, colors = len(table), run.colors
+    figure = Figure(figsize=(style.width, 1.5 + 0.36 * n if style.titled else 0.6 + 0.2 * n))
+    panel = figure.subplots()
+    names = [str(name) for name in table["estimator"]]
+    low, median, high = (table[column].to_numpy(dtype=np.float64) for column in ("low", "median", "high"))
+    rows = zip(range(n), low, median, high, [colors[name] for name in names], strict=True)
+    intervals(panel, rows, *((6.0, 2.2) if style.titled else (3.5, 1.6)))
+    panel.set_yticks(range(n), [safe_text(name) for name in names])
+    panel.set_ylim(n - 0.4, -0.6)
+    if style.titled and 0.0 < float(median.min()) < 0.2 * float(median.max()) < np.inf:
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel("median error on held-out tracks, px" + (", with its 95 % interval" if style.titled else ""))
+    pieces = 0 if run.observed is None else run.observed.held_out_tracks
+    title = f"Predicting tracks that no estimator saw: {plural(pieces, 'piece')} of tracks, the same for all"
+    title_and_legend(figure, title, style=style)
+    return figure
