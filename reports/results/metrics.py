@@ -330,9 +330,9 @@ TERMS: Mapping[str, str] = {
     SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; shorter where the path is too short.",
     REPROJECTION: "Norm of the four pixel differences (uL, vL, uR, vR) of an observation, px. Common observations are "
     "those that every estimator used.",
-    HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the path, "
-    "px. It judges motion over a second or two, not drift. Two paths are separated where the first is above the best "
-    "by at least more than 0.",
+    HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
+    "path, px. It judges motion over a second or two, not drift. Two paths are separated where the first is above the "
+    "best by at least more than 0.",
     NEES: "Normalized estimation error squared of a pose, e^T P^-1 e with e = log(T^-1 T_true): 6 is expected of a "
     "consistent estimator, 5.35 in the median. A larger figure means that it is overconfident.",
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "

@@ -152,7 +152,7 @@ def findings_table(findings: Iterable[Finding]) -> Table:
         )
         for f in findings
     )
-    return Table((Column("before"), Column("after")), rows, name="what the diagnosis found")
+    return Table((Column("before"), Column("after")), rows, name="finding")
 
 
 def _residuals(run: Run) -> Table:
@@ -213,7 +213,7 @@ def exclusions_table(summary: Mapping[str, Any]) -> Table:
     )
     columns = (Column("observations"), Column("of all"))
     caption = "Decided once for all estimators, before any of them runs."
-    return Table(columns, rows, name="an observation takes no part because", caption=caption)
+    return Table(columns, rows, name="reason for exclusion", caption=caption)
 
 
 def events_tables(run: Run) -> list[Table]:

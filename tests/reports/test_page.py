@@ -145,7 +145,7 @@ def test_only_the_script_of_the_page_itself_may_run() -> None:
 def test_what_the_plots_are_drawn_from_is_what_the_run_has() -> None:
     run = standard_run()
     held = json.loads(standard_page().partition('id="run">')[2].partition("</script>")[0])
-    ekf, problem = held["who"][1], run.problem
+    ekf, problem = held["estimators"][1], run.problem
     poses = run.results["ekf"].estimate.world_T_imu
     path = unpacked(ekf["path"]).reshape(-1, 3)
     assert np.allclose(np.linalg.norm(path, axis=1), np.linalg.norm(poses[:, :3, 3], axis=1), atol=1e-4)

@@ -76,11 +76,11 @@ function whenResized(element, draw) {
 const hint = html("div", { class: "hint", role: "status", hidden: "" });
 document.body.append(hint);
 
-// Lines of [text, key of who it is about or null] beside the pointer.
+// Lines of [text, key of its estimator or null] beside the pointer.
 function showHint(event, lines) {
   hint.replaceChildren(...lines.map(([text, key]) => {
     const line = html("div");
-    if (key !== null) line.append(html("span", { class: "swatch who-" + key }));
+    if (key !== null) line.append(html("span", { class: "swatch estimator-" + key }));
     line.append(text);
     return line;
   }));
