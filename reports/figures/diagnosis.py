@@ -1,4 +1,4 @@
-"""Evidence of a diagnosis: what the cameras see beside what was recorded, and how the answers were chosen."""
+"""Figures of a diagnosis: visual odometry beside the recorded velocities, and the likelihood of each convention."""
 
 from typing import Any
 
@@ -59,7 +59,7 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     for i, axis in enumerate(axes):
         known = odometry.known
         values = smoothed(np.where(known, seen[:, i], np.nan), width)
-        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="seen by the cameras", zorder=2)
+        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="visual odometry", zorder=2)
         lines += axis.plot(t, smoothed(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
         if changed:
             lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
@@ -104,7 +104,7 @@ def conventions(diagnosis: Diagnosis) -> Figure:
     handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
     handles += [swatch(RECORDED, "as recorded")] if changed else []
     handles.append(swatch(OTHERS, "others"))
-    title_and_legend(figure, "Which of the 24 axis conventions agrees with the cameras", handles)
+    title_and_legend(figure, "Likelihood of the 24 axis conventions, by visual odometry", handles)
     return figure
 
 
@@ -138,8 +138,8 @@ def delay(diagnosis: Diagnosis) -> Figure:
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 100.0])
     axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
     axes.set_ylabel("agreement, % of the variance")
-    title = "When the recorded rates agree with what the cameras see"
-    title_and_legend(figure, title if timing.identifiable else f"{title}: no shift stands out", handles)
+    title = "Agreement of the recorded rates with visual odometry"
+    title_and_legend(figure, title if timing.identifiable else f"{title}: no shift is identifiable", handles)
     return figure
 
 
@@ -154,7 +154,7 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     for i, panel in enumerate(panels):
         values = fit.motion[np.isfinite(fit.motion[:, i]), i]
         panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color=OTHERS)
-        handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="what the noise found predicts")
+        handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="normal distribution")
         beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
         panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {beyond:.1%} beyond 3 sigma")
     for panel in panels[3:]:
@@ -189,7 +189,7 @@ def tracks_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     lower.set_ylim(bottom=0)
     lower.set_xlabel("time, s")
     lower.set_xlim(0.0, float(t[-1]))
-    title = "Tracks: how many, how many wrong" + (", and when they were copied" if len(copied) else "")
+    title = "Tracks: usable features and wrong matches" + (", copied frames" if len(copied) else "")
     title_and_legend(figure, title, handles)
     return figure
 

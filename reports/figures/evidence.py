@@ -25,32 +25,29 @@ PAPER_BAND = "95 % if consistent"
 
 
 def nees(run: RunData) -> Figure | None:
-    """NEES of each pose against the truth; None without truth or covariances."""
+    """NEES of each pose against ground truth; None without truth or covariances."""
     label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
     panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
-    title = "NEES of each pose: its true error against the error it claims"
+    title = "NEES of each pose: squared error over covariance"
     return time_panels(run, [panel], title, SCREEN, linewidth=1.1)
 
 
 def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """NEES of the difference from the reference, NIS, and sigmas over the reference's; None without any of these.
-
-    On paper the NEES against the truth is with them.
-    """
+    """Reference NEES, NIS and sigma ratios over time; None without any of these. On paper also the NEES."""
     if not style.titled:
         pose, innovation = _pose_band(PAPER_BAND, 0.6), _innovation_band(PAPER_BAND, 0.6)
         panels = [
             Panel("NEES", "nees", 0.95, 5.0, pose),
-            Panel("NEES of diff.", "nees_reference", 0.95, 5.0, pose),
+            Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),
             Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
         return time_panels(run, panels, "", style)
     panels = [
-        Panel("NEES of difference", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
+        Panel("reference NEES", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
         Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
-        Panel("position sigma\nover reference's", "sigma_ratio_position", 1.75, 5.0, _one),
-        Panel("rotation sigma\nover reference's", "sigma_ratio_rotation", 1.75, 5.0, _one),
+        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.75, 5.0, _one),
+        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.75, 5.0, _one),
     ]
     title = "Consistency without truth: overconfident above the band, conservative below it"
     return time_panels(run, panels, title, style, linewidth=1.0)
@@ -61,7 +58,7 @@ def _pose_band(label: str, width: float = 0.9) -> Expected:
 
 
 def _innovation_band(label: str, width: float = 0.9) -> Expected:
-    """Band for as many rows as the median frame that has any."""
+    """Band for the median number of rows of an innovation."""
 
     def draw(run: RunData, axes: Axes) -> list[Any]:
         rows = run.nis_rows
@@ -108,9 +105,7 @@ def three_sigma_of(
     for panel in panels[-1]:
         panel.set_xlim(float(t[0]), float(t[-1]))
         panel.set_xlabel("time, s")
-    title_and_legend(
-        figure, f"{safe_text(name)}: error in its own body frame, and three of its sigmas (99.7 %)", handles
-    )
+    title_and_legend(figure, f"{safe_text(name)}: error in the body frame, and three sigmas (99.7 %)", handles)
     return figure
 
 
@@ -134,8 +129,8 @@ def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
 def maps_by_depth(
     tables: Mapping[str, pd.DataFrame], line: Line, reference: str, style: Style = SCREEN
 ) -> Figure | None:
-    """Tables of `compare.map_by_depth` by name: in metres and sigmas, on paper only as the cameras see them."""
-    columns = {"distance": "in the world, m", "seen": "as seen by the cameras, m", "sigmas": "in the world, sigmas"}
+    """Tables of `compare.map_by_depth` by name: in meters and sigmas, on paper only in the camera frame."""
+    columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
     if style.titled:
         tables = {n: t.assign(sigmas=t["sigmas"].where(t["with_sigmas"] >= MIN_LANDMARKS)) for n, t in tables.items()}
     else:
@@ -183,8 +178,8 @@ def held_out(run: RunData, style: Style = SCREEN) -> Figure | None:
         panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_xlabel("median error on held-out tracks, px" + (", with its 95 % interval" if style.titled else ""))
+    panel.set_xlabel("median held-out error, px" + (", with its 95 % interval" if style.titled else ""))
     pieces = 0 if run.observed is None else run.observed.held_out_tracks
-    title = f"Predicting tracks that no estimator saw: {plural(pieces, 'piece')} of tracks, the same for all"
+    title = f"Held-out error: {plural(pieces, 'piece')} of tracks that no estimator used"
     title_and_legend(figure, title, style=style)
     return figure

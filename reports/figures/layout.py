@@ -1,8 +1,8 @@
-"""Place of everything in a figure: found once, then held, however often and in whatever form it is written.
+"""Layout of a figure: computed once, then fixed for every format it is written in.
 
 Panels are placed by matplotlib's constrained layout in closed form, for figures that are one grid of panels below one
-legend. That engine solves for sizes, looks, and solves again, and looking at every label of every tick is most of what
-it does. Here it is done once, at sizes near those that come of it, and again only where that changed the ticks.
+legend. That engine measures every tick label and solves repeatedly, which takes most of its time. Here it is done once
+at approximate sizes, and again only where that changed the ticks.
 Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where these would be long.
 """
 
@@ -60,7 +60,7 @@ def lay_out(figure: Figure) -> None:
 
 
 def without_layout_engine() -> AbstractContextManager[None]:
-    """Within it nothing gives a figure a layout engine anew, as saving it would."""
+    """Context in which saving a figure adds no layout engine."""
     return mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False})
 
 

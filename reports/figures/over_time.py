@@ -1,4 +1,4 @@
-"""Figures over time: divergence from the reference, error to the truth, height, and the time that frames took."""
+"""Figures over time: divergence from the reference, error to ground truth, height, and time per frame."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -106,7 +106,7 @@ def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
         panels = [Panel("error, m", "truth_position", 0.95), Panel("error, °", "truth_rotation_deg", 0.95)]
         return time_panels(run, panels, "", style)
     names = [name for name in run.names if "truth_position" in run.series[name]]
-    return _errors(run, "truth", names, "Error, unaligned", names) if names else None
+    return _errors(run, "truth", names, "Unaligned error to ground truth", names) if names else None
 
 
 def component_panels(
@@ -153,7 +153,7 @@ def height(run: RunData) -> Figure:
 
 
 def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Time that each frame took, on the screen beside the interval between frames; None where none is known."""
+    """Time per frame, on the screen beside the interval between frames; None where none is known."""
     if not style.titled:
         return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0)], "", style)
     times = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
@@ -202,7 +202,7 @@ def _maxima(tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _names_by_times(times: Mapping[str, FloatArray]) -> list[list[str]]:
-    """Names that share their times, because one run gave both answers."""
+    """Groups of estimators with equal times, which one run gave."""
     shared: list[list[str]] = []
     for name, ms in times.items():
         same = next((names for names in shared if np.array_equal(times[names[0]], ms)), None)

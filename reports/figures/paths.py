@@ -35,7 +35,7 @@ def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
 
 
 def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
-    """All paths in one panel, with the truth where there is one."""
+    """All paths in one panel, with ground truth where there is one."""
     if style is not SCREEN:
         return _paper_paths(run, style, run.names)
     paths, truth = _flat(run)
@@ -54,7 +54,7 @@ def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
     title_and_legend(figure, "All paths from above", handles)
     remarks = [f"{safe_text(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
     if remarks:
-        note(axes, "; ".join(remarks) + " outside the picture")
+        note(axes, "; ".join(remarks) + " outside the panel")
     return figure
 
 
@@ -82,12 +82,12 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     title_and_legend(figure, f"{label(name, run.reference)}: path from above and landmarks", handles)
     remarks = _outside(box, landmarks, "landmark") + _outside(box, path, "pose")
     if remarks:
-        note(axes, " and ".join(remarks) + " outside the picture")
+        note(axes, " and ".join(remarks) + " outside the panel")
     return figure
 
 
 def paths_side_by_side(run: RunData) -> Figure:
-    """A panel for each estimator, all with the same limits, the reference and the truth thin behind each."""
+    """A panel for each estimator, all with the same limits, the reference and ground truth thin behind each."""
     paths, truth = _flat(run)
     box = common_window(paths.values(), truth).shaped(ASPECT, MIN_MARGIN)
     columns = {1: 1, 2: 2, 4: 2}.get(len(paths), 3)
@@ -167,7 +167,7 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
 
 
 def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> None:
-    """Arrows where the camera looks, every so many frames."""
+    """Arrows along the optical axis, at some of the frames."""
     there = np.flatnonzero(np.isfinite(path).all(axis=1))
     chosen = there[:: max(1, len(there) // ARROWS)]
     look: dict[str, Any] = {"scale": 32, "width": 0.0028, "headwidth": 5, "headlength": 6, "alpha": 0.75, "zorder": 3}

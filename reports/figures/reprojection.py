@@ -1,4 +1,4 @@
-"""Reprojection errors: over time with the matches they rest on, as a distribution, by classes, and by track."""
+"""Reprojection errors: over time with the observations, as a distribution, by classes, and by track."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -19,18 +19,18 @@ from .run_data import RunData, RunDetails
 from .style import GRAY, GREEN, SCREEN, Style, stacked_panels, swatch, title_and_legend
 
 SMALL_ERROR = 3.0
-"""px: what the tables count as explained"""
+"""px, a column of the tables"""
 COARSE = (Excluded.DISPARITY, Excluded.SHORT)
-"""reasons that say a match determines little"""
+"""reasons of observations that determine little"""
 BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
 DASHED: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
-CLASSES = {"distance": "by distance", "track age": "by age of the track, sights", "region": "by place in the image"}
+CLASSES = {"distance": "by distance", "track age": "by age of the track, frames", "region": "by place in the image"}
 
 
 def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Median error of each frame, on the screen over its numbers of used and excluded matches; None without any."""
+    """Median error of each frame, on screen above the numbers of observations; None without any."""
     if not style.titled:
         return time_panels(run, [Panel("median error, px", "reprojection_median", 1.2, decades=5.0)], "", style)
     if run.observed is None or len(run.observed.problem.sequence.observations) == 0:
@@ -44,16 +44,16 @@ def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None
     counts = observations_by_frame(run.observed.problem)
     colors = [BANDS[name] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
-    lower.set_ylabel("matches per frame")
+    lower.set_ylabel("observations per frame")
     lower.set_ylim(bottom=0)
     time_axis(run, [upper, lower])
     bands = [swatch(BANDS[name], name) for name in counts if counts[name].any()]
-    title_and_legend(figure, "Reprojection error by frame, and the matches it rests on", [*handles, *bands])
+    title_and_legend(figure, "Median reprojection error by frame, and the observations", [*handles, *bands])
     return figure
 
 
 def reprojection_distribution(run: RunData) -> Figure | None:
-    """Share of observations that each estimator explains to within so many pixels; None without any."""
+    """Share of observations below a reprojection error, for each estimator; None without any."""
     tables = {} if run.observed is None else {n: t for n, t in run.observed.reprojection.items() if len(t)}
     if not tables:
         return None
@@ -89,7 +89,7 @@ def distribution(
     axes.set_ylabel("share of observations, %")
     for label, look in zip(labels, ({}, DASHED), strict=False):
         handles += axes.plot([], [], color=GRAY, label=label, **look)
-    title_and_legend(figure, "Share of the observations explained to within so many pixels", handles)
+    title_and_legend(figure, "Share of observations below a reprojection error", handles)
     return figure
 
 
@@ -106,7 +106,7 @@ def reprojection_classes(run: RunData) -> Figure | None:
         log_where_positive(panel)
         panel.set_ylabel("median error, px")
     handles += _probabilities(panels[3], run.observed, run.line())
-    title_and_legend(figure, "Reprojection errors in classes, and tracks against chi-square", handles)
+    title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
     return figure
 
 
@@ -134,7 +134,7 @@ def medians_by_class(
 
 
 def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) numbers of matches of each frame in the problem, too coarse, and contradicting, by the names of BANDS."""
+    """(T,) observations per frame: in the problem, too coarse, and contradicting, by the names of BANDS."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
     reasons = [(Excluded.NO,), COARSE, WRONG_MATCH]
     return {

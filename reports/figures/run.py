@@ -36,7 +36,7 @@ OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
     reprojection_classes,
     map_difference,
 )
-"""each answers None where the run has nothing for it to show"""
+"""each gives None where the run has no data for it"""
 PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     "paths": (partial(paths_overlaid, style=PAPER), "Paths on {sequence} from above."),
     "landmarks": (
@@ -45,9 +45,9 @@ PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     ),
     "divergence": (
         partial(divergence, style=PAPER),
-        "Distance and angle from the reference, {reference} ({trust}), on {sequence}, without alignment.",
+        "Position and rotation divergence from the reference, {reference} ({trust}), on {sequence}, without alignment.",
     ),
-    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to the truth on {sequence}, without alignment."),
+    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to ground truth on {sequence}, without alignment."),
     "reprojection": (
         partial(reprojection_over_time, style=PAPER),
         "Median reprojection error of each frame of {sequence} (norm of the four pixel differences).",
@@ -55,15 +55,15 @@ PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     "consistency": (
         partial(consistency, style=PAPER),
         "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
-        "sigmas are those of the position over those of {reference}.",
+        "sigma ratios of the position are to {reference}.",
     ),
     "held_out": (
         partial(held_out, style=PAPER),
-        "Median error on tracks of {sequence} that no estimator saw, with 95 % intervals.",
+        "Median held-out error on {sequence}, with 95 % intervals.",
     ),
     "map_difference": (
         partial(map_difference, style=PAPER),
-        "Median distance of landmarks from those of {reference}, as the cameras see them, by depth.",
+        "Median distance of landmarks from those of {reference}, in the camera frame, by depth.",
     ),
     "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}."),
 }

@@ -49,7 +49,7 @@ MAX_NAME = 48
 GREEN, BAND, GRAY = "#6b9a72", "#d7e8d9", "#555555"
 """expected values, the band around them, and marks of no estimator"""
 MARKERS = "os^Dv<P*X>"
-"""of lines on paper, told apart without color"""
+"""of lines on paper, distinguished without color"""
 MARKS_PER_LINE = 8
 """marks of a line on paper"""
 WHITE: Mapping[str, Any] = {"color": "white", "markeredgecolor": "black", "zorder": 5}

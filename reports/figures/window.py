@@ -1,4 +1,4 @@
-"""A scene seen from above, and what part of it a figure shows: all that is plausible, not one runaway's extent."""
+"""Windows: the part of a scene that a figure shows, robust against a diverged estimate."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -69,7 +69,7 @@ def _text(array: np.ndarray) -> str:
 
 
 TRUTH_LINE = "truth"
-"""the key of the truth among the lines of a chart; no estimator has it, as theirs are numbers"""
+"""key of ground truth among the lines of a chart; those of estimators are numbers"""
 OUTLIER = 30.0
 """times farther than every other line: then one line alone would flatten all others on a linear axis"""
 

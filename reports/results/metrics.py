@@ -74,8 +74,8 @@ class Metric:
     """of the figure in a table over that in the results"""
     term: str = ""
     """of the glossary, where it is not the group"""
-    short: str = ""
-    """heading without a group above it, on the terminal and in a bench"""
+    brief: str = ""
+    """heading on the terminal and in a bench, where it is not the group"""
     name: str = ""
     """column of a bench's CSV tables; empty: none"""
     ranked: bool = False
@@ -97,6 +97,11 @@ class Metric:
     def key(self) -> str:
         """Name in `metrics.csv` and limits: the path."""
         return ".".join(self.path)
+
+    @property
+    def short(self) -> str:
+        """Heading without a group above it."""
+        return self.brief or self.group
 
     @property
     def glossary_term(self) -> str:
@@ -159,12 +164,11 @@ METRICS = (
         "%",
         tables=MAIN | TERMINAL | BENCH | COMPARISON,
         scale=PERCENT,
-        short="coverage",
         name="coverage",
         uneven_only=True,
         measure=_coverage,
     ),
-    Metric(("ate", "rmse"), ATE, "RMSE", "m", LOWER, MAIN | TERMINAL, short=ATE, absent=NO_TRUTH),
+    Metric(("ate", "rmse"), ATE, "RMSE", "m", LOWER, MAIN | TERMINAL, absent=NO_TRUTH),
     Metric(
         ("ate_common", "rmse"),
         ATE,
@@ -172,7 +176,6 @@ METRICS = (
         "m",
         LOWER,
         MAIN | BENCH,
-        short=ATE,
         name="ate",
         ranked=True,
         same_data=True,
@@ -185,7 +188,7 @@ METRICS = (
     Metric(("translation", "max"), ATE, "maximum", "m", LOWER, COMPARISON),
     Metric(("rotation_deg", "rmse"), ATE, "rotation RMSE", "°", LOWER, COMPARISON),
     Metric(("nees", "median"), NEES, "median", tables=MAIN, absent="no positive definite covariance"),
-    Metric(("divergence", "rmse"), DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL, short=DIVERGENCE),
+    Metric(("divergence", "rmse"), DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
     Metric(
         ("divergence_common", "rmse"),
         DIVERGENCE,
@@ -193,7 +196,6 @@ METRICS = (
         "m",
         LOWER,
         MAIN | BENCH,
-        short=DIVERGENCE,
         name="divergence",
         same_data=True,
         uneven_only=True,
@@ -214,7 +216,6 @@ METRICS = (
         "px",
         LOWER,
         MAIN | TERMINAL | BENCH | COMPARISON,
-        short=REPROJECTION,
         name="reprojection",
         absent=NO_LANDMARK,
     ),
@@ -227,7 +228,7 @@ METRICS = (
         HIGHER,
         MAIN | TERMINAL | BENCH,
         scale=PERCENT,
-        short="under 3 px",
+        brief="under 3 px",
         name="under_3px",
         absent=NO_LANDMARK,
     ),
@@ -238,7 +239,7 @@ METRICS = (
         "px",
         LOWER,
         MAIN | BENCH | COMPARISON,
-        short="reprojection error over common observations",
+        brief="reprojection error over common observations",
         name="reprojection_common",
         same_data=True,
         absent="no observation was used by every estimator",
@@ -253,21 +254,11 @@ METRICS = (
         "%",
         tables=MAIN | BENCH,
         scale=PERCENT,
-        short="observations used",
+        brief="observations used",
         name="used",
         absent="there are no observations",
     ),
-    Metric(
-        ("seconds",),
-        COST,
-        "time",
-        "s",
-        LOWER,
-        MAIN | TERMINAL,
-        short="time",
-        same_data=True,
-        absent=NOT_MEASURED,
-    ),
+    Metric(("seconds",), COST, "time", "s", LOWER, MAIN | TERMINAL, brief="time", same_data=True, absent=NOT_MEASURED),
     Metric(
         ("frames_per_second",),
         COST,
@@ -286,22 +277,14 @@ METRICS = (
         "px",
         LOWER,
         EVIDENCE | BENCH | COMPARISON,
-        short=HELD_OUT,
         name="held_out",
         ranked=True,
         same_data=True,
     ),
     Metric(("held_out", "behind"), HELD_OUT, "above the best", "px", tables=EVIDENCE),
     Metric(("held_out", "behind_low"), HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
-    Metric(("nees", "mean"), NEES, "mean", tables=EVIDENCE | COMPARISON, short=NEES, name="nees"),
-    Metric(
-        ("nees_reference", "median"),
-        REFERENCE_NEES,
-        "median",
-        tables=EVIDENCE,
-        short=REFERENCE_NEES,
-        name="nees_reference",
-    ),
+    Metric(("nees", "mean"), NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
+    Metric(("nees_reference", "median"), REFERENCE_NEES, "median", tables=EVIDENCE, name="nees_reference"),
     Metric(("nees_reference", "left_out"), REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
     Metric(("nis", "per_degree"), "consistency", "NIS per row", tables=EVIDENCE, term="NIS per row"),
     Metric(("sigma_ratio", "position"), "consistency", "sigma ratio, position", tables=EVIDENCE, term="sigma ratio"),

@@ -24,11 +24,11 @@ class Spread(Part):
     median: Number
     p95: Number
     max: Number
-    missing: Annotated[int, Field(description="errors that are NaN, which the figures leave out")]
+    missing: Annotated[int, Field(description="NaN errors, which the figures leave out")]
 
 
 class Divergence(Spread):
-    """Of each pose from the reference's, m, without alignment."""
+    """Difference of poses, m and °, without alignment."""
 
     final: Number
     rotation_rmse_deg: Number
@@ -44,7 +44,7 @@ class Reprojection(Spread):
 
 
 class Nees(Part):
-    """Normalised estimation error squared of the poses against truth, error log(T^-1 T_true) in the body frame."""
+    """Normalized estimation error squared of the poses, error log(T^-1 T_true) in the body frame."""
 
     mean: Annotated[Number, Field(description="6 is expected")]
     median: Annotated[Number, Field(description="5.35 is expected")]

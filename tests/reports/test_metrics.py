@@ -51,7 +51,7 @@ def test_a_path_that_leads_nowhere_is_noticed() -> None:
 
 def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     added = Metric(("divergence", "p95"), "divergence", "95th percentile", "m", Better.LOWER, MAIN | TERMINAL)
-    added = replace(added, short="divergence, 95th percentile")
+    added = replace(added, brief="divergence, 95th percentile")
     monkeypatch.setattr(metrics, "METRICS", (*METRICS, added))
     run = standard_run()
     summary = as_dict(run)
