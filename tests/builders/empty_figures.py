@@ -34,6 +34,6 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(saving, "_png", lambda *_: empty["png"])
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
-    patch.setattr(run, "drawings", blank)
+    patch.setattr(run, "figure_functions", blank)
     for module in (run, comparison):
         patch.setattr(module, "lay_out", lambda _: None)

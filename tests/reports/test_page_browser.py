@@ -129,15 +129,15 @@ def test_nothing_that_comes_from_files_can_run(opened: Opened) -> None:
 
 
 def test_switching_an_estimator_off_takes_its_lines_away_and_frees_the_axis(opened: Opened) -> None:
-    before = opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg')
+    before = opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg')
     assert opened.count("#over-time .line.estimator-0") > 3
     opened.page.uncheck('#estimators-shown input[value="0"]')
     assert opened.count("#over-time .line.estimator-0") == 0
     assert opened.count("#path-view .estimator-0") == 0
     assert opened.count("#path-view .line.estimator-1") == 1
-    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') != before
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg') != before
     opened.page.check('#estimators-shown input[value="0"]')
-    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') == before
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg') == before
 
 
 def test_the_slider_moves_one_cursor_through_every_plot(opened: Opened) -> None:
@@ -177,7 +177,7 @@ def test_a_frame_shows_what_became_of_each_observation_and_its_true_reprojection
 def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> None:
     opened.page.click("summary:has-text('in numbers')")
     opened.set_frame(59)
-    row = opened.text("#values tr:has-text('Distance from isam2')")
+    row = opened.text("#values tr:has-text('Divergence from isam2')")
     assert row.split("\t")[1:3] == [
         f"{run.results[n].divergence['position'].iloc[59]:#.3g}" for n in list(run.results)[:2]
     ]
