@@ -143,7 +143,7 @@ def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: P
         landmarks=[tmp_path / "mine.csv"],
     )
     row = result.table.loc["mine"]
-    assert row["ATE: maximum, m"] < 1e-9
+    assert row["ATE: max, m"] < 1e-9
     assert row["ATE: rotation RMSE, °"] < 1e-6
     assert row["reprojection error: median, px"] < 10.0
     reference = result.reference_pixels
