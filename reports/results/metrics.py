@@ -314,8 +314,8 @@ TERMS: Mapping[str, str] = {
     REPROJECTION: "Norm of the four pixel differences (uL, vL, uR, vR) of an observation, px. Common observations are "
     "those that every estimator used.",
     HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
-    "path, px. It judges motion over a second or two, not drift. Two paths are separated where the first is above the "
-    "best by at least more than 0.",
+    "path, px. It judges motion over a second or two, not drift. A path is separated from the best where "
+    "'above the best by at least' is positive.",
     NEES: "Normalized estimation error squared of a pose, e^T P^-1 e with e = log(T^-1 T_true): 6 is expected of a "
     "consistent estimator, 5.35 in the median. A larger figure means that it is overconfident.",
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "

@@ -14,7 +14,7 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
-from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, TERMINAL, Metric, shown_in
+from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
 from ..results.run import Summary
 from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
@@ -116,7 +116,7 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
 
 
 def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
-    return set(answered) - ({run.reference, *run.unranked} if metric.group == DIVERGENCE else set())
+    return set(answered) - ({run.reference, *run.unranked} if metric.group in (DIVERGENCE, MAP) else set())
 
 
 def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:

@@ -13,9 +13,10 @@ from fgbaseline.reports.results import metrics
 from fgbaseline.reports.results.comparison import Summary as Comparison
 from fgbaseline.reports.results.metrics import COMPARISON, DELTA, MAIN, METRICS, TERMINAL, TERMS, Metric
 from fgbaseline.reports.results.run import Summary
-from fgbaseline.reports.tables.run import main_table, terminal_table
+from fgbaseline.reports.tables.run import evidence_table, main_table, terminal_table
 
-from ..builders.runs import as_dict, standard_run
+from ..builders.runs import answer, as_dict, run_of, scene, standard_run
+from ..builders.synthetic import plain_problem
 
 GLOSSARY = Path(__file__).parents[2] / "docs" / "glossary.md"
 NOT_OF_A_COMPARISON = ~COMPARISON
@@ -60,6 +61,18 @@ def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.Monke
         (i,) = (i for i, column in enumerate(table.columns) if "95th percentile, m" in column.heading and i > 1)
         assert next(row for row in table.rows if row.name == "ekf").cells[i].text == value
     assert re.search(rf"<td[^>]*>(<strong>)?{re.escape(value)}<", render(run, summary, {}))
+
+
+def test_by_products_of_the_reference_are_not_best_in_what_is_measured_from_it() -> None:
+    problem = plain_problem(scene())
+    twin = answer(problem, "isam2-online")
+    run = run_of(problem, answer(problem, "isam2", by_products={"isam2-online": twin}), twin, answer(problem, "ekf"))
+    estimators = as_dict(run)["estimators"]
+    for table in (main_table(run, estimators), evidence_table(run, estimators)):
+        measured = [i for i, c in enumerate(table.columns) if c.term in ("divergence", "map difference")]
+        assert measured
+        for row in table.rows:
+            assert row.name == "ekf" or not any(row.cells[i].best for i in measured)
 
 
 def test_every_heading_of_a_metric_links_to_a_term_that_the_docs_define_too() -> None:
