@@ -33,7 +33,7 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import Calibration, NoiseSettings
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearization
-from fgbaseline.reports.figures.style import OWN
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS
 
 FRAMES = 20
 PARTS = 5
@@ -41,7 +41,7 @@ PARTS = 5
 EVERYTHING = MaskSettings(min_disparity=-np.inf, max_row_mismatch=np.inf, prediction_gate=np.inf, min_track=1)
 """There are no wrong matches to find, and a gate along noisy velocities would keep what agrees with their noise."""
 INVERSE_DEPTH = JointSettings(linearization=Linearization.TEXTBOOK)
-COLOURS = OWN | {
+COLOURS = ESTIMATOR_COLORS | {
     "joint-ekf-first-estimate": "#56B4E9",
     "textbook, inverse depth": "#882255",
     "joint-ekf-textbook": "#D55E00",

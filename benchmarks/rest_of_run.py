@@ -67,7 +67,7 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         run = compare_all(problem, answers, settings.record(), processes=cores())
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
-        with watch("figures, and tables meanwhile"), figures.being_drawn(run, cores()) as finished:
+        with watch("figures, and tables meanwhile"), figures.drawn_in_background(run, cores()) as finished:
             summary = write_numbers(run, folder)
             drawn = finished()
             (folder / "figures").mkdir()

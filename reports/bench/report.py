@@ -12,13 +12,12 @@ from fgbaseline.reports.figures.bench import draw
 
 from ..figures.saving import encoded
 from ..phrases.bench import TABLE
-from ..results.bench import ANSWERED, COSTS, OF_THE_RUN, Results
+from ..results import bench as statistics
+from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
 from ..results.reader import RunFolder
-from ..results.tree import INFINITE, at
-from ..tables import bench_statistics as statistics
+from ..results.statistics import INFINITE, at
 from ..tables import latex, markdown
 from ..tables.bench import main_table
-from ..tables.bench_statistics import METRICS
 from .job import Planned
 from .page import render
 from .run_cache import RunCache

@@ -185,12 +185,12 @@ def _drawn(
     asked: dict[str, float | None],
     place: FilePath | None,
 ) -> Path:
-    from ..figures.accuracy import draw  # matplotlib: only where something fell short
+    from ..figures.comparison import draw_failed_check  # matplotlib: only where something fell short
 
     path = Path(tempfile.mkdtemp(prefix="fgbaseline-")) / "accuracy.png" if place is None else Path(place)
     limited = {metric.partition(".")[0] for metric, limit in asked.items() if limit is not None}
     shown = [name for name in tables if name in limited] or ["ate"]
-    draw(aligned, {name: (tables[name], asked[f"{name}.max"]) for name in shown}, path)
+    draw_failed_check(aligned, {name: (tables[name], asked[f"{name}.max"]) for name in shown}, path)
     return path
 
 

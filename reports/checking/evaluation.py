@@ -23,7 +23,7 @@ from ..results.reader import (
     sample_of,
     value_of,
 )
-from ..results.tree import INFINITE
+from ..results.statistics import INFINITE
 from .baseline import before, is_timing
 from .limits_file import Limit, Limits, Needed
 

@@ -14,10 +14,9 @@ from fgbaseline.compare.limits import Outcome
 from ..formatting import md
 from ..phrases.check import bound, remarks, verdict
 from ..results.check import Checked, Line
+from ..tables import UNWRAPPED, print_table
 from ..tables import markdown as markdown_table
-from ..tables import print_table
 from ..tables.check import cells, check_table, unit_of
-from ..tables.writers import UNWRAPPED
 
 SCHEMA = "fgbaseline/check/1"
 STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.CANNOT_TELL: "yellow", Outcome.FALLS_SHORT: "bold red"}

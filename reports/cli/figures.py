@@ -34,13 +34,13 @@ def command(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     """
     from fgbaseline.data.formats.atomic_folder import atomic_folder
 
-    from ..figures.run import draw_printed
+    from ..figures.run import draw_for_paper
     from ..figures.run_data import of_folder
     from ..figures.saving import CAPTIONS, save, save_captions
     from ..figures.style import PAPER
 
     place = out or folder / "paper"
-    figures = draw_printed(of_folder(folder))
+    figures = draw_for_paper(of_folder(folder))
     with atomic_folder(place, force=force, mark=CAPTIONS) as building:
         save({name: figure for name, (figure, _) in figures.items()}, building, formats, PAPER)
         save_captions({name: caption for name, (_, caption) in figures.items()}, building)

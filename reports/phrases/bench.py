@@ -8,8 +8,8 @@ import pandas as pd
 from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 
 from ..formatting import interval, listed, number
-from ..results.bench import ANSWERED, Results
-from ..tables.bench_statistics import METRICS, Metric, consistency, judge, overall, rankings, records
+from ..results.bench import ANSWERED, METRICS, Results, consistency, judge, overall, rankings, records
+from ..results.metrics import Metric
 
 MOST_CASES = 10
 """that have a sentence each"""
@@ -94,17 +94,17 @@ def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[
     fewer = [f"{row['estimator']} ({_answers(row, first, most, metric)})" for row in rows if row["runs"] < most]
     left_out = f"; not ranked for missing answers: {listed(fewer)}" if fewer else ""
     if not others:
-        return f"{case}: the {metric.title} of {first['estimator']} is {figures[first['estimator']]}{left_out}."
+        return f"{case}: the {metric.short} of {first['estimator']} is {figures[first['estimator']]}{left_out}."
     if most == 1:
         each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
-        return f"{case}: {metric.title} {each}; one run does not rank them{left_out}."
+        return f"{case}: {metric.short} {each}; one run does not rank them{left_out}."
     best = number(first["mean"])
     tied = [row["estimator"] for row in others if row["tied"] or number(row["mean"]) == best]
     least = f"{figures[first['estimator']]} over {most} runs"
     if tied:
-        text = f"{case}: {metric.title} {first['estimator']} {least}; these do not separate {listed(tied)} from it"
+        text = f"{case}: {metric.short} {first['estimator']} {least}; these do not separate {listed(tied)} from it"
     else:
-        text = f"{case}: {first['estimator']} has the least {metric.title}, {least}"
+        text = f"{case}: {first['estimator']} has the least {metric.short}, {least}"
     apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if row["estimator"] not in tied]
     larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
     return f"{text}{larger}{left_out}."
@@ -127,7 +127,7 @@ def _overall(results: Results) -> list[str]:
     places = [f"{row['estimator']} {number(row['mean_rank'])}" for row in records(table)]
     if not places:
         return []
-    return [f"Mean rank by {metric.title} over {table['cases'].max()} cases: {listed(places)}."]
+    return [f"Mean rank by {metric.short} over {table['cases'].max()} cases: {listed(places)}."]
 
 
 def _consistency(results: Results) -> list[str]:

@@ -27,7 +27,7 @@ def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
 
     `processes` share the drawing of the figures. A caller that is one of several processes at work leaves it at one.
     """
-    with figures.being_drawn(run, processes) as finished:
+    with figures.drawn_in_background(run, processes) as finished:
         summary = write_numbers(run, folder)
         drawn = finished()
     (folder / "figures").mkdir()
@@ -66,7 +66,7 @@ def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**text)
 
 
-def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.Written]) -> None:
+def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.EncodedFigure]) -> None:
     """`report.html`, with the figures that were drawn."""
     (folder / "report.html").write_text(render(run, as_dict(summary), drawn), encoding="utf-8")
 

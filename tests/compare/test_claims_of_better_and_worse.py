@@ -15,7 +15,7 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, truth_sentences
-from fgbaseline.reports.tables.bench_statistics import METRICS
+from fgbaseline.reports.results.bench import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import FRAMES, answer, as_dict, run_of, scene

@@ -19,8 +19,8 @@ from fgbaseline.reports.comparing import compare
 from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.comparison import order_in_words
 from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.bench import METRICS
 from fgbaseline.reports.tables import latex, markdown
-from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import answer, as_dict, run_of, scene
@@ -120,15 +120,15 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", align="none")
     result.write(lost / "out")
     for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
-        assert "share of the reference's time" in text.replace("&#39;", "'")
-        assert "0.497" in text
+        assert "of the time, %" in text.replace("\\%", "%")
+        assert "49.7" in text
         assert "RMSE over common moments, m" in text
     bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
     assert len(bold) == 1  # frames that one estimate alone has do not decide the ranking
     assert "common moments" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
         rows = {row["estimate"]: row for row in csv.DictReader(file)}
-    assert float(rows["lost"]["coverage: share of the reference's time"]) == pytest.approx(99 / 199)
+    assert float(rows["lost"]["coverage: of the time, %"]) == pytest.approx(100 * 99 / 199)
     assert json.loads((lost / "out" / "comparison.json").read_text())["estimates"]["lost"]["rank"] == 2
 
 
@@ -185,8 +185,13 @@ def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_
 
 def test_a_bench_says_of_the_best_that_others_with_fewer_answers_are_below_it() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2]})
-    said = winner("town", figures.monte_carlo_ranking(errors).reset_index(), METRICS[0], frozenset())
-    assert said.startswith("town: the error to truth of sound is")
+    said = winner(
+        "town",
+        figures.monte_carlo_ranking(errors).reset_index(),
+        next(m for m in METRICS if m.name == "ate"),
+        frozenset(),
+    )
+    assert said.startswith("town: the ATE of sound is")
     assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound there)" in said
 
 

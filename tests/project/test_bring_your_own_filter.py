@@ -143,9 +143,9 @@ def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: P
         landmarks=[tmp_path / "mine.csv"],
     )
     row = result.table.loc["mine"]
-    assert row["absolute error: largest, m"] < 1e-9
-    assert row["absolute error: rotation RMSE, °"] < 1e-6
-    assert row["reprojection, median px: its landmarks"] < 10.0
+    assert row["ATE: max, m"] < 1e-9
+    assert row["ATE: rotation RMSE, °"] < 1e-6
+    assert row["reprojection error: median, px"] < 10.0
     reference = result.reference_pixels
     mine = result.results["mine"].pixels
     assert mine is not None

@@ -25,8 +25,8 @@ from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
 from fgbaseline.reports.phrases.bench import sentences
+from fgbaseline.reports.results import bench as tables
 from fgbaseline.reports.results.bench import Results
-from fgbaseline.reports.tables import bench_statistics as tables
 from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.bench import main_table
 
@@ -144,7 +144,7 @@ def test_the_case_table_is_the_mean_of_its_runs(results: Results) -> None:
 def test_the_best_is_marked_once_in_every_form(results: Results) -> None:
     grid = main_table(results, with_costs=False)
     headings = [column.heading for column in grid.columns]
-    column = headings.index("error to truth, m")
+    column = headings.index("ATE, m")
     for _, rows in grid.by_group:
         cells = [row.cells[column] for row in rows]
         (best,) = (cell.text for cell in cells if cell.best)

@@ -95,7 +95,7 @@ def test_what_a_run_lacks_is_not_drawn(tmp_path: Path, monkeypatch: pytest.Monke
     read = figures.of_folder(tmp_path)
     assert read.names == ("dead-reckoning",)
     assert read.truth is None
-    assert set(figures.draw_printed(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
+    assert set(figures.draw_for_paper(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
 
 
 def test_bad_input_is_told_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

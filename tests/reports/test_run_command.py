@@ -215,7 +215,7 @@ def test_truth_that_ends_early_is_counted(recording: Path, tmp_path: Path) -> No
     assert (e.truth.frames, e.truth.missing) == (70, 10)
     assert e.ate_unaligned is not None
     assert e.ate_unaligned.final is None
-    assert e.notes["ate_unaligned.final"] == "the last frame has no truth"
+    assert e.notes["ate_unaligned.final"] == "the last frame has no ground truth"
 
 
 OUTSIDE = """

@@ -101,8 +101,8 @@ def test_the_figures_show_it_and_the_page_has_its_table() -> None:
     assert page.count('id="figure-held_out"') == 1
     assert page.count('id="figure-three_sigma_ekf"') == 1
     assert 'id="evidence"' in page
-    assert "behind the best, px" in page
-    assert "not positive definite</th>" not in page  # a column of zeros tells nothing
+    assert "above the best, px" in page
+    assert "covariances not positive definite" not in page  # a column of zeros tells nothing
 
 
 def test_the_sentences_tell_who_is_best_and_who_cannot_be_told_apart() -> None:
@@ -129,7 +129,7 @@ def test_covariances_that_are_none_are_told_with_their_frames() -> None:
     assert summary["covariance"] == {"frames": 60, "held": 0, "not_positive_definite": 4, "where": "3, 7 to 9"}
     assert summary["nees"]["frames"] == 56
     assert any("4 pose covariances that are not positive definite (frames 3, 7 to 9)" in s for s in verdict(run))
-    assert "not positive definite</th>" in render(run, as_dict(run), {})
+    assert "covariances not positive definite" in render(run, as_dict(run), {})
 
 
 def test_a_run_in_which_nobody_answers_says_that_nothing_can_be_judged() -> None:

@@ -1,4 +1,4 @@
-"""A scene seen from above, and what part of it a figure shows: all that is plausible, not one runaway's extent."""
+"""Windows: the part of a scene that a figure shows, robust against a diverged estimate."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def common_window(paths: Iterable[FloatArray], core: FloatArray | None, least: f
     return _box_of(np.concatenate(points), allowed) if any(map(len, points)) else believed
 
 
-def span(series: Iterable[FloatArray], least: float) -> float:
+def signed_range(series: Iterable[FloatArray], least: float) -> float:
     """Reach of an axis on either side of zero for several series (n,) of signed values.
 
     To the largest value, unless one series reaches more than 30 times as far as any other and farther than `least`.

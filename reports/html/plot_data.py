@@ -17,6 +17,7 @@ from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
+from fgbaseline.reports.tables.run import REASONS
 
 FINEST = 16
 """parts of a pixel that observations are rounded to, unless the image is too large for that"""
@@ -68,7 +69,7 @@ def _text(array: np.ndarray) -> str:
 
 
 TRUTH_LINE = "truth"
-"""the key of the truth among the lines of a chart; no estimator has it, as theirs are numbers"""
+"""key of ground truth among the lines of a chart; those of estimators are numbers"""
 OUTLIER = 30.0
 """times farther than every other line: then one line alone would flatten all others on a linear axis"""
 
@@ -85,14 +86,14 @@ def charts(run: Run) -> list[dict[str, Any]]:
 
 
 def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
-    away, group = f"from {run.reference}", "Where the paths part"
-    yield _chart(group, "divergence", f"Distance {away}", "m", _column(run, "divergence", "position"))
-    yield _chart(group, "rotation", f"Angle {away}", "°", _column(run, "divergence", "rotation_deg"))
+    away, group = f"from {run.reference}", "Divergence and errors"
+    yield _chart(group, "divergence", f"Divergence {away}", "m", _column(run, "divergence", "position"))
+    yield _chart(group, "rotation", f"Rotation {away}", "°", _column(run, "divergence", "rotation_deg"))
     yield _chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
     yield _chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
-    without = "without any alignment: all start at the true pose"
-    yield _chart(group, "error", "Error to the truth", "m", _column(run, "truth", "position"), hint=without)
-    yield _chart(group, "error-rotation", "Angle from the truth", "°", _column(run, "truth", "rotation_deg"))
+    without = "difference from ground truth; all start at the true pose"
+    yield _chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
+    yield _chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
     view, truth = TopView.of(run.problem), run.problem.sequence.truth
     heights = {r.name: view.height(r.estimate.world_T_imu[:, :3, 3]) for r in run.answered}
     along = {} if truth is None else {TRUTH_LINE: view.height(truth.world_T_imu[:, :3, 3])}
@@ -101,7 +102,7 @@ def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
 
 def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
     medians = {r.name: _by_frame(run, r) for r in run.answered if len(r.reprojection)}
-    title = "Reprojection error, median of each frame"
+    title = "Median reprojection error by frame"
     hint = "over all observations of the landmarks that an estimator has"
     yield _chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
 
@@ -110,18 +111,18 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     group, expected = "Consistency", "the band holds 95 % of the frames of a consistent estimator"
     of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
     pose = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": expected}
-    yield _chart(group, "nees", "NEES: true error against the error claimed", "", _numbered(run, of_truth), **pose)
+    yield _chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
-    title = f"NEES of the difference from {run.reference}"
+    title = f"Reference NEES, to {run.reference}"
     yield _chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
     band = _innovation_band(run)
     nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
-    innovations = "Innovations: NIS per row"
+    innovations = "NIS per row"
     yield _chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
     for part in ("position", "rotation"):
         tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
         ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
-        title, hint = f"Sigma of {part} over that of {run.reference}", "a filter's should be above 1"
+        title, hint = f"Sigma ratio of {part}, to {run.reference}", "expected above 1 for a filter"
         yield _chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
 
 
@@ -149,12 +150,12 @@ def _chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: A
     known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
     if not known:
         return None
-    settings = {"log": _one_flattens_all(known.values()), "band": None, "middle": None, "hint": "", **more}
+    settings = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "hint": "", **more}
     packed = {key: floats(values) for key, values in known.items()}
     return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **settings}
 
 
-def _one_flattens_all(lines: Iterable[FloatArray]) -> bool:
+def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
     """Whether a logarithmic axis is needed to see more than one of lines that are nowhere negative."""
     series = [values[np.isfinite(values)] for values in lines]
     if any(values.min() < 0.0 for values in series):
@@ -181,22 +182,11 @@ def _numbered(run: Run, lines: Lines) -> Lines:
     return {number[name]: np.asarray(values, dtype=np.float64) for name, values in lines.items()}
 
 
-REASONS = {
-    Excluded.FEATURE_NOT_CHOSEN: "not among the features asked for",
-    Excluded.DISPARITY: "disparity too small",
-    Excluded.ROWS: "rows disagree",
-    Excluded.PREDICTION: "contradicts its own track",
-    Excluded.SHORT: "track too short to check",
-    Excluded.GEOMETRY: "point not determined",
-    Excluded.MOVING: "point moved",
-    Excluded.COPIED: "copied from the frame before",
-}
-"""why an observation takes no part, as a few words beside a mark"""
 EDGE = 8.0
 """px between the outermost observations and the frame drawn around them"""
 
 
-def payload(run: Run) -> dict[str, Any]:
+def page_data(run: Run) -> dict[str, Any]:
     """Everything in the coordinates of the view from above: x ahead of the start, y to its left, z up, m."""
     view, sequence = TopView.of(run.problem), run.problem.sequence
     axes = np.stack([view.ahead, view.left, view.up])
@@ -205,17 +195,17 @@ def payload(run: Run) -> dict[str, Any]:
         "frames": sequence.n_frames,
         "t": floats(sequence.t - sequence.t[0]),
         "reference": run.reference,
-        "who": [_who(run, r, axes) for r in run.results.values()],
+        "estimators": [_estimator(run, r, axes) for r in run.results.values()],
         "truth": None if truth is None else floats(truth.world_T_imu[:, :3, 3] @ axes.T),
         "camera": _camera(run),
         "observations": _observations(run),
-        "reasons": {str(int(reason)): text for reason, text in REASONS.items()},
+        "reasons": {str(int(Excluded[key.upper().replace(" ", "_")])): text for key, text in REASONS.items()},
         "charts": charts(run),
-        "jumps": _jumps(run),
+        "bookmarks": _bookmarks(run),
     }
 
 
-def _who(run: Run, result: Result, axes: FloatArray) -> dict[str, Any]:
+def _estimator(run: Run, result: Result, axes: FloatArray) -> dict[str, Any]:
     """An estimator: path (T, 3), camera poses (T, 3, 4), position covariances (T, 6), landmarks, what it used."""
     estimate = result.estimate
     about: dict[str, Any] = {"name": result.name, "answered": result.answered}
@@ -269,16 +259,16 @@ def _observations(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _jumps(run: Run) -> list[dict[str, Any]]:
-    """The frames that a person will want to see first."""
-    jumps: list[dict[str, Any]] = []
+def _bookmarks(run: Run) -> list[dict[str, Any]]:
+    """Frames worth a look: first divergences, and the second with the most wrong matches."""
+    bookmarks: list[dict[str, Any]] = []
     for result in run.compared:
         left = divergence_onset(run, result)
         if left is not None:
             text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
-            jumps.append({"frame": left.frame, "text": text})
+            bookmarks.append({"frame": left.frame, "text": text})
     worst = _most_excluded(run.problem)
-    return jumps if worst is None else [*jumps, {"frame": worst, "text": "most matches found wrong"}]
+    return bookmarks if worst is None else [*bookmarks, {"frame": worst, "text": "most wrong matches"}]
 
 
 def _most_excluded(problem: Problem) -> int | None:
