@@ -14,7 +14,7 @@ from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, truth_sentences
+from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences, is_claimed
 from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
@@ -76,7 +76,7 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     common = {name: e[everywhere] for name, e in errors.items()}
     run = run_with(errors, errors)
 
-    worse = next((s for s in truth_sentences(run) if s.startswith("The reference is worse than")), "")
+    worse = next((s for s in ate_sentences(run) if s.startswith("The reference is worse than")), "")
     said = names_after(worse, "worse than", "here")
     for name in errors.keys() - {"isam2"}:
         larger, smaller = rmse(common["isam2"]), rmse(common[name])
@@ -86,7 +86,7 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     rivals = {name: e for name, e in errors.items() if name != "isam2"}
     both = ~np.any([np.isnan(e) for e in rivals.values()], axis=0)
     first = min(rivals, key=lambda name: rmse(rivals[name][both]))
-    (sentence,) = [s for s in nearest_sentences(run) if "minimum" not in s]
+    (sentence,) = [s for s in divergence_sentences(run) if "minimum" not in s]
     farther = names_after(sentence, "farther than", "$")
     for name in rivals.keys() - {first}:
         d = compare.rmse_difference(rivals[name][both], rivals[first][both])
@@ -99,17 +99,17 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
 def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None:
     d = compare.rmse_difference(np.full(100, 0.003984), np.full(100, 0.003976))
     assert d.settled
-    assert not claimed(d, 0.003984, 0.003976)
+    assert not is_claimed(d, 0.003984, 0.003976)
     errors = {"isam2": np.full(FRAMES, 0.003984), "ekf": np.full(FRAMES, 0.003976)}
-    said = truth_sentences(run_with(errors, errors))
+    said = ate_sentences(run_with(errors, errors))
     assert said[1:] == ["The errors of ekf and isam2 agree to the digits printed: not ranked."]
 
 
 def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> None:
     errors = {"isam2": np.full(FRAMES, 2.0), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 1.0)}
     run = run_with(errors, {"isam2": np.zeros(FRAMES), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 0.01)})
-    assert not [s for s in truth_sentences(run) if "worse" in s or "settle" in s]
-    sentences = nearest_sentences(run)
+    assert not [s for s in ate_sentences(run) if "worse" in s or "settle" in s]
+    sentences = divergence_sentences(run)
     assert sentences[0].startswith("ekf is 3.00 m")
     assert "batch, another minimum of the same graph, is 0.0100 m from isam2 (RMSE)." in sentences
 

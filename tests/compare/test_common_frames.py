@@ -15,9 +15,9 @@ from fgbaseline import data
 from fgbaseline.compare.trajectory_comparison.ranking import ranking_of
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.comparison import order_in_words
+from fgbaseline.reports.phrases.comparison import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.bench_statistics import METRICS
@@ -63,7 +63,7 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
     for name in taking_part:
         assert ranking.rmse(name) == pytest.approx(over_common[name], rel=1e-9)
     assert [over_common[name] for name in ranking.rivals] == pytest.approx(sorted(over_common.values()))
-    words = order_in_words(ranking.rivals[0], ranking.behind)
+    words = significance_sentences(ranking.rivals[0], ranking.behind)
     assert "\N{MINUS SIGN}" not in "".join(words).split("[")[0]
     for name, d in ranking.behind.items():
         assert d.value == pytest.approx(over_common[name] - over_common[ranking.rivals[0]], abs=1e-12)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fgbaseline import compare as figures
 from fgbaseline import data
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..conftest import RECORDINGS
 

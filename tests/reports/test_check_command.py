@@ -8,7 +8,7 @@ import pytest
 from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.command import Outputs, check
+from fgbaseline.reports.accuracy_check.command import Outputs, check
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.tables.check import unit_of
 

@@ -15,8 +15,8 @@ from fgbaseline.compare import time_coverage
 from fgbaseline.data import Estimate, Status, Trajectory, Truth, write_tum
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
-from fgbaseline.reports.checking import assert_accuracy
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.accuracy_check import assert_accuracy
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import environment
 

@@ -12,11 +12,11 @@ from fgbaseline import compare as figures
 from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.checking import assert_accuracy
-from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.checking.evaluation import evaluate
-from fgbaseline.reports.checking.limits_file import read_limits
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.accuracy_check import assert_accuracy
+from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.accuracy_check.evaluation import evaluate
+from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of
 

@@ -17,7 +17,7 @@ from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.data.exchange import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.results.comparison import json_schema
 from fgbaseline.reports.tables import latex, markdown
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.compare.estimate_comparison import compare_all
-from fgbaseline.reports.comparing import compare as compared
+from fgbaseline.reports.comparison import compare as compared
 from fgbaseline.reports.phrases.run import verdict
 
 Recordings = Callable[[str], Path]

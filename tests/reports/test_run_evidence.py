@@ -19,7 +19,7 @@ from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.evidence import frame_ranges
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, solve, split
+from fgbaseline.reports.run.problem import RunSettings, hold_out_tracks, solve
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty
@@ -33,7 +33,7 @@ SCHEMA = Path(__file__).parents[2] / "docs" / "summary.schema.json"
 def held_out_run() -> Run:
     """Dead reckoning and both filters on a short drive with a quarter of its tracks held out."""
     settings = RunSettings(held_out=0.25, seed=3, estimators=("dead-reckoning", "ekf", "joint-ekf"))
-    kept, held = split(drive(seconds=8.0, features_per_frame=25.0), settings)
+    kept, held = hold_out_tracks(drive(seconds=8.0, features_per_frame=25.0), settings)
     return solve(matched(kept), settings, held=held)
 
 
@@ -66,9 +66,9 @@ def test_nothing_is_held_out_unless_asked_for() -> None:
     assert summary["held_out"] is None
     assert all(e["notes"]["held_out"] == "no tracks were held out" for e in summary["estimators"].values())
     sequence = drive()
-    assert split(sequence, RunSettings()) == (sequence, None)
+    assert hold_out_tracks(sequence, RunSettings()) == (sequence, None)
     with pytest.raises(InputError, match="held-out"):
-        split(sequence, RunSettings(held_out=1.5))
+        hold_out_tracks(sequence, RunSettings(held_out=1.5))
 
 
 def test_the_folder_has_series_and_tables_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
