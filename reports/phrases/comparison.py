@@ -199,7 +199,8 @@ def _path_lengths(comparison: Comparison) -> list[str]:
         if path > 0.0 and number(own) != number(path):
             sentences.append(
                 f"The path of {result.name} over the paired poses is {number(own)} m long, "
-                f"{per_cent(abs(own / path - 1.0))} {'longer' if own > path else 'shorter'} than the reference's."
+                f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'} than the "
+                "reference's."
             )
     return sentences
 
@@ -210,9 +211,10 @@ def _time_offsets(comparison: Comparison) -> list[str]:
         found = result.offset
         if found is None:
             continue
+        where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
         text = (
-            f"Estimated time offset of {result.name}, added to its stamps: {1e3 * found.seconds:+.3g} ms "
-            f"({1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
+            f"The stamps of {result.name} fit best {'as they are' if found.seconds == 0 else where} "
+            f"(shifts of {1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
         )
         sentences.append(text + ("." if found.determined else "; the path does not determine it."))
     return sentences

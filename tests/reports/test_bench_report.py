@@ -86,7 +86,7 @@ def test_a_process_that_dies_and_an_estimator_that_fails_are_rows_and_stop_nothi
     }
     assert "its process died" in runs.loc[("drive duration=1.2", "dying"), "reason"]
     assert "nothing <to> go_by" in runs.loc[("drive duration=1.4", "dying"), "reason"]
-    assert "1 of 3 runs failed altogether" in result.stdout
+    assert "1 of 3 runs failed; the reasons are below" in result.stdout
     assert "dying gave no answer in 1 of 3 runs" in result.stdout
     page = (tmp_path / "out" / "report.html").read_text()
     assert "nothing &lt;to&gt; go_by" in page
@@ -101,9 +101,9 @@ def test_a_recording_that_changes_under_way_is_no_run(tmp_path: Path) -> None:
     suite = 'name = "x"\nestimators = ["dead-reckoning"]\n[[sequence]]\nfiles = "drive.npz"\n'
     (job,) = plan(read_suite(written(tmp_path, suite)), None)
     write_npz(simulate(Simulation(duration=1.0, features_per_frame=5.0, seed=1)), tmp_path / "drive.npz")
-    assert "the file is another than when the bench was planned" in work(job.job, silent).failure
+    assert "the file has changed since the bench was planned" in work(job.job, silent).failure
     (tmp_path / "drive.npz").unlink()
-    assert "there is no such file where this worker runs" in work(job.job, silent).failure
+    assert "there is no such file on the worker's machine" in work(job.job, silent).failure
 
 
 @pytest.fixture(scope="module")

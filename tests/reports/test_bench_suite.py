@@ -41,15 +41,15 @@ def drive(tmp_path: Path) -> Path:
         ('name = "x"\nestimator = ["ekf"]\n' + DRIVE, "there is no key 'estimator'", "did you mean 'estimators'?"),
         ('name = "x"\nestimators = [\n "ekf",\n "kalman",\n]\n' + DRIVE, "estimators[1]", "no 'kalman'; installed are"),
         ('name = "x"\nestimators = ["ekf", "ekf"]\n' + DRIVE, "estimators", "'ekf' is named twice"),
-        (SEQUENCE, "sequence[0]", "give either files or simulate"),
-        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give either files or simulate"),
+        (SEQUENCE, "sequence[0]", "give files or simulate"),
+        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give files or simulate"),
         (SEQUENCE + 'files = ["drive.npz", "drive_2.npz"]\n', "sequence[0].files[1]", "'drive_2.npz' is no file in"),
         (SEQUENCE + 'files = "kitti/*.mat"\n', "sequence[0].files", "'kitti/*.mat' matches no file in"),
         (SEQUENCE + 'files = "suite.toml"\n', "sequence[0].files", "a text file and no recording"),
-        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "give truth and truth_frame"),
+        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "truth and truth_frame"),
         ('name = "x"\n' + FILE + 'truth = "poses.txt"\ntruth_frame = "imu"\n', "sequence[0].files[0]", "poses.txt"),
         ('name = "x"\n' + FILE + "seeds = [1, 2]\n", "sequence[0]", "seeds are for simulated drives"),
-        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", "sequence[0]", "seeds names one twice"),
+        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", "sequence[0]", "a seed is given twice"),
         ('name = "x"\n' + DRIVE + 'truth = "t.txt"\n', "sequence[0]", "truth is for recordings"),
         (SEQUENCE + 'simulate = { path = "moon" }\n', "sequence[0].simulate.path", 'path = "moon"'),
         (SEQUENCE + "simulate.duration = [1, 0]\n", "sequence[0].simulate.duration", "expected a number above 0"),
@@ -61,14 +61,14 @@ def drive(tmp_path: Path) -> Path:
         (
             'name = "x"\n' + DRIVE + '[sweep]\npreset = "documented"\nnoise = "assumed"\n',
             "sweep.noise",
-            "the calibrated preset alone",
+            "the calibrated preset only",
         ),
-        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', "sweep.landmarks", "the documented preset alone"),
-        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", "sweep.features[1]", "200 is named twice"),
+        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', "sweep.landmarks", "the documented preset only"),
+        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", "sweep.features[1]", "200 is given twice"),
         ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = 0\n", "sweep.features = 0", "change it"),
         ('name = "x"\n' + DRIVE + "[sweep]\nheld_out = 1.0\n", "sweep.held_out = 1.0", "change it"),
         ('name = "x"\n' + DRIVE + DRIVE, "sequence[1]", "'town' is the name of sequence[0] too"),
-        ('name = "a/b"\n' + DRIVE, "name", "without slashes"),
+        ('name = "a/b"\n' + DRIVE, "name", "no slashes"),
     ],
 )
 def test_what_cannot_be_is_told_with_its_key_path(drive: Path, text: str, place: str, said: str) -> None:
@@ -84,7 +84,7 @@ def test_repairs_that_a_preset_would_not_use_are_refused(drive: Path) -> None:
     text = 'name = "x"\n' + FILE + 'repairs = "repairs.toml"\n'
     assert len(planned(drive.parent, text)) == 1
     for sweep, said in (
-        ('preset = ["calibrated", "documented"]', "the documented preset takes a recording as it is"),
+        ('preset = ["calibrated", "documented"]', "the documented preset uses no repairs"),
         ('noise = "assumed"', 'noise = "assumed" takes'),
         ("noise = { pixel = 1.0 }", "noise is set by [sweep] as well"),
     ):

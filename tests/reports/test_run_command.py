@@ -138,7 +138,7 @@ def test_elsewhere_than_on_a_terminal_progress_is_plain_lines(finished: Finished
     lines = finished.result.stderr.splitlines()
     assert lines[0].startswith("drive: 80 frames, ")
     assert [line for line in lines if line.endswith(": started")] == [f"{name}: started" for name in ESTIMATORS]
-    assert len([line for line in lines if ": ended after " in line]) == len(ESTIMATORS)
+    assert len([line for line in lines if ": finished after " in line]) == len(ESTIMATORS)
     assert lines[-1] == "writing the report"
     assert "\x1b" not in finished.result.stderr + finished.result.stdout
     assert "\r" not in finished.result.stderr

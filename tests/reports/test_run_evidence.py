@@ -108,14 +108,16 @@ def test_the_figures_show_it_and_the_page_has_its_table() -> None:
 def test_the_sentences_tell_who_is_best_and_who_cannot_be_told_apart() -> None:
     run = held_out_run()
     assert run.held_out is not None
-    (sentence,) = (s for s in verdict(run) if "held-out" in s)
+    (sentence,) = (s for s in verdict(run) if s.startswith("Held-out error"))
     ranking = run.held_out.ranking
-    assert f"{ranking.index[0]} errs by" in sentence
-    assert "does not separate dead-reckoning" not in sentence
+    assert f" px for {ranking.index[0]}" in sentence.partition(",")[0]
+    apart = " ".join(s for s in verdict(run) if s.startswith("No significant difference in held-out error"))
+    assert "dead-reckoning" not in apart
     twins = ranking.copy()
     twins["behind_low"] = 0.0
     alike = replace(run, held_out=replace(run.held_out, ranking=twins))
-    assert any("the bootstrap does not separate" in s and f"from {ranking.index[0]}" in s for s in verdict(alike))
+    same = f"No significant difference in held-out error between {ranking.index[0]} and "
+    assert any(s.startswith(same) for s in verdict(alike))
 
 
 def test_covariances_that_are_none_are_told_with_their_frames() -> None:
@@ -136,7 +138,7 @@ def test_a_run_in_which_nobody_answers_says_that_nothing_can_be_judged() -> None
     kept, held = diagnosis.hold_out(drive(), 0.5)
     problem = matched(kept)
     run = compare_all(problem, {"ekf": failed(problem, "ekf", "no")}, {}, held)
-    assert any("none is left to judge" in sentence for sentence in verdict(run))
+    assert any("There is no held-out error: none of " in sentence for sentence in verdict(run))
     summary = as_dict(run)
     assert summary["held_out"]["judged"] == 0
     assert summary["estimators"]["ekf"]["notes"] == {"*": "the estimator failed: no"}
