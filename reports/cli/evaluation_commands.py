@@ -171,9 +171,10 @@ def check(
     update_baseline: bool,
     accept_worse: bool,
 ) -> int:
-    """Check the metrics that `run`, `compare` or `bench` wrote into DIR against limits and a baseline.
+    """Check the metrics in DIR against limits and a baseline.
 
-    On GitHub the table also goes to the page of the job (GITHUB_STEP_SUMMARY).
+    DIR is the folder of `run`, `compare` or `bench`. On GitHub the table also goes to the page of the job
+    (GITHUB_STEP_SUMMARY).
 
     Exits 0 when all limits hold, 1 when one falls short, 2 when one is undecided, and on bad input. A limit is
     undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
