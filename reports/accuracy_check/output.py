@@ -114,7 +114,7 @@ def junit(checked: Checked) -> bytes:
 
 
 def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
-    asked = f"against its baseline ({line.tolerance} allowed)" if line.tolerance else bound(line.bounds)
+    asked = f"beside its baseline ({line.tolerance} allowed)" if line.tolerance else bound(line.bounds)
     name = f"{line.metric} {asked}"  # without the baseline's value: the name identifies the test from run to run
     case = ElementTree.SubElement(suite, "testcase", classname=_text(line.estimator), name=_text(name))
     if line.outcome is Outcome.HOLDS:
