@@ -129,12 +129,12 @@ def _noise(diagnosis: Diagnosis) -> str:
 
 
 def _print_findings(findings: tuple[Finding, ...]) -> None:
-    from ..formatting import quantity
+    from ..formatting import NO_BREAK, quantity
     from ..tables import Cell, Column, Row, Table, print_table
 
     def row(finding: Finding) -> Row:
         certainty = "" if finding.certainty == "counted" else f" ({finding.certainty})"
-        figures = (quantity(value, finding.unit) for value in (finding.before, finding.after))
+        figures = (quantity(x, finding.unit).replace(NO_BREAK, " ") for x in (finding.before, finding.after))
         return Row(finding.code, tuple(map(Cell, (f"{finding.sentence}{certainty}", *figures))))
 
     columns = (Column("description", words=True), Column("before"), Column("after"))

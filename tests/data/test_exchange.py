@@ -161,7 +161,7 @@ def test_the_command_writes_the_problem_that_a_run_solves(tmp_path: Path) -> Non
         "export", "drive.npz", "--out", "out/p", "--preset", "documented", "--features", "30", cwd=tmp_path
     )
     assert told.returncode == 0, told.stderr
-    assert "observations of 30 landmarks; left out: " in told.stdout
+    assert "observations of 30 landmarks; " in told.stdout
     exported = read_problem(tmp_path / "out/p")
     expected = data.documented(replace(data.read(tmp_path / "drive.npz"), truth=None, source="drive.npz"), 30)
     assert_equal(expected, exported, "problem")
