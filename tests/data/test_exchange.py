@@ -172,7 +172,7 @@ def test_the_command_writes_the_problem_that_a_run_solves(tmp_path: Path) -> Non
     assert forced.returncode == 0, forced.stderr
     assert read_problem(tmp_path / "out/p").preset == "calibrated"
     held = fgbaseline("export", "drive.npz", "--out", "out/h", "--as-recorded", "--held-out", "0.25", cwd=tmp_path)
-    assert "Held out, and not in the problem: " in held.stdout
+    assert "Held out, not in the problem: " in held.stdout
     assert len(read_problem(tmp_path / "out/h").features) < len(read_problem(tmp_path / "out/p").features)
     assert {name for name in everything_in(tmp_path / "out") if "partial" in name} == set()
 

@@ -201,7 +201,7 @@ def test_every_job_is_told_of_and_the_bars_move(results: Results, tmp_path: Path
         (outcome,) = outcomes([one.job], processes(1, cache.folder), seen.extend)
     assert outcome.failure == ""
     assert any(
-        event.key == one.job.key and event.doing in ("reading", "posing the problem", "writing", *results.estimators)
+        event.key == one.job.key and event.doing in ("reading", "building the problem", "writing", *results.estimators)
         for event in seen
     )
     console = Console(file=StringIO(), force_terminal=True, width=120)
