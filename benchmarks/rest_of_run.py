@@ -27,7 +27,7 @@ import click
 
 from benchmarks.measured import Row, table
 from fgbaseline.reports.cli.main import NEW_OBJECTS
-from fgbaseline.reports.cli.run import DEFAULT_ESTIMATORS
+from fgbaseline.reports.cli.recording_commands import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""
@@ -50,17 +50,17 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
     with watch("imports"):
         from fgbaseline.data.parallel import background_map, cores
         from fgbaseline.reports import progress  # noqa: F401
-        from fgbaseline.reports.run.problem import RunSettings, load_estimators, pose_problem, read_sequence
+        from fgbaseline.reports.run.problem import RunSettings, build_problem, import_estimators, read_sequence
     settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = read_sequence(settings)
-    with watch(POSING), background_map(lambda _: pose_problem(sequence, settings, cores()), 1, cores()) as posed:
+    with watch(POSING), background_map(lambda _: build_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.compare.estimate_comparison import compare_all
         from fgbaseline.data.solving import solve_all
         from fgbaseline.reports import figures
         from fgbaseline.reports.run.folder import write_numbers, write_page
 
-        load_estimators(estimators)
+        import_estimators(estimators)
         (problem,) = posed()
     answers = solve_all(problem, estimators, lambda name: watch(f"{SOLVING}{name}"))
     with watch("comparison"):

@@ -26,8 +26,7 @@ from .style import SCREEN, in_style, note, safe_text, swatch, title_and_legend
 from .window import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.reproduction.study import Study
-    from fgbaseline.reports.reproduction.trial import Outcome
+    from fgbaseline.reports.reproduction.study import Outcome, Study
 
 PATH, ENDS, ARROW, LANDMARK = "#d62728", "#1f4e9c", "#1f4e9c", "#2ca02c"
 DEAD_RECKONING, BROKEN = "#444444", "#b3261e"
@@ -70,8 +69,8 @@ def draw(studies: Several["Study"]) -> dict[str, Figure]:
 
 def numbered(study: "Study") -> dict[str, Figure]:
     """Figures of a recording by name, `figure_01` and so on where the report has them under a number."""
-    reported, name, label = study.subject.reported, safe_text(study.subject.name), safe_text(study.subject.label)
-    of_path, of_arrows, of_slam = (reported.path, reported.arrows, reported.slam) if reported else (None,) * 3
+    paper, name, label = study.subject.paper, safe_text(study.subject.name), safe_text(study.subject.label)
+    of_path, of_arrows, of_slam = (paper.path, paper.arrows, paper.slam) if paper else (None,) * 3
     figures: dict[str, Figure] = {}
 
     def add(kind: str, number: int | None, title: str, path: FloatArray, **shown: Any) -> None:
@@ -81,7 +80,7 @@ def numbered(study: "Study") -> dict[str, Figure]:
     add("path", of_path, f"path of the IMU after prediction, {name}", study.predicted)
     add("arrows", of_arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
     for n, mapped in study.mapped.items():
-        number, estimate = reported.mapped.get(n) if reported else None, mapped.estimate
+        number, estimate = paper.mapped.get(n) if paper else None, mapped.estimate
         title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position
         add(f"mapped_{n}", number, title, estimate.world_T_imu, landmarks=landmarks)
     title, landmarks = f"visual-inertial SLAM, {label}, N = {study.recorded.features}", study.slam.landmarks.position

@@ -161,7 +161,7 @@ def test_the_command_writes_the_problem_that_a_run_solves(tmp_path: Path) -> Non
         "export", "drive.npz", "--out", "out/p", "--preset", "documented", "--features", "30", cwd=tmp_path
     )
     assert finished.returncode == 0, finished.stderr
-    assert "observations of 30 landmarks; left out: " in finished.stdout
+    assert "observations of 30 landmarks; " in finished.stdout
     exported = read_problem(tmp_path / "out/p")
     expected = data.documented(replace(data.read(tmp_path / "drive.npz"), truth=None, source="drive.npz"), 30)
     assert_equal(expected, exported, "problem")
@@ -172,7 +172,7 @@ def test_the_command_writes_the_problem_that_a_run_solves(tmp_path: Path) -> Non
     assert forced.returncode == 0, forced.stderr
     assert read_problem(tmp_path / "out/p").preset == "calibrated"
     held = fgbaseline("export", "drive.npz", "--out", "out/h", "--as-recorded", "--held-out", "0.25", cwd=tmp_path)
-    assert "Held out, and not in the problem: " in held.stdout
+    assert "Held out, not in the problem: " in held.stdout
     assert len(read_problem(tmp_path / "out/h").features) < len(read_problem(tmp_path / "out/p").features)
     assert {name for name in everything_in(tmp_path / "out") if "partial" in name} == set()
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fgbaseline.data.formats import write_kitti, write_trajectory_npz
 from fgbaseline.geometry import InputError, se3
-from fgbaseline.reports.comparing import ComparisonReport, compare
+from fgbaseline.reports.comparison import ComparisonReport, compare
 
 from ..builders.trajectory_writers import VARIANTS, Path3D, frames, kitti, rows, tum
 

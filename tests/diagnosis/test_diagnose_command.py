@@ -42,8 +42,8 @@ def strict(text: str) -> dict[str, Any]:
 def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], cwd=tmp_path)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert "Nothing wrong was found" in result.stdout
-    assert "Noise (one sigma)" in result.stdout
+    assert "No fault detected" in result.stdout
+    assert "Noise (1-sigma)" in result.stdout
     assert everything_in(tmp_path) == set()
 
 

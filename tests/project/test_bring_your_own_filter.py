@@ -9,7 +9,7 @@ import pytest
 
 from fgbaseline import data, ekf
 from fgbaseline.data import read_problem
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import fgbaseline
 from ..builders.synthetic import drive

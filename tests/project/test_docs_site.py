@@ -23,7 +23,7 @@ API = {
     "ekf": ("ekf",),
     "smoother": ("smoother",),
     "compare": ("compare",),
-    "reports": ("reports.comparing", "reports.checking", "reports.figures"),
+    "reports": ("reports.comparison", "reports.accuracy_check", "reports.figures"),
 }
 """page -> the packages on it"""
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")

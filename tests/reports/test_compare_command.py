@@ -11,7 +11,7 @@ import pytest
 from fgbaseline import data
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli import main
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import everything_in, fgbaseline
 from ..builders.synthetic import drive

@@ -17,7 +17,7 @@ from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.results.comparison import json_schema
 from fgbaseline.reports.tables import latex, markdown
 
@@ -68,7 +68,7 @@ def test_three_lines_give_tables_and_figures(files: Path) -> None:
     assert set(result.figures()) == {"paths", "errors", "growth", "relative", "segments"}
     assert set(result.metrics.columns) == {"estimate", "metric", "value", "low", "high"}
     assert result.verdict[0].startswith("The reference, truth, is taken as given")
-    assert any(sentence.startswith("Nearest: near is ") for sentence in result.verdict)
+    assert any(sentence.startswith("Position RMSE against truth: near ") for sentence in result.verdict)
 
 
 def test_the_figures_of_the_table_are_evos(files: Path) -> None:
@@ -178,7 +178,7 @@ def test_held_out_tracks_rank_the_paths(files: Path) -> None:
     assert figures.behind.low is not None
     assert figures.behind.low > 0.0
     assert "held-out error: median, px" in result.table.columns
-    assert any(sentence.startswith("On tracks that were held out") for sentence in result.verdict)
+    assert any(sentence.startswith("Held-out error (median over the held-out tracks)") for sentence in result.verdict)
     assert compare(files / "truth.tum", files / "near.csv", sequence=files / "drive.npz").held_out is None
 
 
@@ -232,8 +232,8 @@ def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
     assert result.behind["two"].low > 0.0
     assert result.behind["three"].value == 0.0
     said = " ".join(result.verdict)
-    assert "Farther than one, by paired bootstrap of their RMSE: two (" in said
-    assert "does not settle whether one is nearer than three" in said
+    assert "Larger position RMSE than one, by paired bootstrap: two (" in said
+    assert "No significant difference from one, by paired bootstrap: three (" in said
     summary = result.summary.estimates
     assert summary["one"].behind is None
     assert summary["two"].behind is not None
@@ -272,7 +272,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     assert aligned.nees is not None
     assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
     between = compare(files / "truth.tum", files / "mine.npz", association="interpolated")
-    assert any(s.startswith("The covariances of mine are not judged: poses were inter") for s in between.verdict)
+    assert any(s.startswith("The covariances of mine are not evaluated: poses were inter") for s in between.verdict)
 
 
 def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:

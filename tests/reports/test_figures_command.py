@@ -38,7 +38,7 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[in
 def test_every_figure_is_there_in_every_format_with_a_caption(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = folder / "all"
     code, said = call(capsys, "figures", folder, "--format", "pdf,svg,png", "--out", out)
-    assert (code, said) == (0, f"8 figures as pdf, svg, png are in {out}\n")
+    assert (code, said) == (0, f"8 figures as pdf, svg, png in {out}\n")
     captions = json.loads((out / "captions.json").read_text())
     names = "paths landmarks divergence error_to_truth reprojection consistency map_difference time_per_frame"
     assert list(captions) == names.split()

@@ -1,4 +1,4 @@
-"""`assert_accuracy`: limits on one trajectory, for people whose CI is pytest."""
+"""`assert_accuracy`: limits on one trajectory, for tests with pytest."""
 
 import math
 import tempfile
@@ -32,12 +32,12 @@ from ..phrases.check import bound, number
 AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
 """a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
 AT_LEAST = ("coverage", "pairs")
-"""what is asked for at least; the rest at most"""
+"""metrics with lower limits; all others have upper limits"""
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
-    """One figure of a trajectory, and what was asked of it."""
+class CheckedMetric:
+    """A metric of a trajectory and its limit."""
 
     metric: str
     unit: str
@@ -46,7 +46,7 @@ class Figure:
 
     @property
     def outcome(self) -> Outcome:
-        """Whether it holds."""
+        """Whether the limit holds."""
         return self.bounds.judge(self.value)
 
 
@@ -67,20 +67,19 @@ def assert_accuracy(
     quaternion: Order | None = None,
     figure: FilePath | None = None,
 ) -> dict[str, float]:
-    """Raises AssertionError, with the table and where the figure is, unless an estimate is as accurate as asked.
+    """Raises AssertionError, with a table and a figure, where an estimate exceeds a limit; returns the metrics.
 
-    At most: `ate` and `ate_max`, RMSE and largest distance (m) after alignment; `divergence` and `divergence_max`, the
-    same without; `rotation_deg`, RMSE of the angle (deg) after alignment. At least: `coverage`, the share of the
-    reference's time in which there are paired poses, and `smallest_sample` pairs of poses. Poses are paired by time
-    within `tolerance` (s; see `compare.associate`), those of estimates and truths of a problem by frame. The figure is
-    drawn where a limit falls short, into the PNG `figure`, by default into a folder of its own among the temporary
-    files.
+    Upper limits: `ate` and `ate_max`, RMSE and maximum of the position error (m) after alignment; `divergence` and
+    `divergence_max`, without alignment; `rotation_deg`, RMSE of the rotation error (deg) after alignment. Lower limits:
+    `coverage`, the share of the reference's time with paired poses, and `smallest_sample` pairs of poses. Poses are
+    associated by time within `tolerance` (s; see `compare.associate`), those of an Estimate or a Truth by frame. The
+    figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit falls short.
 
-    What files leave open is settled as `fgbaseline compare` does, by each other, or by `time_unit` and `quaternion`.
-    Positions without orientations are compared in positions only.
+    Units and quaternion orders that a file does not state are detected as in `fgbaseline compare`, or given by
+    `time_unit` and `quaternion`. Trajectories without orientations are compared by position only.
 
-    Gives the figures by name, such as "ate.rmse". Raises InputError where nothing is asked, a trajectory is none, its
-    units stay in doubt, or a limit needs orientations that are missing or whose order stays in doubt.
+    The metrics are by name, such as "ate.rmse". Raises InputError for a call without limits, an invalid trajectory,
+    ambiguous units, or a limit on orientations that are missing or ambiguous.
     """
     __tracebackhide__ = True
     asked = {
@@ -109,26 +108,26 @@ def assert_accuracy(
     values = _values(tables, time_coverage(matched.reference.t, there.t)) | {"pairs": float(len(matched))}
     if not is_oriented:
         del values["rotation.rmse"]
-    figures = [_figure(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
-    figures = [each for each in figures if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
-    if all(each.outcome is Outcome.HOLDS for each in figures):
+    checked = [_checked(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
+    checked = [each for each in checked if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
+    if all(each.outcome is Outcome.HOLDS for each in checked):
         return values
     recognized = [
         f"{path.name}: {remark}." for path, each in zip((there, here), resolved, strict=True) for remark in each.remarks
     ]
-    raise AssertionError(_message(figures, aligned, recognized, _drawn(aligned, tables, asked, figure)))
+    raise AssertionError(_message(checked, aligned, recognized, _drawn(aligned, tables, asked, figure)))
 
 
 def _require_bounds(asked: dict[str, float | None]) -> None:
     if all(limit is None for metric, limit in asked.items() if metric not in AT_LEAST):
-        raise InputError("accuracy: nothing is asked; give ate=0.5 or another limit")
+        raise InputError("accuracy: there is no limit; give ate=0.5 or another one")
     for metric, limit in asked.items():
         if limit is not None and not (math.isfinite(limit) and limit >= 0):
             raise InputError(f"accuracy: the limit on {metric} is {limit!r}; give a number of at least 0")
 
 
 def _require_one_clock(estimate: AnyTrajectory, reference: AnyTrajectory) -> None:
-    """Raises InputError where one of both counts frames and the other time, or frames are of different problems."""
+    """Raises InputError where only one of both has time stamps, or their frames are of different problems."""
     by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
     if any(by_frame) and not all(by_frame):
         raise InputError(
@@ -139,16 +138,16 @@ def _require_one_clock(estimate: AnyTrajectory, reference: AnyTrajectory) -> Non
         n, n_reference = len(estimate.world_T_imu), len(reference.world_T_imu)
         if n != n_reference:
             raise InputError(
-                f"accuracy: the estimate has {n} frames and the reference {n_reference}; give one problem's"
+                f"accuracy: the estimate has {n} frames and the reference {n_reference}; give two of one problem"
             )
 
 
 def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> None:
-    """Raises InputError where orientations are missing, or an order of quaternions is in doubt."""
+    """Raises InputError where orientations are missing or their quaternion order is ambiguous."""
     for each, path in zip(resolved, paths, strict=True):
         file = path.source or path.name
         if not path.oriented:
-            raise InputError(f"{file}: it has no orientations; leave out rotation_deg and first-pose")
+            raise InputError(f"{file}: it has no orientations; leave out rotation_deg and align='first-pose'")
         if each.order_in_doubt:
             raise InputError(f"{file}: {each.remarks[-1]}".replace("--quaternion", "quaternion"))
 
@@ -174,9 +173,9 @@ def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float
     return dict(sorted(values.items()))
 
 
-def _figure(metric: str, value: float, limit: float) -> Figure:
+def _checked(metric: str, value: float, limit: float) -> CheckedMetric:
     bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
-    return Figure(metric, {"coverage": "", "pairs": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
+    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
 
 
 def _drawn(
@@ -194,9 +193,9 @@ def _drawn(
     return path
 
 
-def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
+def _message(checked: Sequence[CheckedMetric], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
     rows = [("limit", "metric", "value", "bound", "margin")]
-    for each in figures:
+    for each in checked:
         unit = f" ({each.unit})" if each.unit else ""
         margin = number(each.bounds.margin(each.value), sign=True)
         rows.append((each.outcome.value, each.metric + unit, number(each.value), bound(each.bounds), margin))
@@ -204,7 +203,7 @@ def _message(figures: Sequence[Figure], aligned: MatchedTrajectories, recognized
     table = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join(
         [
-            f"{aligned.estimate.name} is not as accurate as asked, against {aligned.reference.name}:",
+            f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:",
             *table,
             aligned.caption,
             *recognized,

@@ -1,4 +1,4 @@
-"""The limits file: what has to hold, in TOML."""
+"""The limits file, in TOML."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -21,27 +21,27 @@ class _Part(BaseModel):
 
 
 class Needed(StrEnum):
-    """How far the reference has to be trusted before anything is said to hold."""
+    """Trust in the reference that a limit requires to hold."""
 
     TRUSTED = "trusted"
     DOUBTFUL = "doubtful"
-    """a doubtful one will do, and is reported"""
+    """a doubtful one suffices, and is reported"""
     NONE = "none"
-    """limits on what does not rest on the reference are judged whatever it is; the others need a doubtful one"""
+    """any, for metrics that do not depend on the reference; the others require a doubtful one"""
 
 
 class Tolerance(_Part):
-    """By how much a figure may be worse than its baseline: the larger of the two."""
+    """Allowed change of a metric for the worse: the larger of the two."""
 
     better: Better
     relative: NotNegative = 0.0
     """share of the baseline"""
     absolute: NotNegative = 0.0
-    """in the figure's unit"""
+    """in the metric's unit"""
 
     @property
     def text(self) -> str:
-        """What is allowed, such as '5 % or 0.01'."""
+        """Such as `5 % or 0.01`."""
         parts = [f"{100 * self.relative:.4g} %"] if self.relative else []
         parts += [f"{self.absolute:.4g}"] if self.absolute else []
         return " or ".join(parts) or "nothing"
@@ -57,28 +57,28 @@ Pattern = Annotated[str, AfterValidator(_no_blank)]
 
 
 class Limit(_Part):
-    """One promise: about a metric of every estimator, in every run, that the patterns match."""
+    """A limit on a metric of every estimator and run that the patterns match."""
 
     metric: Pattern
     """its path below `estimators.NAME` in summary.json, such as ate.rmse"""
     estimators: Pattern | Annotated[tuple[Pattern, ...], Field(min_length=1)] = "*"
     runs: Pattern = "*"
-    """of a folder that holds several"""
+    """pattern, for a folder with several runs"""
     at_most: Finite | None = None
     at_least: Finite | None = None
     baseline: Tolerance | None = None
     smallest_sample: Count | None = None
-    """that of the file where it is left out"""
+    """None for that of the file"""
     smallest_coverage: Share | None = None
 
     @property
     def patterns(self) -> tuple[str, ...]:
-        """The patterns of estimators, however they were written."""
+        """The patterns of estimators, one or several."""
         return (self.estimators,) if isinstance(self.estimators, str) else self.estimators
 
     @property
     def bounds(self) -> Bounds | None:
-        """Those that are written down; None where only the baseline counts."""
+        """The limit's own bounds; None where it has only a baseline."""
         if self.at_most is None and self.at_least is None:
             return None
         return Bounds(**{side: value for side in ("at_most", "at_least") if (value := getattr(self, side)) is not None})
@@ -86,7 +86,7 @@ class Limit(_Part):
     @model_validator(mode="after")
     def _says_something(self) -> "Limit":
         if self.bounds is None and self.baseline is None:
-            raise ValueError(f"nothing is asked of {self.metric}; add at_most, at_least or baseline")
+            raise ValueError(f"{self.metric} has no bound; add at_most, at_least or baseline")
         if self.bounds is not None and self.bounds.at_least > self.bounds.at_most:
             raise ValueError(f"at_least = {self.at_least:g} is above at_most = {self.at_most:g}; nothing lies between")
         return self
@@ -97,12 +97,12 @@ class Limits(_Part):
 
     reference: Needed = Needed.DOUBTFUL
     smallest_sample: Count = MIN_SAMPLE_SIZE
-    """poses, frames, observations: whatever a figure is taken over"""
+    """number of poses, frames or observations behind a metric"""
     smallest_coverage: Share = MIN_COVERAGE
-    """of the time of the estimate; of a run, of the recording"""
+    """share of the time of the estimate; in a run, of the recording"""
     limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
 
 
 def read_limits(path: Path) -> TomlFile[Limits]:
-    """The limits in a file. Raises InputError naming file, key path and what is allowed."""
+    """Reads a limits file. Raises InputError with the file, the key path and the allowed values."""
     return read_toml(path, Limits)

@@ -1,4 +1,4 @@
-"""Progress of workers, through small files here and through events on a Dask cluster, and its display on stderr."""
+"""Progress of workers, sent through files on this machine or Dask events, and its display on standard error."""
 
 import contextlib
 import json
@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -19,18 +18,18 @@ from .worker import Outcome
 
 TOPIC = "fgbaseline-bench"
 WHOLE_BENCH = 1e9
-"""s over which the speed of the whole is averaged"""
+"""s over which the total speed is averaged"""
 INTERVAL = 0.3
-"""s between two events of the same work"""
+"""s between two events of the same step"""
 
 
 @dataclass(frozen=True, slots=True)
 class ProgressEvent:
-    """The step that a worker is at."""
+    """Current step of a worker."""
 
     worker: str
     key: str
-    """of its job; empty while it has none"""
+    """of its job; empty without a job"""
     doing: str
     """an estimator's name, or `reading` and `writing`"""
     done: int
@@ -40,13 +39,13 @@ class ProgressEvent:
 
 @dataclass(frozen=True, slots=True)
 class FileChannel:
-    """A file for each process in a folder."""
+    """Channel with one file per process in a folder."""
 
     folder: Path
 
     def __call__(self, key: str, doing: str, done: int, total: int) -> None:
         """Reports progress, at most every `INTERVAL`."""
-        if not _due(key, doing):
+        if not _is_due(key, doing):
             return
         place = self.folder / str(os.getpid())
         partial = place.with_suffix(".partial")
@@ -55,7 +54,7 @@ class FileChannel:
             partial.replace(place)
 
     def events(self) -> Iterator[ProgressEvent]:
-        """The last of each worker."""
+        """Yields the last event of each worker."""
         for place in sorted(self.folder.iterdir()):
             if place.suffix == "":
                 with contextlib.suppress(OSError, ValueError):
@@ -64,11 +63,11 @@ class FileChannel:
 
 @dataclass(frozen=True, slots=True)
 class EventChannel:
-    """Events of a Dask worker, which the scheduler hands on."""
+    """Channel of Dask events, which the scheduler forwards."""
 
     def __call__(self, key: str, doing: str, done: int, total: int) -> None:
         """Reports progress, at most every `INTERVAL`."""
-        if not _due(key, doing):
+        if not _is_due(key, doing):
             return
         from distributed import get_worker
 
@@ -79,8 +78,8 @@ class EventChannel:
 _last = ("", "", 0.0)
 
 
-def _due(key: str, doing: str) -> bool:
-    """Whether the work is another, or the last event of it old enough; then it counts as reported."""
+def _is_due(key: str, doing: str) -> bool:
+    """Whether the step is new or its last event is older than `INTERVAL`; then the event counts as sent."""
     global _last
     now = time.monotonic()
     if _last[:2] == (key, doing) and now - _last[2] < INTERVAL:
@@ -89,31 +88,19 @@ def _due(key: str, doing: str) -> bool:
     return True
 
 
-class Board(Protocol):
-    """Where progress is shown."""
-
-    def look(self, events: Iterable[ProgressEvent], /) -> None:
-        """Takes the events of the workers."""
-        ...
-
-    def done(self, outcome: Outcome, /) -> None:
-        """A job has ended."""
-        ...
-
-
-class LineBoard:
-    """For a file or a pipe: a line for every job that has ended."""
+class LineDisplay:
+    """Progress in a file or a pipe: a line for every finished job."""
 
     def __init__(self, jobs: Mapping[str, Planned]) -> None:
         self._jobs, self._start = jobs, time.monotonic()
         self._work = sum(planned.work for planned in jobs.values())
         self._worked, self._ended = 0.0, 0
 
-    def look(self, events: Iterable[ProgressEvent]) -> None:
-        """Shows nothing."""
+    def update(self, events: Iterable[ProgressEvent]) -> None:
+        """Prints nothing."""
 
-    def done(self, outcome: Outcome) -> None:
-        """A line, with the time left by the work that is done."""
+    def finish(self, outcome: Outcome) -> None:
+        """Prints a line with the remaining time."""
         planned = self._jobs[outcome.key]
         self._worked, self._ended = self._worked + planned.work, self._ended + 1
         left = (time.monotonic() - self._start) * (self._work / self._worked - 1.0) if self._worked else 0.0
@@ -123,13 +110,13 @@ class LineBoard:
         )
 
 
-class BarBoard:
-    """For a terminal: a bar for the whole, and one for each worker."""
+class BarDisplay:
+    """Progress on a terminal: a bar for all jobs, and one for each worker."""
 
     def __init__(
-        self, jobs: Mapping[str, Planned], whole: Progress, each: Progress, say: Callable[[str], None]
+        self, jobs: Mapping[str, Planned], whole: Progress, each: Progress, print_line: Callable[[str], None]
     ) -> None:
-        self._jobs, self._whole, self._each, self._say = jobs, whole, each, say
+        self._jobs, self._whole, self._each, self._print_line = jobs, whole, each, print_line
         self._ended = 0
         self._task = whole.add_task(self._count(), total=sum(planned.work for planned in jobs.values()))
         self._rows: dict[str, tuple[TaskID, str]] = {}
@@ -137,7 +124,7 @@ class BarBoard:
     def _count(self) -> str:
         return f"{self._ended} of {len(self._jobs)} runs"
 
-    def look(self, events: Iterable[ProgressEvent]) -> None:
+    def update(self, events: Iterable[ProgressEvent]) -> None:
         """Moves the bars of the workers."""
         for event in events:
             name = self._jobs[event.key].name if event.key in self._jobs else ""
@@ -150,32 +137,32 @@ class BarBoard:
             self._rows[event.worker] = (row, text)
             self._each.update(row, completed=event.done, total=event.total or None)
 
-    def done(self, outcome: Outcome) -> None:
-        """A line above the bars for one that failed; moves the bar of the whole."""
+    def finish(self, outcome: Outcome) -> None:
+        """Moves the bar of all jobs; prints a line above the bars for a failure."""
         planned = self._jobs[outcome.key]
         self._ended += 1
         self._whole.update(self._task, advance=planned.work, description=self._count())
         if outcome.failure:
-            self._say(summary_line(planned, outcome))
+            self._print_line(summary_line(planned, outcome))
 
 
 def summary_line(planned: Planned, outcome: Outcome) -> str:
-    """The outcome of a job in a line."""
+    """Outcome of a job in one line."""
     return f"{planned.name}: " + (f"failed: {outcome.failure}" if outcome.failure else duration(outcome.seconds))
 
 
 def duration(seconds: float) -> str:
-    """Such as `3.2 s`, `12 min` or `3.4 h`."""
+    """Duration as text: `3.2 s`, `12 min` or `3.4 h`."""
     if seconds < 100.0:
         return f"{seconds:.2g} s"
     return f"{seconds / 60.0:.2g} min" if seconds < 6000.0 else f"{seconds / 3600.0:.2g} h"
 
 
 @contextmanager
-def board(jobs: Mapping[str, Planned]) -> Iterator[Board]:
-    """The one that fits standard error, for the jobs by key that are still to be done."""
+def progress_display(jobs: Mapping[str, Planned]) -> Iterator[LineDisplay | BarDisplay]:
+    """The display for this standard error, of the remaining jobs by key."""
     if not sys.stderr.isatty():
-        yield LineBoard(jobs)
+        yield LineDisplay(jobs)
         return
     from rich.console import Group
     from rich.live import Live
@@ -184,4 +171,4 @@ def board(jobs: Mapping[str, Planned]) -> Iterator[Board]:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     whole, each = Progress(*columns, console=console, speed_estimate_period=WHOLE_BENCH), Progress(*columns)
     with Live(Group(whole, each), console=console, refresh_per_second=4):
-        yield BarBoard(jobs, whole, each, lambda text: console.print(text, markup=False, highlight=False))
+        yield BarDisplay(jobs, whole, each, lambda text: console.print(text, markup=False, highlight=False))

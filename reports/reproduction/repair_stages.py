@@ -1,34 +1,33 @@
-"""A recording repaired one cause at a time, so that each shows what it does to the documented filter."""
+"""Repair of a recording one fault at a time, to show the effect of each on the documented filter."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fgbaseline.data import Excluded, Observations, Sequence
+from fgbaseline.data import Excluded, Sequence
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix
 from fgbaseline.data.motion import Shift, zero_order_hold
-from fgbaseline.data.observations import BoolArray
 from fgbaseline.diagnosis import Diagnosis, repair
 from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 
-from .stand_in import StandIn
+from .recordings import StandIn
 
 AS_RECORDED = "as recorded"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Stage:
-    """The recording with everything up to here put right."""
+    """The recording with all faults up to this stage repaired."""
 
     name: str
     cause: str
-    """what was wrong until here, in a sentence; empty for the recording as it is"""
+    """the fault that this stage repairs; empty for the recording as recorded"""
     sequence: Sequence
 
 
 def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
-    """As recorded, then without each fault that the diagnosis is sure of: axes, bias, interval, and the tracks."""
+    """As recorded, then after the repair of each significant fault: axes, bias, interval, and tracks."""
     recorded = diagnosis.sequence
     stages = [Stage(AS_RECORDED, "", recorded)]
     if diagnosis.fit is None:
@@ -43,7 +42,7 @@ def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
         stages.append(Stage("without bias", f"gyroscope bias of {_vector(bias)} rad/s", now))
     if diagnosis.shift != Shift.AFTER:
         now = _restamped(now, diagnosis.shift)
-        cause = f"velocities taken for an interval that is not theirs (by {-diagnosis.shift:g})"
+        cause = f"velocities assigned to the wrong interval (by {-diagnosis.shift:g} intervals)"
         stages.append(Stage("right interval", cause, now))
     repaired = repair(diagnosis, MaskSettings())
     good = repaired.excluded == Excluded.NO
@@ -56,13 +55,13 @@ def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
             truth=repaired.sequence.truth,
         )
         copied = ", copied frames" if (repaired.excluded == Excluded.COPIED).any() else ""
-        cause = f"wrong matches{copied} and what else is unusable ({np.mean(~good):.0%} of the observations)"
+        cause = f"wrong matches{copied} and other unusable observations ({np.mean(~good):.0%} of all)"
         stages.append(Stage("right matches", cause, tracked))
     return stages
 
 
 def simulated_stages(simulated: StandIn) -> list[Stage]:
-    """The same for a simulated recording, whose faults are known."""
+    """The stages of a simulated recording, whose faults are known."""
     recorded, bias, axes = simulated.sequence, simulated.gyro_bias, simulated.angular_axes
     now = _turned(recorded, axes, IDENTITY)
     stages = [Stage(AS_RECORDED, "", recorded), Stage("axes agree", _axes(axes, IDENTITY), now)]
@@ -71,13 +70,10 @@ def simulated_stages(simulated: StandIn) -> list[Stage]:
         stages.append(Stage("without bias", f"gyroscope bias of {_vector(bias)} rad/s", now))
     if simulated.wrong.any():
         cause = f"wrong matches ({simulated.wrong.mean():.0%} of the observations)"
-        stages.append(Stage("right matches", cause, _of(now, ~simulated.wrong)))
+        stages.append(
+            Stage("right matches", cause, replace(now, observations=now.observations.select(~simulated.wrong)))
+        )
     return stages
-
-
-def _of(sequence: Sequence, chosen: BoolArray) -> Sequence:
-    o: Observations = sequence.observations.select(chosen)
-    return replace(sequence, observations=o)
 
 
 def _turned(sequence: Sequence, angular: str, linear: str) -> Sequence:
@@ -89,7 +85,7 @@ def _turned(sequence: Sequence, angular: str, linear: str) -> Sequence:
 
 
 def _restamped(sequence: Sequence, shift: float) -> Sequence:
-    """The recording in which sample k is what moved frame k to k + 1."""
+    """The recording in which velocity k moves frame k to k + 1."""
     twist = zero_order_hold(sequence, shift)
     twist = np.concatenate([twist, twist[-1:]])
     return replace(sequence, linear_velocity=twist[:, :3], angular_velocity=twist[:, 3:])
@@ -98,7 +94,7 @@ def _restamped(sequence: Sequence, shift: float) -> Sequence:
 def _axes(angular: str, linear: str) -> str:
     every = (("angular", angular), ("linear", linear))
     wrong = [f"{what} velocity, {name}" for what, name in every if name != IDENTITY]
-    return f"disagreeing axes of the {' and of the '.join(wrong)}"
+    return f"inconsistent axes of the {' and of the '.join(wrong)}"
 
 
 def _vector(values: np.ndarray) -> str:

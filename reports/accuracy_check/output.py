@@ -1,4 +1,4 @@
-"""A check on the terminal, in Markdown for a pull request, as JSON and as JUnit XML, which CI systems show as tests."""
+"""Output of a check: terminal, Markdown for a pull request, JSON, and JUnit XML, which CI systems show as tests."""
 
 import json
 import math
@@ -22,11 +22,11 @@ SCHEMA = "fgbaseline/check/1"
 STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.CANNOT_TELL: "yellow", Outcome.FALLS_SHORT: "bold red"}
 SIGNS: Mapping[Outcome, str] = {Outcome.HOLDS: "✅", Outcome.CANNOT_TELL: "❔", Outcome.FALLS_SHORT: "❌"}
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""characters that no XML document may hold"""
+"""characters that XML does not allow"""
 
 
 def print_check(checked: Checked) -> None:
-    """Prints shortages and untrusted references, the table, the reasons, and the verdict."""
+    """Prints too small samples and untrusted references, the table, the remarks, and the verdict."""
     console = Console()
     console = Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False)
     for sentence in [*checked.shortages, *checked.references]:
@@ -37,7 +37,7 @@ def print_check(checked: Checked) -> None:
 
 
 def markdown(checked: Checked) -> str:
-    """A heading with the verdict, shortages and untrusted references, the table, and the reasons."""
+    """A heading with the verdict, too small samples and untrusted references, the table, and the remarks."""
     baseline = f"; baseline: {md(checked.baseline)}" if checked.baseline else ""
     return "\n".join(
         [
@@ -53,7 +53,7 @@ def markdown(checked: Checked) -> str:
 
 
 def as_json(checked: Checked) -> str:
-    """The document: the outcome, where everything came from, and every line with its numbers in full."""
+    """The JSON document: the outcome, its inputs, and every line with all digits."""
     document = {
         "schema": SCHEMA,
         "exit_code": checked.exit_code,
@@ -96,7 +96,7 @@ def _finite(bound: float) -> float | None:
 
 
 def junit(checked: Checked) -> bytes:
-    """The document, in UTF-8; a limit that falls short is a failure, one that cannot be told an error."""
+    """The JUnit document, in UTF-8; a limit that falls short is a failure, an undecided one an error."""
     suites = ElementTree.Element("testsuites", {"name": "fgbaseline check", **_counts(checked.lines)})
     for run in dict.fromkeys(line.run for line in checked.lines):
         lines = tuple(line for line in checked.lines if line.run == run)
@@ -114,7 +114,7 @@ def junit(checked: Checked) -> bytes:
 
 def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
     asked = f"beside its baseline ({line.tolerance} allowed)" if line.tolerance else bound(line.bounds)
-    name = f"{line.metric} {asked}"  # the same from run to run, whatever the baseline is: it is a test's identity
+    name = f"{line.metric} {asked}"  # without the baseline's value: the name identifies the test from run to run
     case = ElementTree.SubElement(suite, "testcase", classname=_text(line.estimator), name=_text(name))
     if line.outcome is Outcome.HOLDS:
         return
@@ -127,7 +127,7 @@ def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
 
 
 def _reference_suite(suites: ElementTree.Element, checked: Checked) -> None:
-    """A case of its own for a reference that is not trusted: without one, a report with no failure would be green."""
+    """A separate case for an untrusted reference: without one, a report without failures would be green."""
     suite = ElementTree.SubElement(suites, "testsuite", name="reference", tests="1", failures="0", errors="1")
     case = ElementTree.SubElement(suite, "testcase", classname="reference", name="trust")
     message = " ".join(checked.references)

@@ -1,4 +1,4 @@
-"""Every limit against every estimator that it matches."""
+"""Evaluation: every limit against every estimator that it matches."""
 
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
@@ -24,22 +24,22 @@ from ..results.reader import (
     value_of,
 )
 from ..results.statistics import INFINITE
-from .baseline import before, is_timing
+from .baseline import baseline_value, is_timing
 from .limits_file import Limit, Limits, Needed
 
 
 def evaluate(
     limits: TomlFile[Limits], measured: Measured, baseline: Measured | None, *, updating: bool = False
 ) -> Checked:
-    """All limits against what was measured, and against a baseline.
+    """Evaluates all limits on the measured metrics and on a baseline.
 
-    `updating` takes what the baseline lacks as new instead of as undecided. Raises InputError,
-    naming the key path, for a limit that matches nothing and for one that asks for a baseline where there can be none.
+    With `updating`, a metric that the baseline lacks holds as new; otherwise it is undecided. Raises InputError with
+    the key path for a limit that matches nothing, and for one on a baseline that does not exist.
     """
     lines: list[Line] = []
     for index, limit in enumerate(limits.content.limit):
         _require_baseline(limits, index, limit, given=baseline is not None or updating)
-        for name, estimator, values in matched(limits, index, measured):
+        for name, estimator, values in matching(limits, index, measured):
             lines += _lines(limits, index, (name, measured.runs[name]), (estimator, values), baseline, updating)
     needed = limits.content.reference
     sentences = [_reference(name, run, several=len(measured.runs) > 1) for name, run in measured.runs.items()]
@@ -47,15 +47,15 @@ def evaluate(
         lines=tuple(lines),
         references=tuple(sentence for sentence in sentences if sentence),
         shortages=_shortages(lines, several=len(measured.runs) > 1),
-        undecided=needed is not Needed.NONE and any(below(run, needed) for run in measured.runs.values()),
+        undecided=needed is not Needed.NONE and any(is_undertrusted(run, needed) for run in measured.runs.values()),
         measured=measured,
         limits=shown(limits.path),
         baseline=None if baseline is None else shown(baseline.path),
     )
 
 
-def matched(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tuple[str, str, Mapping[str, Any]]]:
-    """Run, estimator and its values, for all that a limit speaks of. Raises InputError where a part matches nothing."""
+def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tuple[str, str, Mapping[str, Any]]]:
+    """Runs, estimators and values that a limit matches. Raises InputError where one of its patterns matches nothing."""
     limit = limits.content.limit[index]
     runs = {name: run for name, run in measured.runs.items() if fnmatchcase(name, limit.runs)}
     if not runs:
@@ -74,13 +74,13 @@ def matched(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tu
     ]
     if not any(failure(values) or has_metric(values, limit.metric) for *_, values in chosen):
         known = sorted({metric for *_, values in chosen for metric in metrics_of(values)})
-        said = f'metric = "{limit.metric}" is no number of any estimator in question; there are '
+        said = f'metric = "{limit.metric}" is not a number of any matching estimator; there are '
         raise limits.wrong(("limit", index, "metric"), said + nearest(limit.metric, known))
     return chosen
 
 
-def below(run: MeasuredRun, needed: Needed) -> bool:
-    """Whether a run's reference is less trusted than needed; without a trust it is the user's own."""
+def is_undertrusted(run: MeasuredRun, needed: Needed) -> bool:
+    """Whether a run's reference is less trusted than needed; one without a trust is the user's own."""
     trust = run.reference.trust
     return trust == "untrusted" or (trust == "doubtful" and needed is Needed.TRUSTED)
 
@@ -93,11 +93,11 @@ def _lines(
     baseline: Measured | None,
     updating: bool,
 ) -> Iterator[Line]:
-    """One line for the bounds that are written down, and one for those that the baseline sets."""
+    """One line for the limit's own bounds, and one for the bounds around the baseline."""
     limit = limits.content.limit[index]
     (name, run), (estimator, values) = named_run, named_values
     value, missing = value_of(values, limit.metric)
-    old, unknown = before(baseline, name, run, estimator, limit.metric)
+    old, unknown = baseline_value(baseline, name, run, estimator, limit.metric)
     shortage = _shortage(limits.content, limit, values)
     doubt = shortage.reason if shortage else _doubt(limit.metric, run, limits.content.reference)
 
@@ -130,19 +130,19 @@ def _outcome(
 
 
 def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
-    """Why guessed units, or the reference, keep a metric from being judged; empty where they do not."""
+    """Why a metric is undecided: guessed units, or the reference; empty where neither applies."""
     if run.guessed_units:
         return (
-            f"the recording is in other units ({', '.join(run.guessed_units)}), which were repaired by a guess; state "
-            "them with run --time-unit, or with a table [units] in --repairs"
+            f"the units of the recording ({', '.join(run.guessed_units)}) were estimated from its data; specify them "
+            "with run --time-unit, or with a table [units] in --repairs"
         )
-    if not run.rests_on_reference(metric) or not below(run, needed):
+    if not run.rests_on_reference(metric) or not is_undertrusted(run, needed):
         return ""
     return f"the reference is {run.reference.trust}"
 
 
 def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shortage | None:
-    """What the sample of a limit's metric lacks; None where it is large enough, or there is none."""
+    """The shortage of a metric's sample; None where it is large enough, or the metric has no sample."""
     sample = sample_of(values, limit.metric)
     smallest = limit.smallest_sample or limits.smallest_sample
     coverage = limits.smallest_coverage if limit.smallest_coverage is None else limit.smallest_coverage
@@ -155,14 +155,14 @@ def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shorta
 
 
 def _shortages(lines: list[Line], *, several: bool) -> tuple[str, ...]:
-    """A sentence for each shortage, with the metrics and the estimators that it concerns."""
+    """A sentence for each shortage, with its metrics and estimators."""
     found: dict[tuple[Shortage, str], tuple[dict[str, None], dict[str, None]]] = {}
     for line in lines:
         if line.shortage is not None and line.value is not None:
             metrics, names = found.setdefault((line.shortage, line.run if several else ""), ({}, {}))
             metrics[line.metric], names[line.estimator] = None, None
     return tuple(
-        f"Too little data{f' in {run}' if run else ''} to judge {', '.join(metrics)} of {', '.join(names)}: "
+        f"Too little data{f' in {run}' if run else ''} for {', '.join(metrics)} of {', '.join(names)}: "
         f"{shortage.reason} (smallest_sample, smallest_coverage)."
         for (shortage, run), (metrics, names) in found.items()
     )
@@ -173,13 +173,13 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
         return
     place = ("limit", index, "baseline")
     if is_timing(limit.metric):
-        raise limits.wrong(place, f"a baseline holds no timings such as {limit.metric}; bound it with at_most")
+        raise limits.wrong(place, f"a baseline has no timings such as {limit.metric}; use at_most")
     if not given:
-        raise limits.wrong(place, "this limit asks for a baseline; name one with --baseline FILE")
+        raise limits.wrong(place, "this limit needs a baseline; name one with --baseline FILE")
 
 
 def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:
-    """The sentence on a reference that is not trusted; empty for one that is."""
+    """The sentence on a reference that is not trusted; empty for a trusted one."""
     reference = run.reference
     if reference.trust in (None, "trusted"):
         return ""

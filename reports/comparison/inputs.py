@@ -15,30 +15,29 @@ from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from .problem_loader import load_problem
-from .run_folder import RunFolder, read_run_folder
+from .reference_run import ReferenceRun, load_problem, read_reference_run
 
 Given = str | Path | Trajectory
-"""[NAME=]FILE, or a trajectory in memory"""
+"""`[NAME=]FILE`, or a trajectory in memory"""
 
 CUT_OFF = 0.01
 """largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
 ONLINE = "-online"
-"""suffix of the name of a smoother's by-product: each pose as estimated when its frame arrived"""
+"""suffix of a smoother's by-product: pose k from data up to frame k"""
 
 
 def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
-    """Reads all inputs. Raises InputError, naming the file, for whatever is wrong."""
-    run = read_run_folder(Path(str(reference))) if _is_folder(reference) else None
+    """Reads all inputs. Raises InputError with the file and its fault."""
+    run = read_reference_run(Path(str(reference))) if _is_folder(reference) else None
     problem, held = load_problem(settings, run)
     own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
-    sources = own if run is None else [run.trajectory(run.reference), *own]
+    sources = own if run is None else [run.files.trajectory(run.reference), *own]
     first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
     beside = []
     if run is not None:
-        first = replace(first, landmarks=run.landmarks(run.reference), trust=run.trust)
+        first = replace(first, landmarks=run.files.landmarks(run.reference), trust=run.trust)
         beside = [
-            Entry(run.trajectory(name), run.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
+            Entry(run.files.trajectory(name), run.files.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
             for name in _beside(run, settings.beside)
         ]
     entries = _named_apart([first, *beside, *others])
@@ -61,7 +60,7 @@ def _opened(given: Given, settings: Settings) -> Source:
 
 
 def _in_one_body(
-    every: list[Resolved], settings: Settings, problem: Problem | None, run: RunFolder | None
+    every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
@@ -70,7 +69,9 @@ def _in_one_body(
     ]
     bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
     if settings.lever_arm is not None and bodies[0] != bodies[1]:
-        raise InputError("lever-arm: it leads to the reference's point already; leave out the bodies")
+        raise InputError(
+            "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
+        )
     if settings.lever_arm is not None:
         estimates = [with_lever_arm(each, np.array(settings.lever_arm)) for each in estimates]
     elif not reference.trajectory.oriented and bodies[0] != bodies[1]:
@@ -93,7 +94,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
 
 
 def _split(given: str) -> tuple[str | None, str]:
-    """Name and file of `NAME=FILE`; an existing file `NAME=FILE` comes first."""
+    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
     name, mark, file = given.partition("=")
     if not mark or Path(given).exists() or "/" in name:
         return None, given
@@ -103,7 +104,7 @@ def _split(given: str) -> tuple[str | None, str]:
 
 
 def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
-    """Stamps, s, for files without: those of --times, else of the recording, of which the last few may be missing."""
+    """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         return [read_times(file, settings.unit) for file in settings.times]
     if problem is None:
@@ -121,7 +122,7 @@ def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None
     return np.asarray(poses[0], dtype=np.float64)
 
 
-def _beside(run: RunFolder, wanted: str) -> list[str]:
+def _beside(run: ReferenceRun, wanted: str) -> list[str]:
     others = [name for name in run.names if name != run.reference]
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
@@ -133,7 +134,7 @@ def _beside(run: RunFolder, wanted: str) -> list[str]:
 
 
 def _named_apart(entries: list[Entry]) -> list[Entry]:
-    """Entries with unique names: files of one name get that of their folder before it, then a number behind it."""
+    """Entries with unique names: equal names get the folder's name in front, then a number at the end."""
     given = [entry.name for entry in entries]
     names = list(given)
     for i, entry in enumerate(entries):
@@ -149,22 +150,22 @@ def _named_apart(entries: list[Entry]) -> list[Entry]:
 
 
 def _file_name(name: str) -> str:
-    """The name; raises InputError where no file can have it."""
+    """The name; raises InputError where a file cannot have it."""
     if "/" in name or "\\" in name or name.startswith(".") or not name:
-        raise InputError(f"{name!r} can be no file's name; name the trajectory otherwise: NAME=FILE")
+        raise InputError(f"{name!r} cannot be a file name; give the trajectory another: NAME=FILE")
     return name
 
 
 def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], problem: Problem | None) -> list[Entry]:
-    """The entries with the landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
+    """The entries with landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
     if files and problem is None:
-        raise InputError("landmarks: they are compared by the observations of a recording; add --sequence")
+        raise InputError("landmarks: their reprojection needs the observations of a recording; add --sequence")
     found: dict[str, Landmarks] = {}
     for given in files:
         name, file = _split(given)
         if name is None:
             if len(own) != 1:
-                raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; say which: NAME=FILE")
+                raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; name one: NAME=FILE")
             name = own[0]
         if name not in own:
             raise InputError(f"landmarks: there is no estimate '{name}'; there are {', '.join(own)}")
@@ -182,5 +183,5 @@ def _require_known(entry: Entry, problem: Problem | None) -> None:
     if last >= n:
         raise InputError(
             f"{entry.name}: its landmark {last} is not one of the sequence's {n}; a run numbers the pieces of split "
-            "tracks beyond the recording's, so give --sequence the folder of fgbaseline export that belongs to it"
+            "tracks beyond the recording's, so give --sequence the folder of its fgbaseline export"
         )

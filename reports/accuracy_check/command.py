@@ -1,4 +1,4 @@
-"""`fgbaseline check`, from what the user named to the exit code."""
+"""`fgbaseline check`: inputs, evaluation, outputs and exit code."""
 
 import os
 from contextlib import ExitStack
@@ -16,15 +16,15 @@ from ..results.reader import read_folder, read_measured
 from .baseline import refusal, require_replaceable, write_baseline
 from .evaluation import evaluate
 from .limits_file import read_limits
-from .writers import as_json, junit, markdown, print_check
+from .output import as_json, junit, markdown, print_check
 
 JOB_SUMMARY = "GITHUB_STEP_SUMMARY"
-"""the environment variable by which GitHub names the file that its page of a job shows"""
+"""environment variable of GitHub: the file that the page of the job shows"""
 
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Files that the user wants beside the table on the terminal."""
+    """Files to write, in addition to the table on the terminal."""
 
     junit: Path | None = None
     markdown: Path | None = None
@@ -40,11 +40,11 @@ def check(
     update: bool = False,
     accept_worse: bool = False,
 ) -> int:
-    """Holds a folder against its limits, writes every output that is asked for, and returns the exit code."""
+    """Evaluates a folder against limits and a baseline, writes the outputs, and returns the exit code."""
     if update and baseline_file is None:
         raise InputError("update-baseline: name the file to write with --baseline FILE")
     if accept_worse and not update:
-        raise InputError("accept-worse: it says what --update-baseline may write; add that")
+        raise InputError("accept-worse: it has an effect with --update-baseline only; add that")
     limits, measured = read_limits(limits_file), read_folder(folder)
     if update and baseline_file is not None:
         baseline = require_replaceable(baseline_file)
@@ -63,7 +63,7 @@ def check(
 
 
 def _write(checked: Checked, outputs: Outputs) -> None:
-    """All files or none, and GitHub's summary of the job."""
+    """Writes all files or none, and GitHub's summary of the job."""
     texts = (
         (outputs.junit, junit(checked)),
         (outputs.markdown, markdown(checked).encode()),
