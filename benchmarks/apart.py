@@ -66,7 +66,7 @@ def apart(function: str, *arguments: Any, limit: int | None = None) -> Taken:
 def peak_memory() -> float:
     """MB that this process has held at most.
 
-    Where Linux tells it by itself, that is taken: to `ru_maxrss` a process inherits what its parent held.
+    Linux reports it in /proc, which is used: to `ru_maxrss` a process inherits what its parent held.
     """
     held = _status("VmHWM")
     if held is not None:
@@ -76,7 +76,7 @@ def peak_memory() -> float:
 
 
 def memory() -> float:
-    """MB that this process holds now; what it held at most, where the system does not tell."""
+    """MB that this process holds now; its peak, where the system does not report the present value."""
     held = _status("VmRSS")
     return peak_memory() if held is None else held
 
@@ -96,9 +96,9 @@ def _status(field: str) -> float | None:
 
 
 def main() -> None:
-    """Calls the function and tells what that took."""
-    module, name, told = sys.argv[1:]
-    asked = json.loads(told)
+    """Calls the function and prints its time and memory."""
+    module, name, arguments = sys.argv[1:]
+    asked = json.loads(arguments)
     if asked["limit"] is not None:
         resource.setrlimit(resource.RLIMIT_CPU, (asked["limit"], resource.RLIM_INFINITY))
     function = getattr(importlib.import_module(module), name)

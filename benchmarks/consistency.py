@@ -1,8 +1,8 @@
-"""Whether the estimators' covariances tell the truth: NEES on simulated drives, `python benchmarks/consistency.py`.
+"""Consistency of the estimators' covariances: NEES on simulated drives, `python benchmarks/consistency.py`.
 
-Drives with turns, no wrong matches, and problems that are told the simulation's own noise. The mean over seeds of the
+Drives with turns, no wrong matches, and problems with the simulation's own noise. The mean over seeds of the
 pose's NEES (6 degrees of freedom) lies inside its 95 % chi-square bounds at 19 of 20 frames, on average, for an
-estimator that knows its errors. What the figures are is told in docs/consistency.md.
+consistent estimator. docs/consistency.md explains the figures.
 """
 
 # ruff: noqa: E402
@@ -33,7 +33,7 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import Calibration, NoiseSettings
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearization
-from fgbaseline.reports.figures.style import OWN
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS
 
 FRAMES = 20
 PARTS = 5
@@ -41,7 +41,7 @@ PARTS = 5
 EVERYTHING = MaskSettings(min_disparity=-np.inf, max_row_mismatch=np.inf, prediction_gate=np.inf, min_track=1)
 """There are no wrong matches to find, and a gate along noisy velocities would keep what agrees with their noise."""
 INVERSE_DEPTH = JointSettings(linearization=Linearization.TEXTBOOK)
-COLOURS = OWN | {
+COLOURS = ESTIMATOR_COLORS | {
     "joint-ekf-first-estimate": "#56B4E9",
     "textbook, inverse depth": "#882255",
     "joint-ekf-textbook": "#D55E00",
@@ -57,7 +57,7 @@ class Study:
     kernel: bool
 
     def problem(self, sequence: Sequence) -> Problem:
-        """The problem that is told all that the simulation did."""
+        """Problem with the true noise and calibration of the simulation."""
         drive = self.drive
         return diagnosis.calibrated(
             sequence,

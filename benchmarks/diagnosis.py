@@ -79,7 +79,7 @@ def simulated(recording: Recording, **settings: Any) -> Any:
 
 
 def hand_held(recording: Recording) -> dict[str, bool]:
-    """Every axis is excited: all can be told."""
+    """Every axis is excited: all are identifiable."""
     d, faults = faulty(recording)
     return {
         "axes of both velocities": (d.angular.name, d.linear.name) == (faults.angular, faults.linear),
@@ -88,7 +88,7 @@ def hand_held(recording: Recording) -> dict[str, bool]:
 
 
 def car(recording: Recording) -> dict[str, bool]:
-    """Which axis of the linear velocity is forward, and that the others cannot be told."""
+    """Which axis of the linear velocity is forward, and that the others are not identifiable."""
     d, faults = faulty(recording)
     return {
         "axes of the angular velocity": d.angular.name == faults.angular,
@@ -150,8 +150,8 @@ def shares(answers: list[dict[str, bool]]) -> Iterator[str]:
         right = [bool(answer.get(name)) for answer in answers]
         few = name.startswith("(")
         seeds = [str(seed) for seed, holds in enumerate(right) if holds == few]
-        told = f"  ({'' if few else 'not '}seeds {', '.join(seeds)})" if seeds and sum(right) != len(right) else ""
-        yield f"  {sum(right):4d} of {len(right)}  {name}{told}"
+        note = f"  ({'' if few else 'not '}seeds {', '.join(seeds)})" if seeds and sum(right) != len(right) else ""
+        yield f"  {sum(right):4d} of {len(right)}  {name}{note}"
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from fgbaseline.data import Problem, Sequence, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError
-from fgbaseline.reports.run.problem import RunSettings, check_estimators, pose_problem, read_sequence
+from fgbaseline.reports.run.problem import RunSettings, build_problem, check_estimators, read_sequence
 
 
 def seconds_taken(problem: Problem, name: str) -> float:
@@ -70,7 +70,7 @@ def main(recording: Path | None, estimators: str, preset: str, repeat: int) -> N
         sequence = read_sequence(settings)
     except FgbaselineError as error:
         raise click.ClickException(str(error)) from None
-    problem = pose_problem(sequence, settings)
+    problem = build_problem(sequence, settings)
     click.echo(
         f"{sequence.name}: {sequence.n_frames} frames, {len(problem.observations())} observations of "
         f"{len(problem.features)} landmarks; {repeat} runs each; load {os.getloadavg()[0]:.1f} on "

@@ -28,7 +28,7 @@ LAST_STRAW = 250
 """processor seconds, after which a process is stopped that takes longer than was expected"""
 WARM_FRAMES = 12
 LEAST_SECONDS, LEAST_MB = 0.02, 2.0
-"""below which a figure tells of the process and not of the problem"""
+"""s; below it a figure measures the process and not the problem"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +89,10 @@ def measured(quick: bool = False) -> list[Point]:
                 data.write_problem(problem, place)
                 size = _size(axis.name, problem)
                 points += [_point(axis, name, size, place, points) for name in ESTIMATORS]
-                told = (f"{p.estimator} {p.seconds:.2g} s" for p in points[-len(ESTIMATORS) :] if p.seconds is not None)
-                click.echo(f"{size:.0f} {axis.name}: {', '.join(told)}", err=True)
+                times = (
+                    f"{p.estimator} {p.seconds:.2g} s" for p in points[-len(ESTIMATORS) :] if p.seconds is not None
+                )
+                click.echo(f"{size:.0f} {axis.name}: {', '.join(times)}", err=True)
     return points
 
 
@@ -119,7 +121,7 @@ def _point(axis: Axis, name: str, size: float, place: Path, points: Iterable[Poi
 
 
 def _expected(before: Iterable[Point], size: float) -> float:
-    """Seconds, by the power that the last two sizes tell of, at least proportional; 0 where nothing was tried."""
+    """Seconds, extrapolated by the power of the last two sizes, at least proportional; 0 where nothing was tried."""
     tried = list(before)
     known = [(p.size, p.spent) for p in tried if not p.why]
     if not known:

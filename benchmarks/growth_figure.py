@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.style import OWN, SCREEN, head, in_style
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, SCREEN, in_style, title_and_legend
 
 from .growth import ESTIMATORS, LEAST_MB, LEAST_SECONDS, Point, exponents, of
 
@@ -30,7 +30,9 @@ def drawn(points: list[Point]) -> bytes:
             panels[row, 0].set_ylabel(title)
         for column, name in enumerate(names):
             panels[-1, column].set_xlabel(name)
-        head(figure, "What it costs as the problem grows, with fitted powers", [_handle(name) for name in ESTIMATORS])
+        title_and_legend(
+            figure, "What it costs as the problem grows, with fitted powers", [_handle(name) for name in ESTIMATORS]
+        )
         lay_out(figure)
         stream = BytesIO()
         figure.savefig(stream, format="png", dpi=DPI)
@@ -38,7 +40,7 @@ def drawn(points: list[Point]) -> bytes:
 
 
 def _handle(name: str) -> Line2D:
-    return Line2D([], [], color=OWN[name], marker=MARKS[name], markersize=5, label=name)
+    return Line2D([], [], color=ESTIMATOR_COLORS[name], marker=MARKS[name], markersize=5, label=name)
 
 
 def _panel(axes: Axes, points: list[Point], axis: str, unit: str, least: float) -> None:
@@ -50,10 +52,10 @@ def _panel(axes: Axes, points: list[Point], axis: str, unit: str, least: float) 
         shown = np.array([(size, max(value, least)) for size, value in line])
         if len(shown) == 0:
             continue
-        axes.plot(*shown.T, color=OWN[name], marker=MARKS[name], markersize=4.5, clip_on=False)
+        axes.plot(*shown.T, color=ESTIMATOR_COLORS[name], marker=MARKS[name], markersize=4.5, clip_on=False)
         power = exponents(of(points, axis, name))[unit]
         if np.isfinite(power):
-            ends.append((*shown[-1], f"{power:.1f}", OWN[name]))
+            ends.append((*shown[-1], f"{power:.1f}", ESTIMATOR_COLORS[name]))
     _label(axes, ends)
     for which in (axes.xaxis, axes.yaxis):
         which.set_minor_formatter(NullFormatter())

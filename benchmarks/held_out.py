@@ -4,7 +4,7 @@ A fifth of the tracks is kept from diagnosis and estimators (seed 0), and the fo
 it. Beside that stand, against the truth, the relative error over 1 and 2 seconds and the error of the aligned path, and
 in the last row of a recording what the held-out tracks make of the truth itself, which takes no part in the mask: where
 the truth errs more than an estimate, the cameras and the truth disagree, and no ranking by cameras can follow it.
-Kendall's tau is 1 where two orders of the four are the same, -1 where they are opposite; "told apart" counts the pairs
+Kendall's tau is 1 where two orders of the four are the same, -1 where they are opposite; "separated" counts the pairs
 whose difference on held-out tracks is sure (95 %, block bootstrap of the difference), and how many of these have the
 same order in the truth. Without files: three simulated drives, whose truth is exact. Tables and text are in
 docs/metrics.md.
@@ -113,12 +113,12 @@ def differences(errors: compare.HeldOutErrors) -> dict[tuple[str, str], tuple[fl
 
 
 def agreement(recordings: dict[str, Judged]) -> pd.DataFrame:
-    """Tau of each recording by each measure, and pairs told apart with the same order in the truth."""
+    """Tau of each recording by each measure, and separated pairs with the same order in the truth."""
     rows: dict[str, dict[str, object]] = {}
     for name, one in recordings.items():
         table = one.table.loc[list(NAMES)]
         sure = {pair: low > 0.0 for pair, (low, high) in one.differences.items() if low > 0.0 or high < 0.0}
-        rows[name] = {"told apart": f"{len(sure)} of {len(one.differences)}"}
+        rows[name] = {"separated": f"{len(sure)} of {len(one.differences)}"}
         for measure in AGAINST:
             tau = float(kendalltau(table["held out, px"], table[measure]).statistic)
             truth = table[measure].to_dict()
@@ -142,7 +142,7 @@ def main(recordings: tuple[Path, ...], truth: Path | None, share: float, seed: i
         done[name] = judged(sequence, share, seed)
         click.echo(f"\n{name}\n{done[name].table.to_string(float_format='{:.3f}'.format, na_rep='')}")
     click.echo(
-        f"\nKendall's tau (pairs told apart that have the same order in the truth)\n{agreement(done).to_string()}"
+        f"\nKendall's tau (separated pairs that have the same order in the truth)\n{agreement(done).to_string()}"
     )
 
 

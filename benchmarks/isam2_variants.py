@@ -1,7 +1,7 @@
 """What was tried to make iSAM2 faster, and what it does to the answer: `python -m benchmarks.isam2_variants FILE...`.
 
-Each variant answers the same problem in turn. Told are processor time, the share of it in GTSAM's updates, and how far
-final and online paths are from those of the variant that relinearizes at every update.
+Each variant solves the same problem in turn. Printed are processor time, the share of it in GTSAM's updates, and how
+far final and online paths are from those of the variant that relinearizes at every update.
 """
 
 import time

@@ -1,7 +1,7 @@
 """How far the joint filter is from iSAM2, and what of it is what: `python benchmarks/joint_distance.py FILE...`.
 
 Each row changes one thing. `isam2-online` has the same data as a filter: the rest of the way to `isam2` is what only
-later frames tell. iSAM2 that never moves a linearization point is a filter as far as linearization goes, on the very
+later frames add. iSAM2 that never moves a linearization point is a filter as far as linearization goes, on the very
 graph that iSAM2 solves: from there to `isam2-online` it is linearization and nothing else.
 """
 
@@ -29,7 +29,7 @@ from fgbaseline.smoother import ISAM2Settings
 NEVER = 1e9
 """a threshold that no step passes"""
 FACTORS = (0.5, 2.0)
-"""by which noise is told too small and too large"""
+"""factors by which the assumed noise is too small and too large"""
 
 
 @dataclass(frozen=True)

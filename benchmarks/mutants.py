@@ -107,8 +107,8 @@ def weighted(everything: list[Mutant], tried: list[Mutant]) -> float:
 def difference(name: str) -> str:
     """The change, on one line."""
     program = Path(sys.executable).with_name("mutmut")
-    told = subprocess.run([program, "show", name], cwd=PLACE, capture_output=True, text=True, check=False).stdout
-    changed = [line for line in told.splitlines() if re.match(r"[-+](?![-+])", line)]
+    diff = subprocess.run([program, "show", name], cwd=PLACE, capture_output=True, text=True, check=False).stdout
+    changed = [line for line in diff.splitlines() if re.match(r"[-+](?![-+])", line)]
     return "  →  ".join(" ".join(line[1:].split()) for line in changed)
 
 
@@ -116,7 +116,7 @@ def difference(name: str) -> str:
 @click.option("--per-module", default=5, show_default=True, help="how many mutants of each module are tried; 0: all")
 @click.option("--seed", default=3, show_default=True, help="which of them")
 def main(per_module: int, seed: int) -> None:
-    """Try mutants, and write the table; what survives is told with its change."""
+    """Try mutants, and write the table; survivors are printed with their change."""
     copied()
     if not (PLACE / "mutants" / "mutmut-stats.json").is_file():
         mutmut("run", "--max-children", "1", "fgbaseline.compare.limits.*")

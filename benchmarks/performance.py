@@ -72,20 +72,20 @@ def _memory() -> str:
 )
 def main(recordings: Path, runs: int, quick: bool, wanted: bool | None, figure: Path | None) -> None:
     """Measure everything, print the table and write it down."""
-    told = [machine()]
+    notes = [machine()]
     recording: Path | None = recordings / RECORDING
     if not (recordings / RECORDING).is_file():
         recording = None
-        told.append(f"{RECORDING} is not in {recordings}: filters, rest_of_run and isam2 on it are left out.")
+        notes.append(f"{RECORDING} is not in {recordings}: filters, rest_of_run and isam2 on it are left out.")
     if quick:
-        told.append("A quick run, on small sizes: for trying, and no verdict.")
+        notes.append("A quick run, on small sizes: for trying, and no verdict.")
     rows: list[Row] = []
     for name, measure in parts(recording, runs, quick):
         start = time.monotonic()
         rows += measure()
         click.echo(f"{name}: {time.monotonic() - start:.0f} s", err=True)
     points = growth.measured(quick)
-    text = "\n\n".join([" ".join(told), table(rows), growth.tables(points, growth.axes(quick))])
+    text = "\n\n".join([" ".join(notes), table(rows), growth.tables(points, growth.axes(quick))])
     click.echo(text)
     if wanted or (wanted is None and not quick):
         page.write(PLACE, "performance", [text])

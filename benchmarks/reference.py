@@ -71,8 +71,8 @@ def rmse(estimate: Estimate, batch: Estimate) -> float:
 
 def two_starts(batch: Estimate) -> str:
     """What batch says of its two starts."""
-    told = {data.EventKind.SAME_COST: "same", data.EventKind.DIFFERENT_COSTS: "differ"}
-    return next((told[event.kind] for event in batch.events if event.kind in told), "one only")
+    texts = {data.EventKind.SAME_COST: "same", data.EventKind.DIFFERENT_COSTS: "differ"}
+    return next((texts[event.kind] for event in batch.events if event.kind in texts), "one only")
 
 
 @click.command()

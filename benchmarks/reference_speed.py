@@ -71,7 +71,7 @@ def _shares(problem: Problem) -> tuple[float, float]:
 def late_against_early(runs: int, frames: int = DRIVE_FRAMES) -> Row:
     """The cost of a frame at the end of a simulated drive, over its last laps, against the lap around frame 300.
 
-    The drive goes round a block at constant speed, and whole laps are compared: on a road that changes, the scene tells
+    The drive goes round a block at constant speed, and whole laps are compared: on a road that changes, the scene shows
     more than the frame's number. No landmark comes back once it was lost, so nothing closes a loop.
     """
     ratios, last = [], min(LAPS_AT_END, frames // EARLY - 1) * EARLY

@@ -23,7 +23,7 @@ from . import page
 PLACE = Path("docs/reliability.md")
 
 
-def told(result: Result) -> str:
+def outcome(result: Result) -> str:
     """A cell of the table."""
     kind = cell(result)
     if kind is Cell.FAILED:
@@ -36,7 +36,7 @@ def told(result: Result) -> str:
 
 def row(recording: Hostile, run: Run) -> str:
     """A line of the table."""
-    cells = [recording.name, *(told(run.results[name]) for name in ESTIMATORS), run.trust.verdict.name.lower()]
+    cells = [recording.name, *(outcome(run.results[name]) for name in ESTIMATORS), run.trust.verdict.name.lower()]
     return f"| {' | '.join(cells)} |"
 
 

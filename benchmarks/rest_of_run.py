@@ -27,7 +27,7 @@ import click
 
 from benchmarks.measured import Row, table
 from fgbaseline.reports.cli.main import NEW_OBJECTS
-from fgbaseline.reports.cli.run import DEFAULT_ESTIMATORS
+from fgbaseline.reports.cli.recording_commands import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""
@@ -48,26 +48,26 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         taken[stage] = time.perf_counter() - start
 
     with watch("imports"):
-        from fgbaseline.data.parallel import cores, background_map
+        from fgbaseline.data.parallel import background_map, cores
         from fgbaseline.reports import progress  # noqa: F401
-        from fgbaseline.reports.run.problem import RunSettings, load_estimators, pose_problem, read_sequence
+        from fgbaseline.reports.run.problem import RunSettings, build_problem, import_estimators, read_sequence
     settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = read_sequence(settings)
-    with watch(POSING), background_map(lambda _: pose_problem(sequence, settings, cores()), 1, cores()) as posed:
+    with watch(POSING), background_map(lambda _: build_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.compare.estimate_comparison import compare_all
         from fgbaseline.data.solving import solve_all
         from fgbaseline.reports import figures
         from fgbaseline.reports.run.folder import write_numbers, write_page
 
-        load_estimators(estimators)
+        import_estimators(estimators)
         (problem,) = posed()
     answers = solve_all(problem, estimators, lambda name: watch(f"{SOLVING}{name}"))
     with watch("comparison"):
         run = compare_all(problem, answers, settings.record(), processes=cores())
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
-        with watch("figures, and tables meanwhile"), figures.being_drawn(run, cores()) as finished:
+        with watch("figures, and tables meanwhile"), figures.drawn_in_background(run, cores()) as finished:
             summary = write_numbers(run, folder)
             drawn = finished()
             (folder / "figures").mkdir()
@@ -81,11 +81,11 @@ def measured(recording: Path, runs: int, estimators: str) -> list[dict[str, floa
     """The stages of so many runs, one after another, each in a process of its own."""
     root = Path(__file__).resolve().parents[1]
     command = [sys.executable, "-m", "benchmarks.rest_of_run", str(recording.resolve()), "--estimators", estimators]
-    told = [
+    outputs = [
         subprocess.run([*command, "--stages"], stdout=subprocess.PIPE, text=True, check=True, cwd=root).stdout
         for _ in range(runs)
     ]
-    return [json.loads(text) for text in told]
+    return [json.loads(text) for text in outputs]
 
 
 def rest(taken: Mapping[str, float]) -> float:
@@ -100,8 +100,8 @@ def rows(recording: Path, runs: int, estimators: str = DEFAULT_ESTIMATORS) -> li
     rests = [rest(taken) for taken in every]
     claim = f"`run {recording.name}` beside its estimators"
     shown = [Row(claim, f"under {WANTED:g} s", *_seconds(rests, whole), statistics.median(rests) < WANTED)]
-    told = [rest(taken) - taken[POSING] for taken in every]
-    shown.append(Row("of that, all but the diagnosis", "", *_seconds(told, whole), None))
+    seconds = [rest(taken) - taken[POSING] for taken in every]
+    shown.append(Row("of that, all but the diagnosis", "", *_seconds(seconds, whole), None))
     for stage in every[0]:
         shown.append(Row(stage, "", *_seconds([taken[stage] for taken in every], whole), None))
     return shown

@@ -7,6 +7,7 @@ import numpy as np
 
 from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.plural import percent
 from fgbaseline.geometry import disparity
 
 from .residuals.cost import cost
@@ -86,19 +87,25 @@ def trust(
     findings = [
         (_above(pixel, limit.pixel_scale), f"normalized pixel residual RMS {_figure(pixel)} (expected 1{robust})"),
         (_above(motion, limit.motion_scale), f"normalized motion residual RMS {_figure(motion)} (expected at most 1)"),
-        (_below(share, limit.used_share), f"it used {share:.0%} of the observations, far points aside"),
-        (_above(weak, limit.weak_frames), f"{weak:.1%} of the frames have fewer than {limit.weak_below} observations"),
-        (_above(given_up, limit.given_up_frames), f"the observations of {given_up:.1%} of the frames were given up"),
+        (_below(share, limit.used_share), f"it used {percent(share)} of the observations, far points aside"),
+        (
+            _above(weak, limit.weak_frames),
+            f"{percent(weak, 1)} of the frames have fewer than {limit.weak_below} observations",
+        ),
+        (
+            _above(given_up, limit.given_up_frames),
+            f"the observations of {percent(given_up, 1)} of the frames were given up",
+        ),
     ]
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     if impossible > NOTABLE:
-        text = f"{impossible:.0%} of the observations have no positive disparity, which no point in view can have"
+        text = f"{percent(impossible)} of the observations have no positive disparity, which no point in view can have"
         findings.append((_above(impossible, limit.impossible_share), text))
     if untied:
         share = untied / (problem.n_frames - 1)
         text = (
             f"over {untied:,} of {problem.n_frames - 1:,} intervals no landmark ties what lies on both sides: only the "
-            "velocities tell the motion there, and a jump would not show"
+            "velocities give the motion there, and a jump would not show"
         )
         findings.append((_above(share, limit.untied_intervals), text))
     if not problem.diagnosed:

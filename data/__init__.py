@@ -1,9 +1,8 @@
-"""Recordings, the problems that they pose, estimates, and the registry of estimators."""
+"""Recordings, estimation problems, estimates, and the registry of estimators."""
 
 from fgbaseline.geometry import HuberKernel
 
 from .estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
-from .exchange import read_problem, write_problem
 from .finding import Finding
 from .formats import (
     attach_truth,
@@ -22,6 +21,7 @@ from .held_out import HeldOut
 from .observations import Observations
 from .problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from .problem.documented import documented
+from .problem_export import read_problem, write_problem
 from .registry import estimator_names, find_estimator
 from .sequence import Sequence, Truth
 from .time_unit import TimeUnit

@@ -1,8 +1,8 @@
-"""The 24 right-handed axis conventions in which velocities can have been recorded.
+"""The 24 right-handed axis conventions of recorded velocities.
 
-A convention is written as three signed letters, such as `x,-y,-z`: the IMU's x axis (the frame of `imu_T_cam`) is the
-recorded x, its y is minus the recorded y, its z is minus the recorded z. Its matrix takes recorded components to the
-axes of `imu_T_cam`, as `axes` in diagnosis.json does.
+A convention is three signed letters. In `x,-y,-z` the IMU's x axis (the frame of `imu_T_cam`) is the recorded x, its y
+is minus the recorded y, its z is minus the recorded z. Its matrix takes recorded components to the axes of `imu_T_cam`,
+as `axes` in diagnosis.json does.
 """
 
 from itertools import permutations, product
@@ -16,9 +16,9 @@ IDENTITY = "x,y,z"
 
 
 def axes_matrix(convention: str) -> FloatArray:
-    """The signed permutation (3, 3) of a convention: `imu = axes_matrix(convention) @ recorded`.
+    """Signed permutation (3, 3) of a convention: `imu = axes_matrix(convention) @ recorded`.
 
-    Raises InputError for what is none of the 24 right-handed conventions.
+    Raises InputError for a convention that is none of the 24.
     """
     if convention not in _MATRICES:
         raise InputError(
@@ -28,7 +28,7 @@ def axes_matrix(convention: str) -> FloatArray:
 
 
 def axes_name(matrix: ArrayLike) -> str:
-    """The convention whose matrix (3, 3) this is. Raises InputError when it is none of the 24."""
+    """Name of the convention with this matrix (3, 3). Raises InputError when it is none of the 24."""
     wanted = np.asarray(matrix, dtype=np.float64)
     for name, known in _MATRICES.items():
         if np.array_equal(known, wanted):
@@ -37,7 +37,7 @@ def axes_name(matrix: ArrayLike) -> str:
 
 
 def twist_in_imu_axes(twist: FloatArray, linear: str, angular: str) -> FloatArray:
-    """Twists [v, w] (n, 6) in the axes of imu_T_cam, from recorded ones with a convention for each velocity."""
+    """Twists [v, w] (n, 6) in the axes of imu_T_cam, from recorded twists with one convention per velocity."""
     return np.concatenate([twist[:, :3] @ axes_matrix(linear).T, twist[:, 3:] @ axes_matrix(angular).T], axis=1)
 
 

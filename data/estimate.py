@@ -1,4 +1,4 @@
-"""What every estimator answers."""
+"""Estimate of one problem: trajectory, landmarks, covariances, status and events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from .observations import BoolArray, IntArray
 
 
 class Progress(Protocol):
-    """Told after every frame how many are done and how many there are."""
+    """Progress callback, called after every frame."""
 
     def __call__(self, done: int, total: int, /) -> None:
         """`done` frames of `total` are estimated."""
@@ -25,38 +25,38 @@ class Status(StrEnum):
 
     OK = "ok"
     RECOVERED = "recovered"
-    """it met trouble, gave something up (see its events), and finished"""
+    """finished after dropping a frame or landmarks, or with an invalid covariance (see its events)"""
     FAILED = "failed"
 
 
 class EventKind(StrEnum):
-    """Kinds of events that the estimators of this package report; the values are the text in files and tables."""
+    """Kinds of events of the estimators of this package; the values are the texts in files and tables."""
 
     LANDMARK_DROPPED = "landmark dropped"
-    """it violated cheirality or made the system indeterminate, and was removed from the graph"""
+    """landmark removed from the graph, since it violated cheirality or made the system indeterminate"""
     LANDMARK_NEVER_DETERMINED = "landmark never determined"
     FRAME_WITHOUT_OBSERVATIONS = "frame without observations"
-    """the observations of a frame left the system indeterminate and were removed; weighs on the reference's trust"""
+    """observations of a frame removed, since they left the system indeterminate; lowers the trust in the reference"""
     SOLVED_BY_QR = "solved by QR"
-    RELINEARIZATION_FAILED = "final relinearisation failed"
+    RELINEARIZATION_FAILED = "final relinearization failed"
     NO_COVARIANCES = "no covariances"
     DESCENT_FAILED = "descent failed"
     """Levenberg-Marquardt ended with an exception from one of its starts"""
     ONE_START = "one start only"
-    """a minimum that no second start confirms; weighs on the reference's trust"""
+    """minimum not confirmed by a second start; lowers the trust in the reference"""
     SAME_COST = "both starts end at the same cost"
     DIFFERENT_COSTS = "starts end at different costs"
     SINGULAR_INNOVATION = "innovation covariance singular"
     COVARIANCE_LOST = "covariance lost"
     """the covariance of a filter's state was no longer positive definite"""
     GYROSCOPE_BIAS = "gyroscope bias"
-    """a result: the bias that was estimated along with the poses"""
+    """estimate of the bias, if it is part of the state"""
     BEHIND_CAMERA = "behind the camera"
-    """observations rejected since their landmark violates cheirality"""
+    """observations rejected because their landmark violates cheirality"""
     OUTSIDE_GATE = "outside the gate"
     """observations rejected by a chi-square gate"""
     FRAME_DISAGREES = "frame disagrees"
-    """all observations of a frame rejected, since most of them are beyond a chi-square quantile"""
+    """all observations of a frame rejected, because most of them exceed a chi-square quantile"""
     INITIALIZATION_DEFERRED = "entry put off"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
     STATE_FULL = "state full"
@@ -65,11 +65,11 @@ class EventKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What happened in an estimator: where, what and why."""
+    """Event of an estimator: frame, kind and cause."""
 
     frame: int
     kind: EventKind | str
-    """short and countable; any text of an estimator's own is counted and listed, and weighs on nothing"""
+    """short and countable; kinds of other packages are counted and listed, without effect on the trust"""
     reason: str
     landmark: int | None = None
 
@@ -83,11 +83,11 @@ class Landmarks:
     position: FloatArray
     """(m, 3) m"""
     covariance: FloatArray | None = None
-    """(m, 3, 3) m^2 in the world frame; NaN where the estimator cannot tell"""
+    """(m, 3, 3) m^2 in the world frame; NaN where unknown"""
 
     @staticmethod
     def none() -> "Landmarks":
-        """No landmark."""
+        """Empty set of landmarks."""
         return Landmarks(np.empty(0, np.int64), np.empty((0, 3)))
 
     def __len__(self) -> int:
@@ -96,55 +96,55 @@ class Landmarks:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Innovations:
-    """How large a filter's innovations were beside what it expected, frame by frame.
+    """Normalized innovation squared (NIS) of a filter, by frame.
 
-    Of everything that a frame offered to the pose update, before the kernel or any gate: what is rejected counts too.
+    Covers all observations offered to the pose update, before kernel and gate: rejected ones count too.
     """
 
     nis: FloatArray
-    """(T,) normalised innovation squared nu^T S^-1 nu over the three rows (uL, uR, (vL + vR) / 2) of all of a frame's
-    observations of landmarks already known, S the filter's own covariance of nu; NaN where there is none"""
+    """(T,) nu^T S^-1 nu over the three rows (uL, uR, (vL + vR) / 2) of all observations of known landmarks in a frame,
+    S being the filter's own covariance of nu; NaN where there is none"""
     degrees: IntArray
-    """(T,) rows that this is over: 3 for each observation"""
+    """(T,) degrees of freedom: 3 per observation"""
 
     @staticmethod
     def none(n_frames: int) -> "Innovations":
-        """Arrays to be filled in, no frame having any yet."""
+        """Empty record of T frames, to be filled."""
         return Innovations(np.full(n_frames, np.nan), np.zeros(n_frames, dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GyroBias:
-    """What a gyroscope reads at rest as an estimator knew it at each frame, in the axes of the IMU."""
+    """Gyroscope bias (reading at rest) as estimated at each frame, in IMU axes."""
 
     mean: FloatArray
-    """(T, 3) rad/s, to be taken off the angular velocities of the problem's sequence"""
+    """(T, 3) rad/s, to be subtracted from the angular velocities of the problem's sequence"""
     covariance: FloatArray
     """(T, 3, 3)"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Estimate:
-    """The answer of one estimator to one problem: T frames, n observations in its sequence."""
+    """Answer of one estimator to one problem, with T frames and n observations in its sequence."""
 
     name: str
     world_T_imu: FloatArray
     """(T, 4, 4); all NaN from the frame on at which an estimator failed"""
     used: BoolArray
-    """(n,) which of the sequence's observations took part"""
+    """(n,) mask of the sequence's observations that were used"""
     covariance: FloatArray | None = None
     """(T, 6, 6) of the right perturbation [v, w] of each pose (m, rad); None where the estimator has none"""
     landmarks: Landmarks = field(default_factory=Landmarks.none)
     status: Status = Status.OK
     reason: str = ""
-    """why the status is not ok, in a sentence"""
+    """reason of a status other than ok, one sentence"""
     seconds: FloatArray = field(default_factory=lambda: np.empty(0))
     """(T,) time spent on each frame, s"""
     seconds_total: float = 0.0
-    """time for all of it, set-up and covariances included, s"""
+    """total time including set-up and covariances, s"""
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
-    """of a filter that records them"""
+    """NIS of a filter that records it"""
     gyro_bias: GyroBias | None = None
     """where it was estimated along with the poses"""
     velocity: FloatArray | None = None
@@ -157,7 +157,7 @@ class Estimate:
     """(T, 15, 15) of the errors [translation, rotation, velocity, gyroscope bias, accelerometer bias]: right
     perturbation of the pose, additive otherwise; its first 6 x 6 block is `covariance`"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
-    """further answers that the same run gave at no cost, by the name they are registered under"""
+    """further estimates of the same run at no cost, by their registered names"""
 
     def transformed(self, motion: FloatArray) -> "Estimate":
         """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
@@ -178,7 +178,7 @@ class Estimate:
 
     @staticmethod
     def failed(name: str, reason: str, n_frames: int, n_observations: int) -> "Estimate":
-        """The answer of an estimator that has none."""
+        """Estimate of a failed estimator: NaN poses."""
         return Estimate(
             name=name,
             world_T_imu=np.full((n_frames, 4, 4), np.nan),

@@ -1,9 +1,9 @@
-"""One fault of a recording, as the reader or the diagnosis reports it."""
+"""Fault of a recording, as reported by the reader or the diagnosis."""
 
 from dataclasses import dataclass
 
 UNITS = frozenset({"time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"})
-"""codes of values in other units than those of SI"""
+"""codes of values in units other than SI"""
 OF_THE_FILE = frozenset(
     {
         "repeated_stamps",
@@ -15,7 +15,7 @@ OF_THE_FILE = frozenset(
         *UNITS,
     }
 )
-"""codes of faults of the file itself, which a run prints with every preset"""
+"""codes of faults of the file, which a run prints with every preset"""
 
 AS_GIVEN = "as given"
 """the certainty of a finding that the user states"""
@@ -30,9 +30,9 @@ class Finding:
     sentence: str
     """description with figures"""
     before: float
-    """a figure of the recording as it is, in `unit`"""
+    """a measure of the fault before repair, in `unit`"""
     after: float
-    """the figure once repaired and masked; equal to `before` where nothing can be repaired"""
+    """the measure after repair and masking; equal to `before` if the fault is not repaired"""
     unit: str
     certainty: str
-    """a standard error, a lead in likelihood, or 'counted'"""
+    """a standard error, a log-likelihood ratio, or 'counted'"""

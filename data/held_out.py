@@ -1,4 +1,4 @@
-"""Observations kept from diagnosis and estimators, by which paths are validated."""
+"""Observations withheld from diagnosis and estimators, for validation."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ MIN_PIECE = 6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HeldOut:
-    """n observations of tracks that were taken out of a sequence."""
+    """n observations of tracks removed from a sequence for validation."""
 
     observations: Observations
     """as recorded, with the recording's landmark numbers"""

@@ -36,7 +36,9 @@ class Observations:
         for array in (self.frame, self.landmark, self.pixel):
             array.flags.writeable = False
 
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]:  # made anew by who unpickles it: read-only there too
+    def __reduce__(
+        self,
+    ) -> tuple[type, tuple[object, ...]]:  # pickle calls the constructor, which makes the arrays read-only
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     def __len__(self) -> int:
@@ -44,7 +46,7 @@ class Observations:
 
     @staticmethod
     def sort(frame: IntArray, landmark: IntArray, pixel: FloatArray) -> "Observations":
-        """Observations of arrays in any order."""
+        """Observations sorted by frame and landmark, from arrays in any order."""
         order = np.lexsort((landmark, frame))
         return Observations(
             np.asarray(frame, dtype=np.int64)[order],
@@ -54,20 +56,20 @@ class Observations:
 
     @staticmethod
     def none() -> "Observations":
-        """No observation at all."""
+        """Empty set of observations."""
         return Observations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 4)))
 
     def select(self, chosen: BoolArray | IntArray) -> "Observations":
-        """The observations where `chosen` (n,) is true, or those at the increasing indices `chosen`."""
+        """Observations where `chosen` (n,) is true, or with the increasing indices `chosen`."""
         return Observations(self.frame[chosen], self.landmark[chosen], self.pixel[chosen])
 
     def of_frames(self, first: int, last: int) -> "Observations":
-        """The observations of the frames first to last, both included."""
+        """Observations of the frames first to last, both included."""
         start, stop = np.searchsorted(self.frame, [first, last + 1])
         return Observations(self.frame[start:stop], self.landmark[start:stop], self.pixel[start:stop])
 
     def frame_starts(self, n_frames: int) -> IntArray:
-        """(n_frames + 1,): the observations of frame k are those from `[k]` up to `[k + 1]`."""
+        """Index ranges (n_frames + 1,): the observations of frame k are `[k]` up to `[k + 1]`."""
         return np.searchsorted(self.frame, np.arange(n_frames + 1)).astype(np.int64)
 
     def by_frame(self, n_frames: int) -> Iterator[slice]:
@@ -77,7 +79,7 @@ class Observations:
             yield slice(int(starts[k]), int(starts[k + 1]))
 
     def ties(self, n_frames: int) -> IntArray:
-        """(n_frames - 1,) how many landmarks are seen both up to frame k and from frame k + 1 on."""
+        """Number (n_frames - 1,) of landmarks observed both up to frame k and from frame k + 1 on."""
         change = np.zeros(n_frames + 1, dtype=np.int64)
         if len(self) > 0:
             order = self.by_track()
@@ -87,9 +89,9 @@ class Observations:
         return np.cumsum(change)[: n_frames - 1]
 
     def counts(self, n_landmarks: int) -> IntArray:
-        """(n_landmarks,) how many observations each landmark has."""
+        """Number (n_landmarks,) of observations of each landmark."""
         return np.bincount(self.landmark, minlength=n_landmarks).astype(np.int64)
 
     def by_track(self) -> IntArray:
-        """(n,) the indices that sort the observations by landmark, then frame."""
+        """Indices (n,) that sort the observations by landmark, then frame."""
         return np.lexsort((self.frame, self.landmark)).astype(np.int64)

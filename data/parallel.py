@@ -1,7 +1,7 @@
-"""Parallel map with forks of this process, each of which takes the next open item.
+"""Parallel map in forks of this process, with dynamic scheduling.
 
-Forks share memory and imports, so that nothing is sent to them. Only Linux forks safely; elsewhere this process does
-all items. Items of a fork that fails or dies are computed here again, so that an error is raised in this process.
+Forks share memory and imports, so that no arguments are sent. Only Linux forks safely; elsewhere this process computes
+all items. Items of a fork that fails or dies are computed again here, so that an exception is raised in this process.
 """
 
 import os
@@ -25,10 +25,10 @@ def cores() -> int:
 
 @contextmanager
 def background_map(work: Callable[[int], T], n: int, processes: int) -> Iterator[Callable[[], list[T]]]:
-    """Starts `work` on the numbers 0 to n - 1 (at most 256) in `processes` - 1 forks, the last numbers first.
+    """Maps `work` over 0 to n - 1 (at most 256) in the background, in `processes` - 1 forks, last numbers first.
 
-    The yielded function joins the work until it is done, and returns all results in the order of their numbers. This
-    process may do something else first. All forks have ended when the block ends, also by an exception.
+    The yielded function joins the work and returns all results in order. The caller may do something else first. All
+    forks have ended when the block ends, also by an exception.
     """
     helpers = min(processes - 1, n) if sys.platform == "linux" else 0
     with _work_queue(n) as numbers, _workers(work, numbers, helpers) as answers:
@@ -44,7 +44,7 @@ def background_map(work: Callable[[int], T], n: int, processes: int) -> Iterator
 
 
 def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
-    """Results by number of the items that this process takes."""
+    """Results by number of the items that this process computes."""
     done = {}
     while number := os.read(numbers, 1):
         done[number[0]] = work(number[0])
@@ -53,7 +53,7 @@ def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
 
 @contextmanager
 def _work_queue(n: int) -> Iterator[int]:
-    """A pipe of the bytes n - 1 to 0; a process takes the number that it reads."""
+    """Queue of the items: a pipe of the bytes n - 1 to 0, of which a process reads one at a time."""
     numbers, into = os.pipe()
     os.write(into, bytes(reversed(range(n))))
     os.close(into)
@@ -65,7 +65,7 @@ def _work_queue(n: int) -> Iterator[int]:
 
 @contextmanager
 def _workers(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[list[Connection]]:
-    """The pipes of results of so many forks."""
+    """Pipes with the results of the forks."""
     answers, started = [], list[ForkProcess]()
     try:
         for _ in range(helpers):
@@ -88,7 +88,7 @@ def _workers(work: Callable[[int], T], numbers: int, helpers: int) -> Iterator[l
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Interrupts delayed to the end of the block: Python swallows exceptions in its hooks around a fork."""
+    """Interrupts blocked until the end of the block, because Python swallows exceptions in its fork hooks."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
@@ -97,7 +97,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _worker(work: Callable[[int], T], numbers: int, answer: Connection, into: Connection) -> None:
-    """The body of a fork. The parent handles interrupts; where the parent is gone, sending fails."""
+    """Body of a fork. The parent handles interrupts; if the parent has ended, sending fails silently."""
     answer.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

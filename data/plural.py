@@ -1,4 +1,4 @@
-"""How a count stands in a sentence: '1 frame', '1,009 frames'."""
+"""Counts and shares in sentences: '1 frame', '1,009 frames', '98 %'."""
 
 
 def plural(n: int, one: str, many: str = "") -> str:
@@ -9,3 +9,8 @@ def plural(n: int, one: str, many: str = "") -> str:
 def noun(n: int, one: str, many: str = "") -> str:
     """The noun alone: `one` for 1, else `many`, by default `one` with an s."""
     return one if n == 1 else many or f"{one}s"
+
+
+def percent(share: float, decimals: int = 0) -> str:
+    """A share of one in percent: '98 %'."""
+    return f"{100.0 * share:.{decimals}f} %"

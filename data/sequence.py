@@ -1,4 +1,4 @@
-"""What was recorded: velocities, stereo tracks, calibration and, where it is known, the truth."""
+"""Recording: velocities, stereo tracks, calibration and, where known, ground truth."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -7,9 +7,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
 
 from .finding import Finding
-from .finite import LARGEST, measurable
 from .imu import ImuSamples
 from .observations import BoolArray, Observations
+from .value_range import LARGEST, measurable
 
 ROTATION_TOLERANCE = 1e-6
 
@@ -22,7 +22,7 @@ class Truth:
     """
 
     world_T_imu: FloatArray
-    """(T, 4, 4); frames without truth are all NaN"""
+    """(T, 4, 4); NaN for frames without ground truth"""
     landmarks: FloatArray | None = None
     """(N, 3) m, one row per landmark of the sequence; NaN where it is not known"""
     source: str = "in the recording"
@@ -37,17 +37,15 @@ class Truth:
 
     @property
     def known(self) -> BoolArray:
-        """(T,) which frames have a true pose."""
+        """Mask (T,) of the frames with ground truth."""
         return np.asarray(np.isfinite(self.world_T_imu).all(axis=(1, 2)), dtype=np.bool_)
 
     @staticmethod
     def from_any_world(
         poses: FloatArray, landmarks: FloatArray | None = None, source: str = "in the recording"
     ) -> "Truth":
-        """Truth re-expressed from the IMU at frame 0.
-
-        `poses` (T, 4, 4) and `landmarks` (N, 3) are in any common world. Raises InputError when frame 0 has no pose.
-        """
+        """Ground truth from `poses` (T, 4, 4) and `landmarks` (N, 3) in any common world, re-expressed in the IMU at
+        frame 0."""
         if not np.isfinite(poses[0]).all():
             raise InputError(f"the ground truth ({source}) has no pose for frame 0, which defines the world frame")
         origin = se3.inverse(poses[0])
@@ -100,19 +98,19 @@ class Sequence:
     """raw inertial samples, in place of body velocities"""
     truth: Truth | None = None
     up_imu: FloatArray | None = None
-    """(3,) unit vector: where up is in the IMU's frame at frame 0; by default the camera's -y axis"""
+    """(3,) unit vector pointing up in the IMU frame at frame 0; by default the camera's -y axis"""
     form: str = "fgbaseline"
-    """which file format it came from"""
+    """file format"""
     source: str = ""
-    """the file it came from, or how it was simulated"""
+    """file name, or description of the simulation"""
     remarks: tuple[str, ...] = ()
-    """what the reader has to say of it, one sentence each"""
+    """remarks of the reader, one sentence each"""
     findings: tuple[Finding, ...] = ()
-    """faults of the file that the reader put right"""
+    """faults of the file that the reader repaired"""
     time_unit_given: bool = False
-    """whether the user said in which unit the stamps were: the diagnosis then does not judge it"""
+    """True if the user gave the unit of the stamps; the diagnosis then does not test it"""
     left_out: tuple[int, ...] = ()
-    """frames of the file, increasing, that the recording does not have: those whose stamp repeats the one before"""
+    """increasing indices of file frames left out because their stamp repeats the previous one"""
 
     def __post_init__(self) -> None:
         if self.up_imu is None:
@@ -122,17 +120,19 @@ class Sequence:
         for array in (self.t, self.linear_velocity, self.angular_velocity, self.imu_T_cam):
             array.flags.writeable = False
 
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]:  # made anew by who unpickles it: read-only there too
+    def __reduce__(
+        self,
+    ) -> tuple[type, tuple[object, ...]]:  # pickle calls the constructor, which makes the arrays read-only
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
     def n_frames(self) -> int:
-        """How many frames there are: T."""
+        """Number of frames T."""
         return len(self.t)
 
     @property
     def dt(self) -> FloatArray:
-        """(T-1,) the intervals between frames, s."""
+        """Intervals between frames (T-1,), s."""
         return np.diff(self.t)
 
     @property
@@ -144,12 +144,12 @@ class Sequence:
         return self.up_imu
 
     def with_truth(self, truth: Truth) -> "Sequence":
-        """The same recording with this truth in place of its own."""
+        """Recording with its ground truth replaced."""
         return replace(self, truth=truth)
 
 
 def check_sequence(s: Sequence) -> None:
-    """Raises InputError, naming field and value, where a sequence is not one that can be estimated from."""
+    """Checks a sequence. Raises InputError, naming field and value, where estimation is impossible."""
     T = s.n_frames
     if T < 2:
         raise InputError(f"time_stamps: a sequence needs at least 2 frames, this one has {T}")

@@ -1,4 +1,4 @@
-"""Answers of all estimators to one problem, ours and those of other packages: the failure of one stops no other."""
+"""Runs estimators, own and registered ones, on one problem; the failure of one does not stop the others."""
 
 import inspect
 import time
@@ -15,7 +15,7 @@ from fgbaseline.data import Estimate, Problem, Progress, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError, so3
 
 Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
-"""around the work of a named estimator: gives the callback for every frame"""
+"""context manager around the run of a named estimator, which gives its progress callback"""
 ROTATION_TOLERANCE = 1e-6
 
 
@@ -25,10 +25,10 @@ def no_progress(name: str) -> AbstractContextManager[Progress | None]:  # noqa: 
 
 
 def solve_all(problem: Problem, names: Iterable[str], watch: Watch = no_progress) -> dict[str, Estimate]:
-    """Answer of each named estimator, in the order of the names; a failure is an answer and stops nothing.
+    """Estimate of each named estimator, in the order of the names; a failure gives a failed estimate.
 
-    A by-product (`isam2-online` of `isam2`) is not solved again, and an estimator that has a parameter `given`
-    (`batch` starts from the answer of `isam2`) receives the answers so far by name.
+    A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a parameter `given` (`batch`
+    starts from the answer of `isam2`) receives the earlier estimates by name.
     """
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
@@ -64,7 +64,7 @@ def _parameters(estimator: Callable[..., object]) -> Iterable[str]:
 
 
 def describe(error: Exception) -> str:
-    """Sentence on an exception: its type, its text and the line it comes from."""
+    """Description of an exception in one sentence: type, text and source line."""
     text = str(error).strip().partition("\n")[0]
     if isinstance(error, FgbaselineError) and text:
         return text
@@ -74,7 +74,7 @@ def describe(error: Exception) -> str:
 
 
 def checked(answer: object, name: str, problem: Problem) -> Estimate:
-    """The answer under the name it was asked for. Raises FgbaselineError where it cannot be compared or written."""
+    """Validated estimate with its registered name. Raises FgbaselineError where it cannot be compared or written."""
     if not isinstance(answer, Estimate):
         raise FgbaselineError(f"it returned {type(answer).__name__} in place of an Estimate")
     T, n = problem.n_frames, len(problem.excluded)

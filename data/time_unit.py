@@ -1,9 +1,10 @@
-"""The unit of time stamps, by their size and their interval; and why stamps that should differ are equal.
+"""Unit of time stamps, detected from their size and interval, and lost digits of repeated stamps.
 
-A clock that counts from 1970 shows its unit by its size. So does an interval between two images of hours or years.
-Anything else, as slow keyframes, takes a look at the motion (`diagnose.units`). A float32 holds seven significant
-digits, a float64 whole numbers up to 2^53: the stamps of a long clock that went through a narrower type, or a `%g`,
-repeat each other.
+Stamps counted from 1970 show their unit by their size; so does an interval between images of hours or years. Other
+cases, such as slow keyframes, need the motion (`diagnosis.conventions.units`).
+
+A float32 has seven significant digits, and a float64 holds whole numbers up to 2^53. Stamps of a long clock that were
+stored in a narrower type, or printed with `%g`, repeat each other.
 """
 
 from dataclasses import replace
@@ -19,7 +20,7 @@ from .sequence import Sequence
 
 
 class TimeUnit(StrEnum):
-    """What a time stamp counts."""
+    """Unit of a time stamp."""
 
     S = "s"
     MS = "ms"
@@ -28,17 +29,17 @@ class TimeUnit(StrEnum):
 
     @property
     def per_second(self) -> int:
-        """How many there are in a second."""
+        """Units per second."""
         return {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[self.value]
 
     @property
     def seconds(self) -> float:
-        """How long one is."""
+        """Length of the unit, s."""
         return 1.0 / self.per_second
 
     @property
     def noun(self) -> str:
-        """Its name in sentences."""
+        """Name in sentences."""
         return {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}[self.value]
 
 
@@ -57,7 +58,7 @@ COARSE = 0.02
 
 
 def usual(interval: float) -> bool:
-    """Whether so many seconds are usual between two frames."""
+    """True if an interval in seconds is usual between two frames."""
     return USUAL_INTERVAL[0] <= interval <= USUAL_INTERVAL[1]
 
 
@@ -85,9 +86,9 @@ def unit_of_stamps(t: FloatArray) -> tuple[TimeUnit, str] | None:
 
 
 def lost_digits(t: FloatArray, longest: str | None = None) -> str:
-    """Why stamps (T,) that should differ are equal, with the remedy; empty where they do not show it.
+    """Cause and remedy of equal stamps (T,) that should differ; empty if the values show none.
 
-    `longest` is the one with the most digits as a text file has it.
+    `longest` is the stamp with the most digits as written in a text file.
     """
     largest = float(np.abs(t).max())
     if longest is not None and significant_digits(longest) <= SINGLE:
@@ -124,9 +125,9 @@ def significant_digits(word: str) -> int:
 
 
 def in_seconds(sequence: Sequence, unit: TimeUnit | None = None) -> Sequence:
-    """The recording with its stamps in seconds, and what was done about them.
+    """Recording with its stamps in seconds, and a remark on the conversion.
 
-    `unit` is what the user knows of them; without it the unit that the stamps alone show.
+    `unit` is given by the user; without it, it is detected from the stamps alone.
     """
     if unit is not None:
         said = f"The time stamps are in {unit.noun}, as given."

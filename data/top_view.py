@@ -9,12 +9,12 @@ from fgbaseline.geometry import FloatArray
 from .problem import Problem
 
 STEEP = 0.2
-"""horizontal part of a unit vector, below which it points nowhere in particular"""
+"""horizontal part of a unit vector below which its heading is undefined"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TopView:
-    """The horizontal plane: x ahead of the camera at the start, y to its left, both unit vectors (3,) in the world."""
+    """Horizontal plane: x ahead of the camera at the start, y to its left, both unit vectors (3,) in the world."""
 
     ahead: FloatArray
     left: FloatArray

@@ -1,4 +1,4 @@
-"""A path through time, from anywhere: stamps and the poses of one body in one world."""
+"""Trajectory from any source: time stamps and poses of one body in one world."""
 
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, replace
@@ -10,39 +10,39 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .observations import BoolArray, IntArray
 
 ROTATION_TOLERANCE = 1e-6
-"""how far from a rotation the nine numbers of a pose may be"""
+"""largest orthogonality error of a rotation matrix in a file"""
 FARTHEST = 1e12
-"""m; positions beyond it have fewer digits than a millimetre needs"""
+"""m; largest distance from the origin at which positions still resolve a millimeter"""
 EXACT = 1e-12
-"""up to here it is rounding, and they stay as they are"""
+"""orthogonality error within rounding: such rotations are not changed"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trajectory:
-    """T >= 1 poses of a body, sorted by time. Its arrays are copies of what it was given, and cannot be written to;
-    rotations that are not exact are replaced by the nearest that is.
+    """T >= 1 poses of a body, sorted by time.
 
-    Raises InputError, naming the pose (and the line it came from, where that is known), for stamps that do not rise or
-    repeat, for poses that are not finite or farther than FARTHEST from the origin, and for rotations that are none
-    (beyond ROTATION_TOLERANCE).
+    Its arrays are read-only copies. Rotations that are not exact are replaced by the nearest rotation.
+
+    Raises InputError, naming the pose (and its line, if known), for stamps that do not increase, poses that are not
+    finite or farther than FARTHEST from the origin, and matrices that are no rotations (beyond ROTATION_TOLERANCE).
     """
 
     t: FloatArray
-    """(T,) s, strictly rising; the number of the frame where `stamped` is False"""
+    """(T,) s, strictly increasing; the frame number if `stamped` is False"""
     world_T_body: FloatArray
     """(T, 4, 4)"""
     name: str = "trajectory"
-    """what tables and figures call it"""
+    """name in tables and figures"""
     source: str = ""
-    """the file it came from; what errors speak of"""
+    """file name, for error messages"""
     line: IntArray | None = None
-    """(T,) the line or row of `source` that each pose stands in, for errors"""
+    """(T,) line or row of each pose in `source`, for error messages"""
     stamped: bool = True
-    """False where the source has no time: then nothing can be said per second"""
+    """False if the source has no time stamps: quantities per second are then undefined"""
     oriented: bool = True
-    """False where the source has positions only: then the rotations are the identity and mean nothing"""
+    """False if the source has positions only: the rotations are then the identity, without meaning"""
     proven: InitVar[bool] = False
-    """True leaves out the checks: for what was made of a checked trajectory"""
+    """True skips the checks, for data from a checked trajectory"""
 
     def __post_init__(self, proven: bool) -> None:
         for field in ("t", "world_T_body"):
@@ -53,9 +53,9 @@ class Trajectory:
 
     @staticmethod
     def of_frames(t: FloatArray, world_T_body: FloatArray, name: str, source: str = "") -> "Trajectory":
-        """The frames of t (n,) that have a pose: those of `world_T_body` (n, 4, 4) that are all NaN are left out.
+        """Trajectory of the frames of t (n,) that have a pose; all-NaN poses of `world_T_body` (n, 4, 4) are left out.
 
-        That is how estimates that failed on the way, and truths with gaps, mark frames without one.
+        Estimates that failed midway and ground truth with gaps mark missing poses by NaN.
         """
         known = ~np.isnan(np.asarray(world_T_body)).all(axis=(1, 2))
         return Trajectory(np.asarray(t)[known], np.asarray(world_T_body)[known], name, source)
@@ -74,25 +74,25 @@ class Trajectory:
         return self.world_T_body[:, :3, :3]
 
     def at(self, index: IntArray) -> "Trajectory":
-        """The poses of these strictly rising indices (n,)."""
+        """Trajectory of the poses with these strictly increasing indices (n,)."""
         if len(index) == len(self):
             return self
         line = None if self.line is None else self.line[index]
         return replace(self, t=self.t[index], world_T_body=self.world_T_body[index], line=line, proven=len(index) > 0)
 
     def with_poses(self, world_T_body: FloatArray) -> "Trajectory":
-        """The same stamps with other poses (T, 4, 4)."""
+        """Trajectory with the same stamps and other poses (T, 4, 4)."""
         return replace(self, world_T_body=world_T_body)
 
     def later(self, seconds: float) -> "Trajectory":
-        """The same poses, every stamp `seconds` later."""
+        """Trajectory with all stamps shifted by `seconds`."""
         return replace(self, t=self.t + seconds)
 
 
 def check_trajectory(path: Trajectory) -> FloatArray:
-    """(T,) how far each pose is from a rigid motion, at most ROTATION_TOLERANCE.
+    """Orthogonality errors (T,) of the poses, at most ROTATION_TOLERANCE.
 
-    Raises InputError, naming pose and line, where a trajectory is not one that can be compared.
+    Raises InputError, naming pose and line, where a trajectory is not comparable.
     """
     t, poses = path.t, path.world_T_body
     who = path.source or path.name
@@ -117,7 +117,7 @@ def check_trajectory(path: Trajectory) -> FloatArray:
         np.asarray((np.abs(poses[:, :3, 3]) <= FARTHEST).all(axis=1), dtype=np.bool_),
         path,
         lambda i: (
-            f"its position {poses[i, :3, 3].tolist()} is beyond {FARTHEST:g} m; give metres, of a path that holds"
+            f"its position {poses[i, :3, 3].tolist()} is beyond {FARTHEST:g} m; give meters, of a path that holds"
         ),
     )
     with np.errstate(over="ignore", invalid="ignore"):
@@ -135,10 +135,10 @@ def check_trajectory(path: Trajectory) -> FloatArray:
 
 
 def _make_exact(poses: FloatArray, defect: FloatArray) -> None:
-    """Writes the nearest rigid motions over poses (T, 4, 4) that are off by more than rounding, by `defect` (T,)."""
+    """Replaces poses (T, 4, 4) by the nearest rigid motions where their `defect` (T,) exceeds rounding."""
     off = np.flatnonzero(defect > EXACT)
     R = poses[off, :3, :3]
-    for _ in range(2):  # Newton's method for the polar factor: each step squares what is left
+    for _ in range(2):  # Newton's method for the polar factor converges quadratically
         R = 0.5 * R @ (3.0 * np.eye(3) - np.swapaxes(R, 1, 2) @ R)
     poses[off, :3, :3], poses[off, 3] = R, [0.0, 0.0, 0.0, 1.0]
 

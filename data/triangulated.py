@@ -1,4 +1,4 @@
-"""The landmarks that a problem's observations give along any path."""
+"""Landmarks of a problem, triangulated along a given path."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from .estimate import Landmarks
 from .problem import Problem
 
 SINGULAR_CONDITION = 1e14
-"""of a landmark's 3x3 information: beyond it its position is not determined"""
+"""condition number of a landmark's 3x3 information beyond which its position is undetermined"""
 
 
 def landmarks_along(problem: Problem, world_T_imu: FloatArray) -> Landmarks:
-    """The problem's landmarks triangulated from its observations with the poses (T, 4, 4) held.
+    """Landmarks of a problem, triangulated with the poses (T, 4, 4) held fixed.
 
-    Their covariances hold for exact poses. Landmarks that no observation determines are left out.
+    Covariances assume exact poses. Undetermined landmarks are left out.
     """
     o = problem.observations()
     world_T_cam = (world_T_imu @ problem.sequence.imu_T_cam)[o.frame]

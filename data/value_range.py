@@ -1,4 +1,4 @@
-"""Numbers that a sensor can measure, whatever their unit."""
+"""Range of values that a sensor can measure, in any unit."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from fgbaseline.geometry import FloatArray
 from .observations import BoolArray
 
 LARGEST = 1e60
-"""in any unit: no sensor measures more, and products of larger numbers overflow"""
+"""largest plausible measurement in any unit; products of larger numbers could overflow"""
 
 
 def measurable(values: FloatArray) -> BoolArray:
-    """Whether values (...) are finite and at most LARGEST, so that their products are finite too."""
+    """True where values (...) are finite and at most LARGEST in magnitude."""
     return np.asarray(np.abs(values) <= LARGEST)

@@ -12,10 +12,10 @@ from .motion_model import predicted_history
 
 
 def dead_reckoning(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Path of the increments with its covariance (equation 9), or strapdown integration of all inertial samples.
+    """Dead-reckoned path with its covariance (equation 9), or strapdown integration of all inertial samples.
 
-    No observation corrects it. Its landmarks are those of the prior where the problem has one (the average of their
-    back-projections), else triangulated along the path.
+    Landmarks are at their prior where the problem has one (the average of their back-projections), else triangulated
+    along the path.
     """
     start = time.perf_counter()
     history = predicted_history(problem)

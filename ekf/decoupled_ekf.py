@@ -1,4 +1,4 @@
-"""Decoupled EKF: the documented visual-inertial SLAM (part c of the report), equations 9, 11, 12 and 13."""
+"""Decoupled EKF: the visual-inertial SLAM of the source paper (part c), equations 9, 11, 12 and 13."""
 
 import time
 
@@ -26,7 +26,7 @@ eigenvalue: eps times the condition against one over the condition."""
 
 
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Documented filter: pose and landmarks with separate covariances.
+    """EKF SLAM of the source paper, with separate covariances of pose and landmarks.
 
     At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9) or the inertial samples
     since frame k-1, update the pose (with inertial samples the velocity and the biases as well) with
@@ -114,7 +114,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
 
 
 def _standard_form_failure(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> str:
-    """Failure of (I - K H) Sigma in the printed form; empty where it stays positive definite."""
+    """Failure of the standard form (I - K H) Sigma; empty where it stays positive definite."""
     try:
         printed = standard_form_covariance(covariance, innovation, weight)
         smallest = float(np.linalg.eigvalsh(0.5 * (printed + printed.T))[0])

@@ -1,4 +1,4 @@
-"""Landmark mapping along the dead-reckoned path (part b of the report, equations 11 and 12)."""
+"""Landmark mapping along the dead-reckoned path (part b of the source paper, equations 11 and 12)."""
 
 import time
 

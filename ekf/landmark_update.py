@@ -1,12 +1,10 @@
 """Landmark update (equations 11 and 12) on independent 3x3 blocks, for known poses.
 
-With the poses given, landmarks are conditionally independent: the report's 3M x 3M covariance is exactly block
-diagonal, and its update equals, block by block,
+With known poses, landmarks are conditionally independent: the 3M x 3M covariance of the source paper is block diagonal.
+Each block is updated by Sigma^-1 <- Sigma^-1 + H^T V^-1 H and mu <- mu + Sigma H^T V^-1 (z - z~).
 
-    Sigma^-1 <- Sigma^-1 + H^T V^-1 H    and    mu <- mu + Sigma H^T V^-1 (z - z~).
-
-The blocks are kept as square roots R with Sigma^-1 = R^T R, updated by the QR decomposition of [V^-1/2 H; R]: a
-landmark near the camera plane, whose H is without bound, then leaves a covariance that is still positive.
+The blocks are kept as square roots R with Sigma^-1 = R^T R, updated by the QR decomposition of [V^-1/2 H; R]. The
+covariance then stays positive definite for a landmark near the camera plane, whose H is unbounded.
 """
 
 import numpy as np
@@ -40,9 +38,9 @@ class IndependentLandmarks:
     ) -> None:
         """Update landmarks `row` (n,) with pixels (n, 4) observed from a pose (4, 4) (equations 11 and 12).
 
-        `weight` (n,) multiplies V^-1 of each observation; without it the kernel decides, of innovations whitened by
-        H Sigma H^T + V. Landmarks that are not yet known start at their back-projection, with the information that
-        this one observation gives.
+        `weight` (n,) multiplies V^-1 of each observation. Without it the kernel gives the weights, from innovations
+        whitened by H Sigma H^T + V. A new landmark is initialized at its back-projection, with the information of this
+        observation.
         """
         model = self.measurement
         fresh = ~self.known[row]
@@ -58,7 +56,7 @@ class IndependentLandmarks:
             if model.kernel is not None:
                 weight[~fresh] = model.kernel.weight(self._squared_norms(residual[~fresh], H[~fresh], row[~fresh]))
         whiten = np.sqrt(weight[:, None] / variance)
-        # The right-hand side as a fourth column: its first three rows in R are Q^T times it, and Q is never formed.
+        # The right-hand side is a fourth column, so that R contains Q^T times it and Q is never formed.
         r = len(variance)
         stacked = np.zeros((len(row), r + 3, 4))
         stacked[:, :r, :3] = whiten[:, :, None] * H
@@ -83,7 +81,7 @@ class IndependentLandmarks:
 
 
 def _solved(R: FloatArray) -> FloatArray:
-    """x (n, 3) with T x = c of upper triangles [T, c] (n, 3 or more, 4)."""
+    """Solutions x (n, 3) of T x = c for upper triangular [T, c] (n, 3 or more, 4)."""
     x = np.empty((len(R), 3))
     x[:, 2] = R[:, 2, 3] / R[:, 2, 2]
     x[:, 1] = (R[:, 1, 3] - R[:, 1, 2] * x[:, 2]) / R[:, 1, 1]

@@ -14,7 +14,7 @@ from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 
 
 def decoupled_nis(innovation: PoseInnovation, covariance: FloatArray) -> float:
-    """NIS of the decoupled filter, which takes landmarks as known: S = H Sigma H^T + R with the pose covariance Sigma.
+    """NIS of the decoupled filter, which treats landmarks as known: S = H Sigma H^T + R with the pose covariance Sigma.
 
     NaN where it is not finite.
     """
@@ -28,7 +28,7 @@ def decoupled_nis(innovation: PoseInnovation, covariance: FloatArray) -> float:
 def three_row_nis(posterior: PosePosterior, innovation: PoseInnovation) -> float:
     """NIS over the three rows, from a pose update in which every observation had weight 1.
 
-    The squared norm of the printed four rows is larger by (vL - vR)^2 / (2 V), which no state changes.
+    The squared norm of the printed four rows is larger by (vL - vR)^2 / (2 V), which does not depend on the state.
     """
     if innovation.residual.shape[1] == len(ROWS):
         return posterior.nis

@@ -15,7 +15,7 @@ from .motion_model import POSE
 
 
 class PoseInnovation(NamedTuple):
-    """Innovation of n observations of known landmarks, in r rows each, with its Jacobian by the pose."""
+    """Innovation of n observations of known landmarks, r rows each, with its Jacobian by the pose."""
 
     residual: FloatArray
     """(n, r) z - z~, px"""
@@ -37,9 +37,9 @@ def pose_innovation(
     points: FloatArray,
     pixel: FloatArray,
 ) -> PoseInnovation:
-    """Residuals and Jacobians of world points (n, 3) seen at pixels (n, 4) from a pose (4, 4) (equation 13).
+    """Innovation of world points (n, 3) observed at pixels (n, 4) from a pose (4, 4) (equation 13).
 
-    In the rows of `StereoMeasurement.documented_innovation`.
+    Its rows are those of `StereoMeasurement.documented_innovation`.
     """
     predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
     residual, rows, variance = measurement.documented_innovation(pixel, predicted.pixel)
@@ -60,17 +60,18 @@ class PosePosterior(NamedTuple):
 
 
 def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> PosePosterior:
-    """Pose update (equation 13) in square-root form: linear cost in the observations, positive definite result.
+    """Pose update (equation 13) in square-root form: cost linear in the observations, positive definite result.
 
     With Sigma = L L^T and B = V^-1/2 H L: (I - K H) Sigma = L (I + B^T B)^-1 L^T, and L^-1 K (z - z~) is the least
-    squares solution of [B; I] x = [V^-1/2 (z - z~); 0]. The QR decomposition [B; I] = Q R gives both without forming
-    B^T B, which a landmark near the camera plane would leave with no correct digit; rows by size and column pivoting
-    make it accurate row by row (Cox and Higham, 1998). The eigenvalues of R^T R, none below 1, are those of
-    (H Sigma H^T + V) V^-1 that differ from 1, which gives the condition number of the innovation covariance. What is
-    left of the least squares, its residual, has the squared norm of the innovation.
+    squares solution of [B; I] x = [V^-1/2 (z - z~); 0]. The QR decomposition [B; I] = Q R gives both without B^T B,
+    which has no correct digit for a landmark near the camera plane. Sorting rows by size and pivoting columns make it
+    row-wise stable (Cox and Higham, 1998).
 
-    `weight` (n,) multiplies V^-1 of each observation. Raises numpy's LinAlgError where `covariance` is not positive
-    definite or the innovation not finite.
+    The eigenvalues of R^T R, all at least 1, are those of (H Sigma H^T + V) V^-1 that differ from 1; they give the
+    condition number of the innovation covariance. The squared norm of the least-squares residual is the NIS.
+    `weight` (n,) multiplies V^-1 of each observation.
+
+    Raises numpy's LinAlgError where `covariance` is not positive definite or the innovation is not finite.
     """
     if not (np.isfinite(innovation.jacobian).all() and np.isfinite(innovation.residual).all()):
         raise np.linalg.LinAlgError("the innovation is not finite")
@@ -92,7 +93,7 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
 def standard_form_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
     """Posterior covariance (n, n) as equation 13 prints it, (I - K H) Sigma, with its rounding errors.
 
-    Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
+    Raises numpy's LinAlgError where H Sigma H^T + I (x) V is singular.
     """
     n = len(covariance)
     H = np.pad(innovation.jacobian.reshape(-1, POSE), ((0, 0), (0, n - POSE)))

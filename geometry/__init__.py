@@ -1,4 +1,4 @@
-"""Rotations, rigid motions, the stereo camera and its measurement model on stacked arrays; the error base class."""
+"""Rotations, rigid motions, stereo camera and measurement model on stacked arrays; the error base class."""
 
 from . import se3, so3, strapdown
 from .errors import FgbaselineError, InputError

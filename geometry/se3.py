@@ -1,8 +1,8 @@
 """Rigid motions on stacked arrays.
 
-Poses are 4x4 matrices `a_T_b`, taking coordinates in b to coordinates in a. Twists are `[v, w]`: translation (m)
-before rotation (rad), in the body frame. Perturbations are on the right, `T = mu @ exp(delta)`, as in equations 9
-and 13 of the report. The leading axes of every array are a batch.
+Poses are 4x4 matrices `a_T_b`, which take coordinates in b to coordinates in a. Twists are `[v, w]`: translation (m)
+before rotation (rad), in the body frame. Perturbations are on the right, `T = mu @ exp(delta)`, as in equations 9 and
+13 of the source paper. The leading axes of every array are a batch.
 """
 
 import math

@@ -28,7 +28,7 @@ def hat3(vector: ArrayLike) -> FloatArray:
 
 
 class AngleCoefficients(NamedTuple):
-    """The four scalar functions of a rotation angle that closed forms of SO(3) and SE(3) are made of."""
+    """Scalar functions of a rotation angle in the closed forms of SO(3) and SE(3)."""
 
     sine: FloatArray
     """sin(x) / x"""
@@ -45,7 +45,7 @@ def angle_coefficients(angle: FloatArray) -> AngleCoefficients:
     x2 = angle * angle
     return AngleCoefficients(
         sine=np.where(small, 1.0 - x2 / 6.0, np.sin(x) / x),
-        # 2 sin^2(x/2) has no cancellation where 1 - cos(x) has.
+        # 2 sin^2(x/2) avoids the cancellation in 1 - cos(x).
         cosine=np.where(small, 0.5 - x2 / 24.0, 2.0 * np.sin(0.5 * x) ** 2 / (x * x)),
         cubic=np.where(small, 1.0 / 6.0 - x2 / 120.0, (x - np.sin(x)) / (x * x * x)),
     )
@@ -100,7 +100,7 @@ def quaternion_xyzw(rotation: ArrayLike) -> FloatArray:
 
 
 def rotation_from_quaternion(xyzw: ArrayLike) -> FloatArray:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4), x y z w, normalised here."""
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), x y z w, which are normalized here."""
     q = np.asarray(xyzw, dtype=np.float64)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     skew = hat3(q[..., :3])
@@ -122,10 +122,10 @@ def rotation_angle(rotation: ArrayLike) -> FloatArray:
 
 
 def twist_angle(axis: ArrayLike, rotation: ArrayLike) -> FloatArray:
-    """Angles (...,) in radians, -pi to pi, by which rotation matrices (..., 3, 3) turn about a unit axis (3,).
+    """Angles (...,) in radians, -pi to pi, of the twist of rotations (..., 3, 3) about a unit axis (3,).
 
-    That of the rotation about the axis which is nearest to them: their twist. Zero where they turn by pi about an axis
-    square to it, and there is none.
+    The twist is the rotation about the axis that is nearest to the given one (swing-twist decomposition). It is zero
+    where it is undefined, at a rotation by pi about a perpendicular axis.
     """
     a, R = np.asarray(axis, dtype=np.float64), np.asarray(rotation, dtype=np.float64)
     antisymmetric = np.stack(
@@ -146,8 +146,8 @@ def rotation_to_z(vector: ArrayLike) -> FloatArray:
 
 
 def orthogonality_error(matrix: ArrayLike) -> FloatArray:
-    """How far matrices (..., 3, 3) are from proper rotations: the largest entry of |R^T R - I| and |det R - 1|."""
-    # Columns apart: ten times as fast as stacked products, determinants and reductions over axes of three.
+    """Largest entry of |R^T R - I| and |det R - 1| of matrices (..., 3, 3); zero for proper rotations."""
+    # Separate columns are ten times as fast as stacked products and determinants.
     a, b, c = np.moveaxis(np.asarray(matrix, dtype=np.float64), (-1, -2), (0, 1)).copy()
 
     def dot(x: FloatArray, y: FloatArray) -> FloatArray:

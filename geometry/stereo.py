@@ -1,12 +1,12 @@
-"""The rectified stereo camera: pixel rows `[uL, vL, uR, vR]` of a point in the left camera's frame (equation 10).
+"""Rectified stereo camera: pixels [uL, vL, uR, vR] of a point in the left camera frame (equation 10).
 
-The pair sees the homogeneous point q = (x, y, z, w), w being 1 for a point at a finite distance, at
+The pair observes the homogeneous point q = (x, y, z, w), with w = 1 for a point at a finite distance, at
 
     uL = fu x/z + cu,    uR = uL - fu b w/z,    v = fv y/z + cv,
 
-with vL = vR = v. `StereoCamera.rows` and `row_derivatives` are these three rows and their derivatives; every prediction and
-every Jacobian of the toolkit is made of them. Coordinates are the first axis: with stacks of small matrices what runs
-over many observations takes several times as long.
+with vL = vR = v. `StereoCamera.rows` and `row_derivatives` give these three rows and their derivatives, from which all
+predictions and Jacobians are built. Coordinates are the first axis, because stacks of small matrices are several times
+slower over many observations.
 """
 
 from dataclasses import dataclass
@@ -18,26 +18,26 @@ from numpy.typing import ArrayLike
 from .so3 import FloatArray
 
 PIXEL_ROWS = (0, 2, 1, 2)
-"""which of the three rows (uL, uR, v) predicts each of the printed four, uL, vL, uR, vR"""
+"""index into (uL, uR, v) of the prediction of each of uL, vL, uR, vR"""
 MIN_DEPTH = 0.5
-"""baselines: a nearer point is in both images only of cameras that see more than 90 degrees; at the camera's plane the
-Jacobian is without bound"""
+"""Smallest depth in baselines. Nearer points are in both images only with more than 90 degrees of view, and at the
+camera plane the Jacobian is unbounded."""
 
 
 class StereoRows(NamedTuple):
-    """Where a pair sees points; every array has its coordinate first, then the points (...)."""
+    """Predicted rows of points, with what their derivatives need; coordinates first, then the points (...)."""
 
     pixel: FloatArray
     """(3, ...) uL, uR and v, px"""
-    slope: FloatArray
-    """(3, ...) x/z, y/z and w/z (1/m)"""
-    near: FloatArray
+    normalized: FloatArray
+    """(3, ...) x/z, y/z and w/z (1/m), normalized by depth"""
+    inverse_depth: FloatArray
     """(...) 1/z, 1/m"""
 
 
 @dataclass(frozen=True, slots=True)
 class StereoCamera:
-    """Intrinsics of a rectified stereo pair; z looks forward, x right, y down. Focal lengths and centre in pixels."""
+    """Intrinsics of a rectified stereo pair, px; z points forward, x right, y down."""
 
     fu: float
     fv: float
@@ -48,13 +48,13 @@ class StereoCamera:
 
     @property
     def min_depth(self) -> float:
-        """m: a point nearer to the camera's plane than `MIN_DEPTH` baselines does not count as in front of it."""
+        """Smallest depth (m) of a point in front of the camera: `MIN_DEPTH` baselines."""
         return MIN_DEPTH * self.baseline
 
     def rows(self, q: FloatArray) -> StereoRows:
-        """The rows of points q (3, ...) in the left camera's frame in m, or of homogeneous ones (4, ...).
+        """Rows of points q (3, ...) in the left camera frame, m, or of homogeneous points (4, ...).
 
-        Points behind the camera are projected by the same formula, as the report does; divides by zero at its plane.
+        Points behind the camera are projected by the same formula, as in the source paper. Divides by zero at z = 0.
         """
         near = 1.0 / q[2]
         slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
@@ -65,10 +65,10 @@ class StereoCamera:
         return StereoRows(pixel, slope, near)
 
     def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
-        """Derivatives (3, k, ...) of the rows along k motions of the points, `along` (3 or 4, k, ...) in m.
+        """Directional derivatives (3, k, ...) of the rows along k directions `along` (3 or 4, k, ...), m.
 
-        `along[i]` is how the coordinate i of q changes with each of the k parameters; a point at a finite distance has
-        three coordinates, its w does not change.
+        `along[i]` is the derivative of coordinate i of q by each of the k parameters. Three coordinates suffice for
+        points at a finite distance, where w is constant.
         """
         x, y, w = seen.normalized
         left = (self.fu * seen.inverse_depth) * (along[0] - x * along[2])
@@ -77,16 +77,15 @@ class StereoCamera:
         return np.stack([left, right, (self.fv * seen.inverse_depth) * (along[1] - y * along[2])])
 
     def project(self, points: ArrayLike) -> FloatArray:
-        """Pixels (..., 4), uL, vL, uR, vR, of points (..., 3) in the left camera's frame, m (equation 10).
+        """Pixels uL, vL, uR, vR (..., 4) of points (..., 3) in the left camera frame, m (equation 10).
 
-        Points behind the camera are projected by the same formula, as the report does; `points[..., 2] > 0` are those
-        in front.
+        Points behind the camera (`points[..., 2] <= 0`) are projected by the same formula, as in the source paper.
         """
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         return np.ascontiguousarray(np.moveaxis(self.rows(q).pixel[list(PIXEL_ROWS)], 0, -1))
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
-        """Derivatives (..., 4, 3) of `project` with respect to points (..., 3): K_s dpi/dq in equations 11, 13."""
+        """Jacobian (..., 4, 3) of `project` by points (..., 3): K_s dpi/dq in equations 11 and 13."""
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         identity = np.eye(3).reshape(3, 3, *([1] * (q.ndim - 1)))
         along = np.broadcast_to(identity, (3, 3, *q.shape[1:]))
@@ -94,10 +93,10 @@ class StereoCamera:
         return np.ascontiguousarray(np.moveaxis(J, (0, 1), (-2, -1)))
 
     def triangulate(self, pixels: ArrayLike) -> FloatArray:
-        """Points (..., 3) in the left camera's frame, m, of pixels (..., 4).
+        """Triangulates pixels (..., 4) to points (..., 3) in the left camera frame, m.
 
-        Depth comes from uL - uR and height from vL, also where the disparity is not positive (the point then lies
-        behind the camera, or at infinity for a disparity of zero: the caller decides whether that may take part).
+        Depth comes from the disparity uL - uR, height from vL. A negative disparity gives a point behind the camera, a
+        disparity of zero one at infinity; the caller decides whether to use them.
         """
         z_pixels = np.asarray(pixels, dtype=np.float64)
         uL, vL = z_pixels[..., 0], z_pixels[..., 1]
@@ -107,7 +106,7 @@ class StereoCamera:
 
 
 def disparity(pixels: ArrayLike) -> FloatArray:
-    """uL - uR (...,) in pixels of observations (..., 4)."""
+    """Disparities uL - uR (...,), px, of observations (..., 4)."""
     z = np.asarray(pixels, dtype=np.float64)
     result: FloatArray = z[..., 0] - z[..., 2]
     return result

@@ -1,7 +1,7 @@
-"""Points from many views, with the poses given: damped Gauss-Newton over all tracks at once.
+"""Multi-view triangulation with known poses: damped Gauss-Newton over all tracks at once.
 
-Every point has its own damping and is done when its own step is small. Each coordinate is in an array of its own over
-the observations, which are sorted by point: with stacks of small matrices it takes several times as long.
+Each point has its own damping and its own convergence test. Each coordinate is a separate array over the observations,
+sorted by point, because stacks of small matrices are several times slower.
 """
 
 from typing import NamedTuple
@@ -15,20 +15,20 @@ from .stereo import disparity
 
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-8
-"""relative to the point's distance from the camera that saw it nearest"""
+"""step at convergence, relative to the distance from the nearest camera that observed the point"""
 NEWTON = 1e-2
-"""step, relative to the same distance, from which on the curvature of the kernel counts: without it a point with
-outliers comes nearer by no more than half with every step, with it far away it may be led astray"""
+"""Relative step below which the second-order term of the kernel is used. Without it a point with outliers converges
+only linearly; with it far from the minimum the step may point away from it."""
 DAMPED = 1.0
-"""damping from which on a small step may be one that was held back, and is no sign that the point has arrived"""
+"""damping above which a small step is due to the damping and no sign of convergence"""
 FEWER = 0.5
-"""share of the points that still move, below which the others are put aside"""
+"""share of unconverged points below which the converged ones are removed from the iteration"""
 LEAST_PIVOT = 1e-12
-"""1/baseline^2: no pivot of an information matrix can be less, but by rounding"""
+"""1/baseline^2: lower bound of a pivot of an information matrix, against rounding"""
 
 
 class Triangulated(NamedTuple):
-    """m points, in the frame that the poses lead to."""
+    """m points, in the reference frame of the poses."""
 
     position: FloatArray
     """(m, 3) m; NaN where no observation has a positive disparity"""
@@ -37,28 +37,27 @@ class Triangulated(NamedTuple):
 
 
 class _Observed(NamedTuple):
-    """n observations of m points, sorted by point; every point has one.
+    """n observations of m points, sorted by point; each point has at least one.
 
-    Each point has its own origin, the camera that saw it nearest, and its own part of the world in view: what is
-    computed here does not depend on where the origin of the world is.
+    The origin of each point is the nearest camera that observed it. The result does not depend on the world origin.
     """
 
     row: NDArray[np.int64]
     """(n,) 0..m-1"""
     start: NDArray[np.int64]
-    """(m,) the first of each point"""
+    """(m,) index of the first observation of each point"""
     axes: FloatArray
-    """(3, 3, n) of the camera, the second index, in the world"""
-    centre: FloatArray
-    """(3, n) m, of the camera, from the origin of the point"""
+    """(3, 3, n) camera axes (second index) in the world"""
+    center: FloatArray
+    """(3, n) m, camera center relative to the origin of the point"""
     measured: FloatArray
     """(3, n) uL, uR and v, px"""
 
     def of(self, chosen: NDArray[np.bool_]) -> "_Observed":
-        """Those of the chosen points (m,), numbered anew."""
+        """Observations of the chosen points (m,), renumbered."""
         keep = np.flatnonzero(chosen[self.row])
         row = (np.cumsum(chosen) - 1)[self.row[keep]]
-        return _Observed(row, _starts(row), self.axes[:, :, keep], self.centre[:, keep], self.measured[:, keep])
+        return _Observed(row, _starts(row), self.axes[:, :, keep], self.center[:, keep], self.measured[:, keep])
 
 
 def triangulate_tracks(
@@ -69,11 +68,12 @@ def triangulate_tracks(
     n_points: int,
     tolerance: float = STEP_TOLERANCE,
 ) -> Triangulated:
-    """The points that minimise the loss of n stereo observations under their measurement model, poses held.
+    """Triangulates n stereo observations of m points by minimizing the loss of the measurement model, poses held fixed.
 
-    `world_T_cam` (n, 4, 4) is the left camera's pose of each observation, `row` (n,) the point (0..m-1) it sees,
-    `pixel` (n, 4) what it measured. Starts at the back-projection with the largest disparity; a step that raises a
-    point's cost is refused and damped. A point is done when its step is at most `tolerance` of its distance.
+    `world_T_cam` (n, 4, 4) is the left camera pose of each observation, `row` (n,) the index of its point (0..m-1) and
+    `pixel` (n, 4) the measurement. Starts at the back-projection with the largest disparity. A step that raises the
+    cost of a point is rejected and the damping raised. A point has converged when its relative step is at most
+    `tolerance`.
     """
     camera = measurement.camera
     position, information = np.full((n_points, 3), np.nan), np.zeros((n_points, 3, 3))
@@ -89,7 +89,7 @@ def triangulate_tracks(
     p = np.ascontiguousarray((reference[:, :3, :3] @ from_camera[finite, :, None])[:, :, 0].T)
     observed = _sorted(world_T_cam, row, pixel, n_points, place, origin)
     least = LEAST_PIVOT / camera.baseline**2
-    # Points at a camera's plane divide by zero; they cost infinitely much and nothing else comes of it.
+    # Points at a camera plane divide by zero; their cost is infinite and the step is rejected.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         damping = np.full(len(place), 1e-6)
         sums = _linearized(measurement, observed, p)
@@ -115,7 +115,8 @@ def triangulate_tracks(
 
 
 def _nearest_observations(row: NDArray[np.int64], pixel: FloatArray, n_points: int) -> NDArray[np.int64]:
-    """(m,) the observation of each point with the largest positive disparity, the last of equals; -1 where none has."""
+    """Observation (m,) of each point with the largest positive disparity, the last of equals; -1 where there is
+    none."""
     apart = disparity(pixel)
     order = np.argsort(apart, kind="stable")
     order = order[apart[order] > 0.0]
@@ -132,7 +133,7 @@ def _sorted(
     place: NDArray[np.int64],
     origin: FloatArray,
 ) -> _Observed:
-    """The observations of the points `place` (m,) with origins (m, 3), numbered by their place in it."""
+    """Observations of the points `place` (m,) with origins (m, 3), sorted by point."""
     number = np.full(n_points, -1, dtype=np.int64)
     number[place] = np.arange(len(place))
     order = np.argsort(number[row], kind="stable")
@@ -140,8 +141,8 @@ def _sorted(
     first = int(np.searchsorted(row, 0))
     order, row = order[first:], row[first:]
     axes = np.ascontiguousarray(np.moveaxis(world_T_cam[order, :3, :3], 0, 2))
-    centre = np.ascontiguousarray((world_T_cam[order, :3, 3] - origin[row]).T)
-    return _Observed(row, _starts(row), axes, centre, np.ascontiguousarray(measured_rows(pixel[order]).T))
+    center = np.ascontiguousarray((world_T_cam[order, :3, 3] - origin[row]).T)
+    return _Observed(row, _starts(row), axes, center, np.ascontiguousarray(measured_rows(pixel[order]).T))
 
 
 def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -149,10 +150,13 @@ def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _linearized(measurement: StereoMeasurement, observed: _Observed, p: FloatArray) -> FloatArray:
-    """(16, m) of points p (3, m): cost, then the upper triangle of J^T W J row by row, each row followed by its entry
-    of J^T W r, then the upper triangle of what the kernel's curvature takes off J^T W J."""
+    """Cost and normal equations (16, m) of points p (3, m).
+
+    Rows: cost; upper triangle of J^T W J row by row, each row followed by its entry of J^T W r; upper triangle of the
+    second-order correction that is subtracted from J^T W J.
+    """
     camera, axes = measurement.camera, observed.axes
-    q = (axes * (p[:, observed.row] - observed.centre)[:, None]).sum(axis=0)
+    q = (axes * (p[:, observed.row] - observed.center)[:, None]).sum(axis=0)
     seen, white = camera.rows(q), measurement.white_scale[:, None]
     A = np.empty((3, 4, q.shape[1]))
     A[:, :3] = camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
@@ -174,8 +178,10 @@ def _linearized(measurement: StereoMeasurement, observed: _Observed, p: FloatArr
 
 
 def _damped_step(sums: FloatArray, damping: FloatArray, near: NDArray[np.bool_], least: float) -> FloatArray:
-    """(3, m) m, by Cholesky's factors, whose pivots are at least `least` (1/m^2); with the kernel's curvature for the
-    points that are near."""
+    """Damped steps (3, m), m, by Cholesky factorization with pivots of at least `least` (1/m^2).
+
+    Points that are `near` the minimum use the second-order term of the kernel.
+    """
     a, b, c, d, e, f = sums[[1, 2, 3, 5, 6, 8]] - sums[10:] * near
     x, y, z = sums[[4, 7, 9]]
     more = 1.0 + damping

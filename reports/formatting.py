@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from math import isfinite, isinf
 
-from fgbaseline.data.plural import noun
+from fgbaseline.data.plural import plural
 
 DASH = "–"
 INFINITY = "∞"
@@ -26,25 +26,26 @@ _TEX = {
     "↓": r"$\downarrow$",
     "–": "--",
     MINUS: "$-$",
-    "\N{NARROW NO-BREAK SPACE}": r"\,",
 }
+counted = plural
+"""a count and its noun"""
 
 
 def number(value: object) -> str:
-    """A number to three significant digits (whole from 1000 on, counts in full), ∞, or a dash for None and NaN."""
+    """A number to three significant digits (whole from 1,000 on, counts in full), ∞, or a dash for None and NaN."""
     if isinstance(value, float) and isinf(value):
         return INFINITY if value > 0 else f"{MINUS}{INFINITY}"
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         return DASH
     if isinstance(value, int):
-        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+        return f"{value:,}".replace("-", MINUS)
     size = abs(value)
     if size == 0.0:
         return "0"
     if 1e-3 <= size < 999.5:
         return f"{value:#.3g}".rstrip(".").replace("-", MINUS)
     if 999.5 <= size < 1e6:
-        return number(round(value)).replace("-", MINUS)
+        return number(round(value))
     mantissa, exponent = f"{value:.2e}".split("e")
     return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", MINUS)
 
@@ -54,24 +55,19 @@ def interval(value: float, low: float, high: float) -> str:
     return f"{number(value)} [{number(low)}, {number(high)}]" if isfinite(low) and isfinite(high) else number(value)
 
 
-def counted(n: int, one: str, many: str = "") -> str:
-    """A count and its noun: `one` for 1, else `many`, by default `one` with an s."""
-    return f"{number(n)} {noun(n, one, many)}"
-
-
 def per_cent(share: float) -> str:
     """A share of one as per cent; a dash for NaN."""
     return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
 
 
 def meters(value: float) -> str:
-    """`0.35 m`, `79.6 m`, `1342 m`, `28.9 km`; `no path` for what is not finite."""
+    """`0.35 m`, `79.6 m`, `1,342 m`, `28.9 km`; `no path` for what is not finite."""
     if not isfinite(value):
         return "no path"
     size = abs(value)
     if size >= 9_999.5:
         return f"{value / 1000:.3g} km"
-    return f"{value:.0f} m" if size >= 999.5 else f"{value:.3g} m"
+    return f"{value:,.0f} m" if size >= 999.5 else f"{value:.3g} m"
 
 
 def pixels(value: float) -> str:

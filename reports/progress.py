@@ -3,26 +3,14 @@
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
-from typing import Protocol
+from contextlib import contextmanager
+from typing import TypeAlias
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from fgbaseline.data import Progress as FrameProgress
-
-
-class Reporter(Protocol):
-    """Tells a person how far a run has come."""
-
-    def say(self, text: str) -> None:
-        """One line on what happens next."""
-        ...
-
-    def estimator(self, name: str) -> AbstractContextManager[FrameProgress]:
-        """Around the work of one estimator; gives what is told of every frame."""
-        ...
 
 
 class _Speed(ProgressColumn):
@@ -34,18 +22,18 @@ class _Speed(ProgressColumn):
 
 
 class BarReporter:
-    """For a terminal."""
+    """Progress on a terminal."""
 
     def __init__(self) -> None:
         self._console = Console(stderr=True)
 
-    def say(self, text: str) -> None:
-        """A line above the bars."""
+    def print_line(self, text: str) -> None:
+        """Prints a line above the bars."""
         self._console.print(text, markup=False, highlight=False)
 
     @contextmanager
     def estimator(self, name: str) -> Iterator[FrameProgress]:
-        """A bar for one estimator."""
+        """Shows a bar for one estimator; yields the function that takes its frames done and in total."""
         columns = (TextColumn("{task.description:>16}", markup=False), BarColumn(), MofNCompleteColumn(), _Speed())
         with Progress(*columns, TimeRemainingColumn(), console=self._console) as bar:
             task = bar.add_task(name, total=None)
@@ -53,31 +41,34 @@ class BarReporter:
 
 
 class LineReporter:
-    """For a file or a pipe: a line when an estimator starts, every ten seconds, and when it has ended."""
+    """Progress in a file or a pipe: a line at the start of an estimator, every ten seconds, and at its end."""
 
     INTERVAL = 10.0
 
-    def say(self, text: str) -> None:
-        """A line."""
+    def print_line(self, text: str) -> None:
+        """Prints a line."""
         print(text, file=sys.stderr, flush=True)
 
     @contextmanager
     def estimator(self, name: str) -> Iterator[FrameProgress]:
-        """Lines for one estimator."""
-        start = told = time.monotonic()
-        self.say(f"{name}: started")
+        """Prints lines for one estimator; yields the function that takes its frames done and in total."""
+        start = printed = time.monotonic()
+        self.print_line(f"{name}: started")
 
         def progress(done: int, total: int, /) -> None:
-            nonlocal told
+            nonlocal printed
             now = time.monotonic()
-            if now - told >= self.INTERVAL:
-                told = now
-                self.say(f"{name}: frame {done} of {total}, {done / (now - start):.0f} frames/s")
+            if now - printed >= self.INTERVAL:
+                printed = now
+                self.print_line(f"{name}: frame {done} of {total}, {done / (now - start):.0f} frames/s")
 
         yield progress
-        self.say(f"{name}: ended after {time.monotonic() - start:.1f} s")
+        self.print_line(f"{name}: finished after {time.monotonic() - start:.1f} s")
+
+
+Reporter: TypeAlias = BarReporter | LineReporter
 
 
 def reporter() -> Reporter:
-    """The one that fits standard error."""
+    """The reporter for this standard error."""
     return BarReporter() if sys.stderr.isatty() else LineReporter()

@@ -1,4 +1,4 @@
-"""The fixture `assert_accuracy` for tests of other projects; nothing of ours is imported before a test asks for it."""
+"""Pytest plugin with the fixture `assert_accuracy`; fgbaseline is imported when a test first uses it."""
 
 import re
 from collections.abc import Callable
@@ -10,19 +10,19 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--accuracy-figures DIR`, for CI systems that keep a folder."""
+    """Adds `--accuracy-figures DIR`, for CI systems that archive a folder."""
     parser.getgroup("fgbaseline").addoption(
         "--accuracy-figures",
         metavar="DIR",
         type=Path,
-        help="Folder for the figures of trajectories that fall short.  [default: the test's tmp_path]",
+        help="Folder for the figures of trajectories that fall short of a limit.  [default: the test's tmp_path]",
     )
 
 
 @pytest.fixture
 def assert_accuracy(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., dict[str, float]]:
-    """`fgbaseline.reports.checking.assert_accuracy`, whose figure is named after the test."""
-    from .checking import assert_accuracy as asserted
+    """`fgbaseline.reports.accuracy_check.assert_accuracy`, whose figure has the test's name."""
+    from .accuracy_check import assert_accuracy as asserted
 
     folder = request.config.getoption("--accuracy-figures") or tmp_path
     stem = re.sub(r"[^\w.-]+", "_", request.node.name)

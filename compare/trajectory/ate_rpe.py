@@ -4,6 +4,7 @@ E = A^-1 B takes one pose, or one motion, to another. `PoseRelation` names what 
 """
 
 from enum import StrEnum
+from typing import TypedDict, Unpack
 
 import numpy as np
 import pandas as pd
@@ -105,23 +106,28 @@ MOTION_COLUMNS = (
 )
 
 
+class Pairing(TypedDict, total=False):
+    """How pairs of poses are chosen: see `matched_pairs`."""
+
+    all_pairs: bool
+    """False by default: consecutive pairs, end to end"""
+    tolerance: float
+    """share of the delta, `TOLERANCE` by default"""
+    from_reference: bool
+    """True by default: pairs of the reference, not of the estimate"""
+
+
 def relative_errors(
-    matched: MatchedTrajectories,
-    delta: float,
-    unit: Unit | str,
-    *,
-    all_pairs: bool = False,
-    tolerance: float = TOLERANCE,
-    from_reference: bool = True,
+    matched: MatchedTrajectories, delta: float, unit: Unit | str, **pairing: Unpack[Pairing]
 ) -> pd.DataFrame:
-    """RPE: one row per pair of poses that are `delta` apart (see `pose_pairs`), with the columns
+    """RPE: one row per pair of poses that are `delta` apart (see `matched_pairs`), with the columns
 
     `start`, `end` (indices of the matched poses), `t` (s, of the start), `seconds` and `metres` (of the reference's
     path) between them, and `PoseRelation` of the motion from start to end: `translation` (m, in the frame
     of the starting body), `rotation_deg`, `rotation_chord`, `pose`, `distance` (m) and `distance_percent`.
     """
     reference, estimate = matched.reference, matched.estimate
-    pairs = matched_pairs(matched, delta, unit, all_pairs=all_pairs, tolerance=tolerance, from_reference=from_reference)
+    pairs = matched_pairs(matched, delta, unit, **pairing)
     travelled = distance_traveled(reference.position)
     start, end = pairs[:, 0], pairs[:, 1]
     columns = {
@@ -151,7 +157,8 @@ def matched_pairs(
 ) -> IntArray:
     """Pairs (m, 2) of `pose_pairs` on the reference, hence equal for every estimate, or on the estimate itself.
 
-    Raises InputError for seconds without time stamps."""
+    Raises InputError for seconds without time stamps.
+    """
     path = matched.reference if from_reference else matched.estimate
     if Unit(unit) is Unit.SECONDS:
         require_stamps(matched)

@@ -6,8 +6,8 @@ from .ground_truth import BodyFrame, attach_truth
 from .kitti import read_times, write_kitti
 from .landmark_file import read_landmarks
 from .npz_writer import write_npz
-from .recording import read
 from .parsed_trajectory import ParsedTrajectory
+from .recording import read
 from .trajectory_npz import write_trajectory_npz
 from .trajectory_reader import (
     TrajectoryFormat,

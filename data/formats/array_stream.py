@@ -1,4 +1,4 @@
-"""An array in a file, opened behind its header and read piece by piece, trusting nothing the file says of itself."""
+"""Array in a file, read piece by piece after its header, without trust in what the header claims."""
 
 import math
 import os
@@ -13,11 +13,11 @@ from fgbaseline.geometry import FloatArray, InputError
 
 Shape = tuple[int, ...]
 WHOLE_ARRAY_LIMIT = 256 * 2**20
-"""bytes: an array that is read whole and claims more than this is a mistake or an attack"""
+"""bytes; a larger claim of an array that is read whole is a mistake or an attack"""
 
 
 class Readable(Protocol):
-    """Bytes in their order: a file, a member of an archive, a compressed element."""
+    """Sequential bytes: a file, a member of an archive, or a compressed element."""
 
     def read(self, n: int, /) -> bytes:
         """The next n bytes; fewer only at the end."""
@@ -26,7 +26,7 @@ class Readable(Protocol):
 
 @contextmanager
 def damage_as_input_error(key: str) -> Iterator[None]:
-    """Parsers and decompressors raise a dozen types on damaged input: here they become one InputError."""
+    """Converts the many exceptions of parsers and decompressors on damaged input into one InputError."""
     try:
         yield
     except InputError:
@@ -37,16 +37,16 @@ def damage_as_input_error(key: str) -> Iterator[None]:
 
 
 def missing(key: str, keys: frozenset[str]) -> InputError:
-    """The error for an array that is not in the file, which has `keys`."""
+    """InputError for an array that is missing among the `keys` of a file."""
     found = ", ".join(repr(k) for k in sorted(keys)[:16]) or "nothing"
     return InputError(f"{key} is missing; the file has {found}")
 
 
 def require_room(key: str, shape: Shape, dtype: np.dtype[Any], memory: int | None = None) -> None:
-    """Raises InputError, with its size, for an array that claims more bytes than this machine has memory (`memory`).
+    """Raises InputError, with its size, for an array that claims more bytes than the machine's memory (`memory`).
 
-    It would be read piece by piece and not held, but so large a block of features is a mistake or an attack, and its
-    zeros may be packed into a small file that takes hours.
+    Such an array would be read piece by piece and not held. But a feature block of that size is a mistake or an attack,
+    and its zeros may be compressed into a small file that takes hours to read.
     """
     memory = _machine_memory() if memory is None else memory
     claimed = math.prod(shape) * dtype.itemsize
@@ -58,7 +58,7 @@ def require_room(key: str, shape: Shape, dtype: np.dtype[Any], memory: int | Non
 
 
 def _machine_memory() -> int | None:
-    """Bytes; None where the system does not tell."""
+    """Memory of this machine, bytes; None where the system does not report it."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -67,7 +67,7 @@ def _machine_memory() -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class ArrayStream:
-    """One array, opened behind its header: `take` gives its values in the order they lie in."""
+    """Array opened after its header; `take` returns its values in storage order."""
 
     key: str
     shape: Shape

@@ -17,13 +17,13 @@ _HERE = -100
 _EXCHANGE = 2
 """RENAME_EXCHANGE"""
 _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP)
-"""what a kernel or a file system says that cannot"""
+"""error numbers of kernels and file systems without this operation"""
 
 
 def exchanged(one: Path, other: Path) -> bool:
-    """Whether the two existing paths have changed their names; False, and nothing done, where the system cannot.
+    """Exchanges the names of two existing paths; False, with nothing changed, if the system cannot.
 
-    Raises OSError where it can and fails.
+    Raises OSError if the system supports it and fails.
     """
     rename = _renameat2()
     if rename is None:
@@ -48,10 +48,9 @@ def _renameat2() -> Any:
 
 
 def require_free(place: Path, *, force: bool, mark: str) -> None:
-    """Raises InputError where `place` exists and may not be replaced, or where no folder can be made.
+    """Raises InputError where `place` exists and may not be replaced, or where no folder can be created.
 
-    With `force` an empty folder may be replaced, and one that holds the file `mark`, which says that it is of our
-    making.
+    `force` allows the replacement of an empty folder, and of one that holds the file `mark`, which our commands write.
     """
     with _refusals(place):
         if not place.exists() and not place.is_symlink():
@@ -70,7 +69,7 @@ def require_free(place: Path, *, force: bool, mark: str) -> None:
 
 @contextmanager
 def atomic_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
-    """A folder to write into that becomes `place` when the block ends well; otherwise nothing is left of it.
+    """Folder to write into that becomes `place` when the block succeeds; otherwise nothing is left of it.
 
     Raises InputError, before the block runs, where `place` may not be written (see `require_free`).
     """
@@ -98,15 +97,15 @@ def _require_room(place: Path) -> None:
 
 
 def _replace(place: Path, building: Path, mark: str) -> None:
-    """`building` in place of the folder `place`, if there is one.
+    """Replaces the folder `place`, if it exists, by `building`.
 
-    Where the system can exchange two names in one step, `place` is one of both whole folders at every moment, even if
-    the process is killed; elsewhere the old one comes back if the exchange fails or is interrupted.
+    If the system can exchange two names in one step, `place` is always a complete folder, even if the process is
+    killed. Otherwise the old folder is restored if the exchange fails or is interrupted.
     """
     if not place.exists():
         building.rename(place)
         return
-    if exchanged(building, place):  # the old one is where the new one was built, and goes with it
+    if exchanged(building, place):  # the old folder now has the temporary name and is removed with it
         return
     old = place.with_name(f".{place.name}.{os.getpid()}.old")
     try:
@@ -119,14 +118,14 @@ def _replace(place: Path, building: Path, mark: str) -> None:
 
 
 def _remove(folder: Path, mark: str) -> None:
-    """Removes a folder, first of all the file that says that it is whole."""
+    """Removes a folder, its completeness mark first."""
     with suppress(OSError):
         (folder / mark).unlink()
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Removes folders, innermost first, up to the first that holds something."""
+    """Removes empty folders, innermost first."""
     for folder in folders:
         try:
             folder.rmdir()
@@ -136,7 +135,7 @@ def _remove_empty(folders: list[Path]) -> None:
 
 @contextmanager
 def _refusals(place: Path) -> Iterator[None]:
-    """Within it, an OSError comes out as an InputError that names the folder."""
+    """Converts an OSError in the block into an InputError that names the folder."""
     try:
         yield
     except OSError as error:

@@ -13,7 +13,7 @@ from .named_file import FilePath, shown, writing
 
 @contextmanager
 def atomic_write(path: FilePath) -> Iterator[IO[bytes]]:
-    """A binary file that becomes `path` when the block ends well; otherwise nothing is left and `path` is as before.
+    """Binary file that becomes `path` when the block succeeds; otherwise `path` is unchanged.
 
     Raises InputError naming the file when it cannot be written.
     """

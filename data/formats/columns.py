@@ -1,4 +1,4 @@
-"""Which column of a trajectory file is what: by the names in its header, or by how many columns there are."""
+"""Columns of a trajectory file, identified by the names in its header or by their count."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from fgbaseline.geometry import InputError
 from .number_table import Lines, split
 
 Order = Literal["xyzw", "wxyz"]
-"""in which a quaternion's numbers stand"""
+"""order of a quaternion's components"""
 XYZW_FIRST: tuple[Order, ...] = ("xyzw", "wxyz")
 WXYZ_FIRST: tuple[Order, ...] = ("wxyz", "xyzw")
 
@@ -21,7 +21,7 @@ UNITS = {
     "ns": ("ns", "nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds"),
 }
 TIME = ("stamp", "timestamp", "timestamps", "time", "times", "t")
-"""names of stamps, the better ones first"""
+"""names of time stamps, preferred ones first"""
 NUMBER = ("frame", "index", "idx", "id", "seq", "")
 POSITION = {"p", "t", "pos", "position", "trans", "translation", "location", "point"}
 QUATERNION = {"q", "quat", "quaternion", "orientation", "rotation", "rot", "ori", "attitude"}
@@ -30,37 +30,37 @@ NO_POSITION = QUATERNION | {
     *("bg", "ba", "bw", "bias", "std", "sigma", "cov", "covariance", "err", "error", "var", "a", "euler", "rpy", "g"),
 }
 OPENVINS = [f"p{part}{i}{k}" for part in "rt" for i in (1, 2, 3) for k in (1, 2, 3) if k >= i]
-"""the names of its covariances: rotation, then translation, the upper triangles"""
+"""names of OpenVINS covariances: rotation, then translation, upper triangles"""
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The places of what a trajectory file has, from 0."""
+    """Column indices of a trajectory file, from 0."""
 
     position: tuple[int, ...] = ()
     quaternion: tuple[int, ...] = ()
-    """in the order of `orders[0]`; none where there are positions only"""
+    """columns in the order of `orders[0]`; empty for positions only"""
     orders: tuple[Order, ...] = ("xyzw",)
-    """the orders that the four may have, the usual one first; one where a header names them"""
+    """possible orders of the quaternion, the usual one first; one if a header names them"""
     matrix: tuple[int, ...] = ()
-    """the 12 numbers of the upper three rows of a pose"""
+    """12 numbers of the upper three rows of a pose"""
     time: int | None = None
     nanoseconds: int | None = None
-    """the rest of stamps whose whole seconds are in `time`"""
+    """nanoseconds of stamps whose whole seconds are in `time`"""
     number: int | None = None
-    """numbers of frames, in place of stamps"""
+    """frame numbers, in place of stamps"""
     unit: str | None = None
-    """of the stamps, where the header has it"""
+    """unit of the stamps, if the header has it"""
     covariance: tuple[int, ...] = ()
     """12 of OpenVINS, or 36 as in ROS"""
     remark: str = ""
-    """what is worth reporting about how they were found"""
+    """remark on the identification"""
 
 
 def named_columns(lines: Lines) -> Columns | None:
-    """The columns by the names in the header: the line above the data, or a comment there. None without such names.
+    """Columns by the names in the header: the line above the data, or a comment there; None without such names.
 
-    Raises InputError where a line of names is there but names no position or not each column.
+    Raises InputError for a header that names no position or not each column.
     """
     for comment in reversed(lines.comments):
         names = names_of(comment, lines.separator)
@@ -83,7 +83,7 @@ def named_columns(lines: Lines) -> Columns | None:
 
 
 def names_of(header: str, separator: str | None) -> list[str]:
-    """The names of columns in a header."""
+    """Column names in a header."""
     header = header.strip().rstrip(",;")
     if separator is None and "," in header:
         separator = ","
@@ -95,9 +95,9 @@ def names_of(header: str, separator: str | None) -> list[str]:
 
 
 def counted_columns(lines: Lines, *, whole: bool) -> Columns:
-    """The columns by their count, where no header names them; `whole`: the stamps are whole numbers.
+    """Columns by their count, without a header; `whole` is True for integer stamps.
 
-    Raises InputError for a count that no known format has.
+    Raises InputError for a count of no known format.
     """
     width, comma = lines.width, lines.separator is not None
     if width in (16, 17) and lines.words(0)[-4:] and _is_last_row(lines.words(0)[-4:]):

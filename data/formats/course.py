@@ -126,7 +126,7 @@ def _camera(archive: NpzArchive) -> StereoCamera:
     if np.abs(K[2] - [0.0, 0.0, 1.0]).max() > EXACT:
         raise InputError(f"K: its last row is {K[2].tolist()}, expected [0, 0, 1]; write the calibration in pixels")
     fu, fv = (positive(f"K[{i}, {i}]", K[i, i], "a focal length in pixels") for i in (0, 1))
-    b = positive("b", archive.array("b"), "the baseline in metres")
+    b = positive("b", archive.array("b"), "the baseline in meters")
     return StereoCamera(fu, fv, float(K[0, 2]), float(K[1, 2]), b)
 
 

@@ -25,7 +25,7 @@ def write_euroc(path: FilePath, t: FloatArray, world_T_body: FloatArray) -> None
     nanoseconds = [_nanoseconds(stamp) for stamp in stamps.tolist()]
     for before, after in pairwise(nanoseconds):
         if after <= before:
-            raise InputError(f"two stamps are the same nanosecond ({after}), which EuRoC files cannot tell apart")
+            raise InputError(f"two stamps are the same nanosecond ({after}), which EuRoC files cannot distinguish")
     wxyz = np.roll(so3.quaternion_xyzw(poses[:, :3, :3]), 1, axis=1)
     rows = np.concatenate([poses[:, :3, 3], wxyz], axis=1).tolist()
     lines = [",".join([str(ns), *map(repr, row)]) for ns, row in zip(nanoseconds, rows, strict=True)]

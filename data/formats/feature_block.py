@@ -1,14 +1,13 @@
-"""The recorded block of features (4, N, T), -1 where unobserved, turned into flat observations piece by piece.
+"""Feature block (4, N, T) of a recording, -1 where unobserved, converted piece by piece into flat observations.
 
-The dense block is never held: of 4 x 13289 x 3026 doubles (1.29 GB) some ten thousandths are observations.
+The dense block is never held: of 4 x 13289 x 3026 doubles (1.29 GB) less than 1 % are observations.
 
-An entry is unobserved when all four of its rows are exactly -1. Anything else must be four finite pixel
-coordinates none of which is exactly -1: where some rows are -1 and others are not, a tracker has lost one camera,
-and a coordinate that truly is -1.0 (which lies outside every image, and which a sub-pixel tracker hits with
-probability zero) could not be told from that. So both are refused, by the reader and by the writer.
+An entry is unobserved if all four rows are exactly -1. Otherwise all four must be finite pixel coordinates other than
+exactly -1. If only some rows are -1, a tracker has lost one camera. A true coordinate of -1.0, which lies outside every
+image, could not be distinguished from that. Reader and writer reject both cases.
 
-An entry whose four rows are all exactly 0 is unobserved as well: no pair of cameras measures the outermost corner of
-both images, with a disparity of exactly zero. Such entries are counted and reported.
+An entry whose four rows are exactly 0 is unobserved as well: no stereo pair measures the outermost corner of both
+images with zero disparity. Such entries are counted and reported.
 """
 
 from collections.abc import Iterator
@@ -31,7 +30,7 @@ ROWS = ("uL", "vL", "uR", "vR")
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """How the flat entries of a block lie: `frames_first` when neighbours are the same landmark in the next frame."""
+    """How the flat entries of a block lie: `frames_first` when neighbors are the same landmark in the next frame."""
 
     key: str
     n_frames: int
@@ -62,7 +61,7 @@ def read_features(stream: ArrayStream, n_frames: int) -> tuple[Observations, int
 
 
 def read_features_by_frame(stream: ArrayStream, n_frames: int) -> tuple[Observations, int, tuple[Finding, ...]]:
-    """The same of a block (4, T, N), as `.mat` files have it."""
+    """Observations of a block (4, T, N), as in `.mat` files; see `read_features`."""
     shape = stream.shape if len(stream.shape) != 2 else (*stream.shape, 1)  # MATLAB drops a last axis of length 1
     if len(shape) != 3 or shape[:2] != (4, n_frames):
         raise InputError(

@@ -1,11 +1,11 @@
-"""What a recording's fields must be, said by the names they have in the file (`Sequence` knows only its own names)."""
+"""Checks of a recording's fields, with error messages that use the names in the file."""
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from ..finite import LARGEST, measurable
 from ..sequence import ROTATION_TOLERANCE
+from ..value_range import LARGEST, measurable
 
 
 def finite_stamps(key: str, array: FloatArray) -> FloatArray:

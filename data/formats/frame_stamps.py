@@ -1,6 +1,6 @@
-"""Time stamps of a recording's frames: repeated ones are left out, and what cannot be mended is refused with its cause.
+"""Time stamps of a recording's frames: repeated ones are left out, other faults are rejected with their cause.
 
-The stamps of a long clock that lost their digits repeat each other (`time_unit.lost_digits`), or jump by the rounding.
+Stamps of a long clock that lost digits repeat each other (`time_unit.lost_digits`), or jump by the rounding.
 """
 
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
+from ..plural import percent
 from ..sequence import Truth
 from ..time_unit import COARSE, lost_digits
 from .fields import finite_stamps
@@ -22,21 +23,21 @@ STRAY = 1000.0
 
 
 class FrameStamps(NamedTuple):
-    """The frames of a file that have a stamp of their own."""
+    """Frames of a file with a time stamp of their own."""
 
     t: FloatArray
     """(T,) as recorded, strictly rising"""
     kept: BoolArray
-    """(m,) which of the file's frames these are"""
+    """(m,) mask of these frames in the file"""
     findings: tuple[Finding, ...]
 
     @property
     def left_out(self) -> tuple[int, ...]:
-        """The other frames of the file."""
+        """Frames of the file that are left out."""
         return tuple(np.flatnonzero(~self.kept).tolist())
 
     def observations(self, o: Observations) -> Observations:
-        """Those of the kept frames, the frames numbered anew."""
+        """Observations of the kept frames, renumbered."""
         if self.kept.all():
             return o
         number = np.cumsum(self.kept) - 1
@@ -120,8 +121,8 @@ def _rounding(key: str, t: FloatArray) -> list[Finding]:
     if step < COARSE * usual:
         return []
     text = (
-        f"{key}: the stamps are multiples of {step:g}, {step / usual:.0%} of the median interval ({usual:g}){why}: "
-        "every interval, and with it every motion, is wrong by up to as much."
+        f"{key}: the stamps are multiples of {step:g}, {percent(step / usual)} of the median interval ({usual:g}){why}:"
+        " every interval, and with it every motion, is wrong by up to as much."
     )
     return [Finding("stamps_rounded", text, step / usual, step / usual, "share of the interval", "counted")]
 

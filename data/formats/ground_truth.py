@@ -1,4 +1,4 @@
-"""Ground truth from a trajectory file, brought to the recording's frames and to its world."""
+"""Ground truth from a trajectory file, associated with the recording's frames and transformed to its world."""
 
 from dataclasses import replace
 from functools import reduce
@@ -16,9 +16,9 @@ from ..time_unit import TimeUnit
 from .columns import Order
 from .inertial_truth import inertial_truth, with_state
 from .named_file import FilePath, reading, shown
+from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .quaternion_order import STEP, fits_clearly_better, in_words
 from .shared_clock import units_in_common
-from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]

@@ -1,4 +1,4 @@
-"""Errors that name the file: readers say what is wrong in a field, the name of the file is put before it here."""
+"""Error messages with the file name: readers report the fault of a field, and the name is prepended here."""
 
 import os
 from collections.abc import Iterator
@@ -11,21 +11,21 @@ FilePath = str | os.PathLike[str]
 
 
 def shown(path: FilePath) -> str:
-    """The path as text that can be printed anywhere, on one line."""
+    """Path as printable text on one line."""
     text = os.fspath(path).encode("utf-8", "backslashreplace").decode()
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 @contextmanager
 def reading(path: FilePath) -> Iterator[None]:
-    """Within it, an InputError or OSError comes out as one InputError that begins with the file's name."""
+    """Converts an InputError or OSError in the block into one InputError that begins with the file name."""
     with _naming(path, "it cannot be read", "check the path and its permissions"):
         yield
 
 
 @contextmanager
 def writing(path: FilePath) -> Iterator[None]:
-    """As `reading`, for a file that is being written."""
+    """Same as `reading`, for a file being written."""
     with _naming(path, "it cannot be written", "check the folder, its permissions and the space left"):
         yield
 
@@ -41,7 +41,7 @@ def _naming(path: FilePath, failure: str, advice: str) -> Iterator[None]:
 
 
 def regular_file(path: FilePath) -> Path:
-    """The path, if there is an ordinary file. Raises InputError (without the name: see `reading`) or OSError."""
+    """Path of an ordinary file. Raises InputError (without the name: see `reading`) or OSError."""
     file = Path(path)
     try:
         found = file.exists()

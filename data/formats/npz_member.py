@@ -1,4 +1,4 @@
-"""One array of an npz, the same bytes for the same numbers: the time of writing is none of the file's business."""
+"""Array of an npz file, byte-identical for equal numbers because no time of writing is stored."""
 
 import zipfile
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""`ParsedTrajectory`: the poses of a trajectory file, and the unit, order and times that it leaves open."""
+"""Parsed trajectory file: poses, and the unit, quaternion order and times that the file leaves open."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ STRAIGHT = 1e-3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ParsedTrajectory:
-    """What a trajectory file holds, and what it leaves open: n poses."""
+    """Content of a trajectory file with n poses, and what it leaves open."""
 
     name: str
     source: str
@@ -49,7 +49,7 @@ class ParsedTrajectory:
     up: FloatArray | None = None
     """(3,) what points up in its world, where the format defines it"""
     remarks: tuple[str, ...] = ()
-    """what was recognized: each completes a sentence that begins with the file's name"""
+    """remarks on the detection: each completes a sentence that begins with the file name"""
 
     def trajectory(
         self,
@@ -125,9 +125,9 @@ def bends(position: FloatArray) -> bool:
 
 
 def unit_and_order(file: ParsedTrajectory, unit: TimeUnit | None, order: Order | None) -> tuple[TimeUnit, Order]:
-    """The unit and order that a file has, or else the given ones, or else the likeliest.
+    """Unit and quaternion order of a file: its own, else the given ones, else the likeliest.
 
-    Raises InputError where the stamps may have several units, and seconds are not among them.
+    Raises InputError where several units are possible, and seconds are not among them.
     """
     if unit is None and TimeUnit.S not in file.units and len(file.units) != 1:
         raise InputError(unit_ambiguity(file))
@@ -136,7 +136,7 @@ def unit_and_order(file: ParsedTrajectory, unit: TimeUnit | None, order: Order |
 
 
 def unit_ambiguity(file: ParsedTrajectory, units: Sequence[TimeUnit] | None = None) -> str:
-    """What to say where the stamps of a file may have several units, or have none that fits a recorder."""
+    """Error message for stamps with several possible units, or none that fits a recorder."""
     assert file.stamps is not None
     possible = file.units if units is None else units
     if not possible:

@@ -1,4 +1,4 @@
-"""Covariances of poses as other programs write them, brought to those of the right perturbation [v, w]."""
+"""Pose covariances of other programs, converted to the right perturbation [v, w]."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Which order the four numbers of a quaternion have where no header names it: when another one fits clearly better."""
+"""Quaternion order of files without a header: another order is used if it fits clearly better."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""`read`: a recording in any of the known forms, told apart by what is in the file and never by its name."""
+"""Reader of recordings in all known forms, detected from the content and never from the file name."""
 
 import os
 from pathlib import Path
@@ -24,7 +24,7 @@ from .utias import read_utias
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 HDF5 = b"\x89HDF\r\n\x1a\n"
 MATLAB_HEADER = 128
-"""bytes: the text of a MATLAB 5 file, its version and the two letters that tell its byte order"""
+"""bytes: the text of a MATLAB 5 file, its version and the two letters of its byte order"""
 
 
 def read(

@@ -1,4 +1,4 @@
-"""In which units two sets of time stamps are, by the stretch of time that they share."""
+"""Units of two sets of time stamps, by the time span that they share."""
 
 from collections.abc import Mapping
 from itertools import product
@@ -12,9 +12,9 @@ CLEARLY = 10.0
 
 
 def units_in_common(first: Spans, second: Spans) -> tuple[TimeUnit, TimeUnit] | None:
-    """The units by which two sets of stamps share the most time, as a part of the time that either covers.
+    """Units by which two sets of stamps share the most time, relative to the time that either covers.
 
-    None where no other units are clearly worse (CLEARLY).
+    None if other units are not clearly worse (CLEARLY).
     """
     choices = list(product(first, second))
     if len(choices) == 1:

@@ -1,4 +1,4 @@
-"""What every trajectory file has in common: stamps that rise, and poses that are rigid motions."""
+"""Checks common to all trajectory files: increasing stamps and rigid motions."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The time stamps of a trajectory file: exact, in whatever unit, and whether they are whole."""
+"""Time stamps of a trajectory file: exact values and possible units."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -86,10 +86,10 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
 
 
 def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
-    """The units that stamps may have, the likeliest first, and whether header or size settle it.
+    """Possible units of the stamps, likeliest first, and True if header or size determine the unit.
 
-    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. None where
-    no unit makes their rate a recorder's; both where header and size contradict each other.
+    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. Empty if no unit
+    gives the rate of a recorder; both units if header and size contradict each other.
     """
     interval = stamps.interval
     by_size = since_1970(float(np.median(np.abs(stamps.value))), interval or 0.0, EPOCH_INTERVAL)
@@ -107,9 +107,9 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
 
 
 def equal_stamps(stamps: Stamps, moved: BoolArray) -> str | None:
-    """Why so many of the stamps are equal between poses that `moved` (n - 1,): they have lost digits. None otherwise.
+    """Cause of many equal stamps between poses that `moved` (n - 1,): lost digits, or GTSAM keys in place of stamps.
 
-    GTSAM's keys in place of stamps are recognized too.
+    None otherwise.
     """
     n = len(stamps.value)
     letter = _letter(stamps)

@@ -1,4 +1,4 @@
-"""The poses of a trajectory in text; lines without a pose and repeated stamps are left out and counted."""
+"""Parser of text trajectories; lines without a pose and repeated stamps are left out and counted."""
 
 from dataclasses import replace
 
@@ -10,10 +10,10 @@ from ..observations import BoolArray, IntArray
 from .columns import Columns
 from .kitti import kitti_poses
 from .number_table import Lines, NumberTable, numbers_of
+from .parsed_trajectory import ParsedTrajectory
 from .quaternion_order import xyzw
 from .stamped_poses import require_rising, rotations_of_quaternions
 from .stamps import equal_stamps, possible_units, stamps_of
-from .parsed_trajectory import ParsedTrajectory
 
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
@@ -22,7 +22,7 @@ FORWARD = 0.9
 
 
 def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> ParsedTrajectory:
-    """The trajectory file `empty`, which has name and source, with what its columns hold. Raises InputError."""
+    """Trajectory `empty`, which has name and source, filled from the columns. Raises InputError."""
     places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
     stamp = columns.time if columns.time is not None else columns.number
     table = numbers_of(lines, places if stamp is None else [stamp, *places], nan=True)

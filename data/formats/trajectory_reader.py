@@ -1,4 +1,4 @@
-"""`read_trajectory`: a trajectory in any of the known formats, detected from its content and never from its name."""
+"""Reader of trajectories in all known formats, detected from the content and never from the file name."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +13,10 @@ from ..trajectory import Trajectory
 from .columns import Columns, Order, counted_columns, named_columns
 from .named_file import FilePath, reading, regular_file, shown
 from .number_table import Lines, read_lines
-from .stamps import possible_units, stamps_of
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
-from .trajectory_npz import read_trajectory_npz
+from .stamps import possible_units, stamps_of
 from .trajectory_from_text import read_text
+from .trajectory_npz import read_trajectory_npz
 
 TrajectoryFormat = Literal["tum", "kitti", "euroc", "npz"]
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")
@@ -79,7 +79,7 @@ def read_kitti(path: FilePath) -> FloatArray:
 def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
 ) -> ParsedTrajectory:
-    """What a trajectory file holds and leaves open. Raises as `read_trajectory`."""
+    """Parsed trajectory file, with what it leaves open. Raises as `read_trajectory`."""
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
     with reading(path), np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""Writes TUM trajectories: `timestamp tx ty tz qx qy qz qw` a line, in seconds and metres."""
+"""Writes TUM trajectories: `timestamp tx ty tz qx qy qz qw` a line, in seconds and meters."""
 
 import numpy as np
 

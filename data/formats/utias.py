@@ -6,7 +6,7 @@
 | `v_vk_vk_i`, `w_vk_vk_i` | (3, >= T) | velocities of the vehicle (IMU) in its own frame, m/s and rad/s |
 | `y_k_j` | (4, T, N) | uL, vL, uR, vR in pixels, -1 where unobserved |
 | `C_c_v`, `rho_v_c_v` | (3, 3), (3, 1) | rotation IMU to camera; position of the camera in the IMU frame, m |
-| `fu fv cu cv b` | (1, 1) | calibration, pixels and metres |
+| `fu fv cu cv b` | (1, 1) | calibration, pixels and meters |
 | `r_i_vk_i`, `theta_vk_i` | (3, >= T) | true position, m, and axis-angle of world_R_imu, rad, in any world |
 | `rho_i_pj_i` | (3, N) | surveyed landmarks in that world, m (only dataset3) |
 
@@ -27,7 +27,7 @@ from .mat_file import MatFile
 
 VELOCITIES = ("v_vk_vk_i", "w_vk_vk_i")
 TRUTH = ("r_i_vk_i", "theta_vk_i")
-POSITIVE = {"fu": "a focal length in pixels", "fv": "a focal length in pixels", "b": "the baseline in metres"}
+POSITIVE = {"fu": "a focal length in pixels", "fv": "a focal length in pixels", "b": "the baseline in meters"}
 VARIANCES = ("v_var", "w_var", "y_var")
 
 
@@ -87,7 +87,7 @@ def _extrinsic(mat: MatFile) -> FloatArray:
 def _finite(mat: MatFile, key: str) -> float:
     value = mat.array(key)
     if value.size != 1 or not np.isfinite(value).all():
-        raise InputError(f"{key}: expected one finite number, the image centre in pixels, got {value.tolist()[:4]}")
+        raise InputError(f"{key}: expected one finite number, the image center in pixels, got {value.tolist()[:4]}")
     return float(value.reshape(-1)[0])
 
 

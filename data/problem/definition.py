@@ -1,4 +1,4 @@
-"""The problem that every estimator solves: all that decides the optimum is here, and none of it in an estimator."""
+"""Estimation problem: everything that determines the optimum, independent of the estimator."""
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
@@ -15,33 +15,33 @@ from .inertial import ImuIntervals, InertialStart
 
 
 class Excluded(IntEnum):
-    """Why an observation of the sequence takes no part in the problem."""
+    """Reason for which an observation of the sequence is excluded from the problem."""
 
     NO = 0
-    """it takes part"""
+    """not excluded"""
     FEATURE_NOT_CHOSEN = 1
     DISPARITY = 2
-    """disparity too small to tell the depth"""
+    """disparity too small to determine the depth"""
     ROWS = 3
     """vL and vR disagree"""
     PREDICTION = 4
-    """disagrees with its own track, predicted from the frame before by the velocities"""
+    """inconsistent with its track, as predicted from the previous frame by the velocities"""
     SHORT = 5
-    """what is left of its track is too short to check or to determine a point"""
+    """remaining track too short to validate or triangulate"""
     GEOMETRY = 6
-    """its point is not determined, or lies behind a camera"""
+    """point undetermined, or behind a camera"""
     MOVING = 7
-    """its point moved"""
+    """point on a moving object"""
     COPIED = 8
-    """a copy of the frame before: it was never tracked"""
+    """copy of the previous frame: never tracked"""
 
 
 WRONG_MATCH = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
-"""Reasons that say that a match is wrong, that its point moved, or that the velocities that predict it are wrong."""
+"""Reasons that imply a wrong match, a moving point, or wrong velocities in the prediction."""
 
 
 class LandmarkMode(StrEnum):
-    """Treatment of landmarks in the documented SLAM, which can be read either way."""
+    """Treatment of landmarks in the documented SLAM, where the source paper allows two readings."""
 
     UPDATED = "in-turn"
     """updated after the pose in every frame"""
@@ -51,7 +51,7 @@ class LandmarkMode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NoiseSettings:
-    """Standard deviations; the defaults stand in where a recording could not be diagnosed."""
+    """Standard deviations of the noise; defaults for recordings that could not be diagnosed."""
 
     pixel: float = 1.5
     """px, of each of the four rows"""
@@ -97,7 +97,7 @@ class Problem:
     features: IntArray
     """(m,) increasing indices of the chosen landmarks"""
     excluded: NDArray[np.uint8]
-    """(n,) an `Excluded` for each observation of the sequence"""
+    """(n,) `Excluded` code of each observation of the sequence"""
     initial_pose: FloatArray
     """(4, 4) world_T_imu of frame 0"""
     initial_covariance: FloatArray
@@ -109,20 +109,21 @@ class Problem:
     landmark_prior: LandmarkPrior | None = None
     kernel: HuberKernel | None = None
     mapping_pixel_variance: float | None = None
-    """px^2, in place of `pixel_variance` where landmarks are mapped along given poses (the report has V = I there)"""
+    """px^2, in place of `pixel_variance` where landmarks are mapped along given poses (the source paper has V = I
+    there)"""
     landmark_mode: LandmarkMode = LandmarkMode.UPDATED
     diagnosed: bool = False
-    """whether noise and repairs are estimated from the recording"""
+    """True if noise and repairs are estimated from the recording"""
     findings: tuple[Finding, ...] = ()
     """faults of the recording, from reader and diagnosis"""
     repairs: tuple[str, ...] = ()
-    """what was repaired for all estimators alike, and user-specified values; one sentence each"""
+    """repairs common to all estimators, and user-specified values; one sentence each"""
     remarks: tuple[str, ...] = ()
-    """decisions in building the problem, one sentence each"""
+    """choices made in building the problem, one sentence each"""
 
     @property
     def n_frames(self) -> int:
-        """T, the number of frames."""
+        """Number of frames T."""
         return self.sequence.n_frames
 
     @property
@@ -137,20 +138,20 @@ class Problem:
 
     @property
     def mask(self) -> BoolArray:
-        """(n,) true for the sequence's observations that take part."""
+        """Mask (n,) of the sequence's observations that are used."""
         mask: BoolArray = self.excluded == Excluded.NO
         return mask
 
     def observations(self) -> Observations:
-        """The observations that take part, with landmark indices of the sequence."""
+        """Observations that are used, with landmark indices of the sequence."""
         return self.sequence.observations.select(self.mask)
 
     def scatter_mask(self, taken: BoolArray) -> BoolArray:
-        """(n,) flags of `observations()` scattered over the sequence's observations, as `Estimate.used` has them."""
+        """Flags of `observations()` scattered over the sequence's observations (n,), as in `Estimate.used`."""
         scattered = self.mask
         scattered[scattered] = taken
         return scattered
 
     def feature_row(self, landmark: IntArray) -> IntArray:
-        """The rows (…,) in `features` of landmark indices that are among them."""
+        """Rows (...) in `features` of landmark indices that are among them."""
         return np.searchsorted(self.features, landmark).astype(np.int64)

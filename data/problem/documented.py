@@ -1,4 +1,4 @@
-"""The `documented` preset: the problem as the report poses it."""
+"""The `documented` preset: the problem of the source paper."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..sequence import Sequence
 from .definition import Excluded, LandmarkMode, LandmarkPrior, Problem
 
 MOTION_NOISE = np.diag([0.5, 0.5, 0.5, 0.05, 0.05, 0.05])
-"""W of the report, added once per step whatever its length"""
+"""W of the source paper, added once per step of any length"""
 LANDMARK_VARIANCE = 0.01
 MAPPING_PIXEL_VARIANCE = 1.0
 SLAM_PIXEL_VARIANCE = 15.0
@@ -21,10 +21,10 @@ DEFAULT_FEATURES = 1000
 def documented(
     sequence: Sequence, features: int | None = DEFAULT_FEATURES, landmark_mode: LandmarkMode = LandmarkMode.UPDATED
 ) -> Problem:
-    """The report's problem on a recording taken as it is: no mask, no kernel, no repairs.
+    """Problem of the source paper on a recording as recorded: no mask, no kernel, no repairs.
 
-    W is added once per step; V = I for mapping and 15 I for SLAM; every one of the `features` most often seen
-    landmarks (None: all) has the prior 0.01 I at the average of its back-projections along the dead-reckoned path.
+    W is added once per step; V = I for mapping and 15 I for SLAM. The `features` most observed landmarks (None: all)
+    have the prior 0.01 I at the average of their back-projections along the dead-reckoned path.
     """
     if sequence.imu is not None:
         raise InputError(
@@ -68,7 +68,7 @@ def documented(
 
 
 def most_observed(observations: Observations, n_landmarks: int, features: int | None) -> IntArray:
-    """(m,) increasing indices of the landmarks seen most often (ties: lower index first); None for all that are seen.
+    """Increasing indices (m,) of the most observed landmarks (ties: lower index first); None: all observed ones.
 
     Raises InputError for fewer than one feature.
     """
@@ -83,7 +83,7 @@ def most_observed(observations: Observations, n_landmarks: int, features: int | 
 def average_back_projections(
     sequence: Sequence, world_T_imu: FloatArray, features: IntArray, chosen: np.ndarray
 ) -> FloatArray:
-    """(m, 3) the mean world point of each feature over its chosen observations (n,), along a path (T, 4, 4)."""
+    """Mean back-projection (m, 3) of each feature over its chosen observations (n,), along a path (T, 4, 4)."""
     row = np.searchsorted(features, sequence.observations.landmark[chosen])
     points = back_project(sequence, world_T_imu, chosen)
     counts = np.bincount(row, minlength=len(features))

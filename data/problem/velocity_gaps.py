@@ -1,8 +1,8 @@
-"""Process noise over gaps between frames, from how much the velocity changes elsewhere.
+"""Process noise over gaps between frames, from the variation of the velocity elsewhere.
 
 The velocity is modeled as a random walk of spectral density q (m^2/s^3 or rad^2/s^3). Held over a time t, its error has
-a variance of q t, and the increment one of q t^3 / 3. The structure function of the recorded velocities gives q: the
-mean square of u(s + t) - u(s), less twice the variance of their noise, over t. Its largest value counts, since a steady
+the variance q t, and the increment q t^3 / 3. q comes from the structure function of the recorded velocities: the mean
+square of u(s + t) - u(s), minus twice the noise variance, over t. The largest value over t is used, because a steady
 acceleration shows only at long lags.
 """
 
@@ -16,20 +16,20 @@ from ..observations import BoolArray
 from .definition import Problem
 
 GAP = 2.5
-"""times the median interval, from which on an interval is a gap"""
+"""interval of a gap, in median intervals"""
 SHORTEST_LAG = 1.0
-"""s; over less, noise hides how the velocity changes"""
+"""shortest lag, s; over less, noise hides the variation of the velocity"""
 LAGS = 12
 MIN_PAIRS = 5
 
 
 def gaps(dt: FloatArray) -> BoolArray:
-    """(T-1,) which intervals are longer than `GAP` times the median."""
+    """Mask (T-1,) of the intervals longer than `GAP` times the median."""
     return np.asarray(dt > GAP * np.median(dt), dtype=np.bool_)
 
 
 def inflate_gap_covariance(problem: Problem) -> Problem:
-    """The problem with the covariance of increments over gaps enlarged by the velocity's random walk.
+    """Problem with the increment covariance over gaps inflated by the random walk of the velocity.
 
     A problem without gaps is returned unchanged.
     """
@@ -52,7 +52,8 @@ def inflate_gap_covariance(problem: Problem) -> Problem:
 
 
 def random_walk_density(problem: Problem, long: BoolArray) -> FloatArray:
-    """(6,) q of each component of the velocity [v, w], m^2/s^3 and rad^2/s^3, from between the `long` intervals."""
+    """Spectral density q (6,) of the velocity [v, w], m^2/s^3 and rad^2/s^3, from samples between the `long`
+    intervals."""
     dt = problem.sequence.dt
     usual = float(np.median(dt))
     twist = problem.increment[~long] / dt[~long, None]

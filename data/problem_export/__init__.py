@@ -1,4 +1,4 @@
-"""Problems as plain files, for filters that are not written in Python: written here, read back, the same to the bit."""
+"""Export of problems as plain files, for filters in other languages; reading them back is exact."""
 
 from .reading import read_problem
 from .writing import write_problem

@@ -1,9 +1,9 @@
-"""What stands in an exported problem, by file; docs/export.md says it to people."""
+"""Files, keys and columns of an exported problem; docs/export.md describes them."""
 
 from typing import Final
 
 SCHEMA: Final = "fgbaseline/problem/1"
-"""raised when a key or column is renamed, removed or changes its meaning"""
+"""incremented when a key or column is renamed, removed or changes its meaning"""
 ARRAYS = "problem.npz"
 SCALARS = "problem.json"
 FRAMES, INCREMENTS, OBSERVATIONS, LANDMARKS = "frames.csv", "increments.csv", "observations.csv", "landmarks.csv"

@@ -1,4 +1,4 @@
-"""An exported problem, read back from its npz and JSON."""
+"""Reader of exported problems, from their npz and JSON."""
 
 import json
 from pathlib import Path
@@ -8,25 +8,25 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError, StereoCamera
 
-from ..finite import LARGEST, measurable
 from ..formats.fields import extrinsic, positive, time_stamps
 from ..formats.named_file import FilePath, reading, regular_file
 from ..formats.npz_archive import NpzArchive
 from ..observations import IntArray, Observations
 from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from ..sequence import Sequence
+from ..value_range import LARGEST, measurable
 from . import layout
 from .inertial import START, interval_noise, read_samples, read_start
 
 MOST_UNSEEN = 100
-"""landmarks for each observation: some are seen in no frame, and arrays have their size"""
+"""most landmarks per observation: some landmarks are unobserved, and arrays have their number"""
 
 
 def read_problem(folder: FilePath) -> Problem:
-    """The problem that `write_problem` left in a folder (or that something else wrote in the same form), truth missing.
+    """Problem in a folder written by `write_problem` (or in the same form), without ground truth.
 
-    Numbers are taken from problem.npz, words from problem.json. Raises InputError naming file and key for what is
-    missing, misshapen or not finite.
+    Numbers are read from problem.npz, texts from problem.json. Raises InputError naming file and key for missing,
+    misshapen or non-finite values.
     """
     place = Path(folder)
     with reading(place / layout.SCALARS):
@@ -59,7 +59,7 @@ def _words(path: Path) -> dict[str, Any]:
 
 
 class _Numbers:
-    """The arrays of an open archive, held to their shapes."""
+    """Arrays of an open archive, with shape checks."""
 
     def __init__(self, archive: NpzArchive) -> None:
         self._archive = archive
@@ -68,7 +68,7 @@ class _Numbers:
         return key in self._archive.keys
 
     def real(self, key: str, *shape: int | None, finite: bool = True) -> FloatArray:
-        """The array `key`; None in `shape` stands for any length."""
+        """Array `key`; None in `shape` allows any length."""
         array = self._archive.array(key)
         fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
         if not fits:
@@ -81,7 +81,7 @@ class _Numbers:
         return array
 
     def whole(self, key: str, *shape: int | None) -> IntArray:
-        """The same of whole numbers from 0 on."""
+        """Array `key` of integers >= 0, as `real`."""
         array = self.real(key, *shape)
         if (array < 0).any() or (array != np.floor(array)).any() or (array >= 2**31).any():
             raise InputError(f"{key}: expected whole numbers from 0 on, below 2^31; export the problem again")

@@ -1,4 +1,4 @@
-"""A problem written as npz, CSV and JSON: the same numbers in each, in full."""
+"""Writer of problems as npz, CSV and JSON, with the same numbers in full precision."""
 
 import json
 import zipfile
@@ -16,10 +16,9 @@ from .inertial import inertial_arrays, inertial_scalars
 
 
 def write_problem(problem: Problem, folder: Path) -> None:
-    """Writes a problem into an existing, empty folder; `read_problem` gives it back bit by bit, but for its truth.
+    """Writes a problem into an existing, empty folder; `read_problem` restores it exactly, without ground truth.
 
-    The ground truth stays behind: what is exported is what an estimator may look at. Raises InputError when a file
-    cannot be written.
+    Ground truth is not exported, because estimators must not use it. Raises InputError when a file cannot be written.
     """
     with atomic_write(folder / layout.ARRAYS) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in arrays(problem).items():
@@ -32,7 +31,7 @@ def write_problem(problem: Problem, folder: Path) -> None:
 
 
 def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
-    """Everything numerical: integers as int64, all else as float64, what there is not as NaN."""
+    """Arrays of a problem: integers as int64, others as float64, missing values as NaN."""
     sequence = problem.sequence
     camera, o, prior = sequence.camera, sequence.observations, problem.landmark_prior
     numbers: dict[str, NDArray[Any]] = {
@@ -64,7 +63,7 @@ def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
 
 
 def scalars(problem: Problem) -> dict[str, Any]:
-    """What is not an array, and for readers of the CSV files the few small ones too."""
+    """Scalars and texts, and for readers of the CSV files the small arrays."""
     sequence, prior = problem.sequence, problem.landmark_prior
     camera = sequence.camera
     return {
@@ -127,7 +126,7 @@ def _motion_tables(
 
 
 def _table(path: Path, titles: tuple[str, ...], columns: list[NDArray[Any]]) -> None:
-    """A CSV of columns (n,): numbers in full, an empty cell where there is none."""
+    """CSV of columns (n,): numbers in full precision, empty cells for missing values."""
     cells = [map(_cell, column.tolist()) for column in columns]
     lines = [",".join(titles), *(",".join(row) for row in zip(*cells, strict=True)), ""]
     with atomic_write(path) as file:

@@ -1,4 +1,4 @@
-"""What a rig sees of points at a time: their pixels, and whether a tracker could hold them."""
+"""Simulated camera view: projection of points, and their visibility in both cameras."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ _CHUNK = 200_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CameraView:
-    """A rig carried along frames: `cam_T_world` (T, 4, 4)."""
+    """View of a stereo rig along a path: `cam_T_world` (T, 4, 4)."""
 
     rig: Rig
     cam_T_world: FloatArray
@@ -30,7 +30,7 @@ class CameraView:
         return self.rig.camera.project(self._in_camera(frame, points))
 
     def visible(self, frame: IntArray, points: FloatArray, farthest: float = np.inf) -> BoolArray:
-        """Which points (n, 3) are seen by both cameras at frames (n,); a point that is NaN is not."""
+        """Mask (n,) of points (n, 3) visible in both cameras at frames (n,); NaN points are not."""
         seen = np.empty(len(frame), dtype=np.bool_)
         for start in range(0, len(frame), _CHUNK):
             part = slice(start, start + _CHUNK)

@@ -1,4 +1,4 @@
-"""What is wrong with the matches: pixel noise on all of them, and a share that belongs to other points altogether."""
+"""Errors of simulated matches: pixel noise on all, and a share of wrong matches."""
 
 import numpy as np
 
@@ -22,11 +22,7 @@ def noisy_pixels(pixel: FloatArray, settings: Simulation) -> FloatArray:
 def wrong_matches(
     frame: IntArray, track: IntArray, t: FloatArray, settings: Simulation
 ) -> tuple[BoolArray, FloatArray]:
-    """Which observations (n,) are wrong, and by how many pixels (n, 4).
-
-    Half of `wrong_share` are single observations. The other half belongs to tracks that slip onto another point at
-    some frame and stay there, displaced by one constant amount. In a burst every observation is wrong by chance.
-    """
+    """Mask (n,) of wrong observations, and their offsets (n, 4), px."""
     rng = generator(settings.seed, RandomStream.WRONG_MATCHES)
     n, m = len(frame), int(track.max(initial=-1)) + 1
     single = rng.random(n) < 0.5 * settings.wrong_share

@@ -1,4 +1,4 @@
-"""Things that move: cars ahead, oncoming and crossing, or people in a room, each for a few seconds."""
+"""Moving objects: cars ahead, oncoming and crossing, or people in a room, each for a few seconds."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from .path import Path
 from .settings import WorldName
 
 _SLOT = 4.0
-"""s after which another thing comes along"""
+"""s between the appearance of objects"""
 
 
 class MovingObjects:
-    """One thing at a time, in a straight line at constant speed; points on its surface share its velocity."""
+    """Moving object, one at a time, with constant velocity, which its surface points share."""
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
         self._t = t
@@ -38,7 +38,7 @@ class MovingObjects:
             sideways = np.where(kind == 2, -rng.uniform(4.0, 8.0, n), 0.0)
             speed = np.stack([forward, sideways, np.zeros(n)], axis=1)
             self._size = np.array([2.1, 0.9, 0.6])
-        self._centre = poses[:, :3, 3] + np.einsum("nij,nj->ni", self._axes, local)
+        self._center = poses[:, :3, 3] + np.einsum("nij,nj->ni", self._axes, local)
         self._velocity = np.einsum("nij,nj->ni", self._axes, speed)
 
     def points(self, birth: IntArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -50,4 +50,4 @@ class MovingObjects:
         surface[np.arange(len(birth)), face] = np.sign(surface[np.arange(len(birth)), face])
         offset = np.einsum("nij,nj->ni", self._axes[slot], surface * self._size)
         velocity = self._velocity[slot]
-        return self._centre[slot] + offset + velocity * (t - self._begin[slot])[:, None], velocity
+        return self._center[slot] + offset + velocity * (t - self._begin[slot])[:, None], velocity

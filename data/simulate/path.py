@@ -1,4 +1,4 @@
-"""Where a body is at any time: poses on a fine grid, joined by constant body velocities."""
+"""Path of a body in continuous time: poses on a fine grid, joined by constant body velocities."""
 
 from dataclasses import dataclass
 

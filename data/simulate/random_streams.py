@@ -1,4 +1,4 @@
-"""One random generator per concern, so that turning on one kind of noise leaves all the others as they were."""
+"""Random streams of a simulation, one per purpose, so that one kind of noise does not change the others."""
 
 from enum import IntEnum
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 class RandomStream(IntEnum):
-    """What random numbers are drawn for; the values are part of what makes a seed repeat, so only ever append."""
+    """Purpose of a random stream. A seed reproduces by these values, so only append."""
 
     PATH = 0
     SCENERY = 1
@@ -22,5 +22,5 @@ class RandomStream(IntEnum):
 
 
 def generator(seed: int, concern: RandomStream) -> np.random.Generator:
-    """The generator of one concern: an independent child of `seed`."""
+    """Random generator of one purpose: an independent child of `seed`."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(int(concern),))))

@@ -1,4 +1,4 @@
-"""A simulated recording: a path, what it sees, what its sensors make of it."""
+"""Simulated recording: path, tracks and sensor data."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -9,23 +9,23 @@ from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
-from .random_streams import RandomStream, generator
+from .camera_view import CameraView
 from .inertial import recorded_samples, standing_start
 from .match_errors import displaced, noisy_pixels, wrong_matches
+from .moving_objects import MovingObjects
 from .path import Path, drone_path, followed, handheld_path, path_along, time_grid
+from .random_streams import RandomStream, generator
 from .roads import drive, highway_road, loop_road, town_road
 from .room import Room
 from .settings import MAX_FRAMES, Simulation
-from .camera_view import CameraView
 from .street import Street
 from .tracks import Tracking, Tracks, follow
-from .moving_objects import MovingObjects
 from .velocities import recorded_velocities
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Labels:
-    """What is wrong with each of the n observations of a simulated sequence."""
+    """Labels of the errors of n simulated observations."""
 
     wrong: BoolArray
     """(n,) wrong matches"""
@@ -34,16 +34,16 @@ class Labels:
 
 
 def simulate(settings: Simulation) -> Sequence:
-    """A recording with its truth: poses and landmarks in the IMU's frame at frame 0. Same settings, same bytes.
+    """Simulated recording with ground truth in the IMU frame at frame 0; equal settings give equal bytes.
 
-    Landmarks on things that move have no true position: their rows are NaN. Raises InputError where `along` cannot be
+    Landmarks on moving objects have no true position: their rows are NaN. Raises InputError where `along` cannot be
     followed.
     """
     return simulate_with_labels(settings)[0]
 
 
 def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
-    """The same, and which observations are wrong or moving."""
+    """Simulated recording, and labels of wrong and moving observations."""
     rig = settings.mount
     t, level = _path(settings)
     origin = _origin(level.at(t[:1])[0], upright=settings.imu is not None)
@@ -174,7 +174,12 @@ def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
         max(1, round(settings.return_after / float(np.median(np.diff(t))))),
     )
     static = follow(
-        standing, sight, t, how, generator(settings.seed, RandomStream.TRACKS), generator(settings.seed, RandomStream.RETURNS)
+        standing,
+        sight,
+        t,
+        how,
+        generator(settings.seed, RandomStream.TRACKS),
+        generator(settings.seed, RandomStream.RETURNS),
     )
     traffic = generator(settings.seed, RandomStream.TRAFFIC)
     share = settings.moving_share

@@ -1,4 +1,4 @@
-"""What is mounted on what: stereo camera, image size and where the left camera sits on the IMU."""
+"""Stereo rig: camera, image size and extrinsic."""
 
 from dataclasses import dataclass, field
 
@@ -47,7 +47,7 @@ class Rig:
 
 
 def rig_of(sequence: Sequence) -> Rig:
-    """The rig that recorded a sequence; images are taken to be as large as its observations or twice its centre say."""
+    """The rig that recorded a sequence; images are taken to be as large as its observations or twice its center say."""
     camera, pixel = sequence.camera, sequence.observations.pixel
     corner = pixel[:, :2].max(axis=0, initial=0.0)
     return Rig(

@@ -1,4 +1,4 @@
-"""Cars on roads: a road is a curvature and a speed limit per metre; a drive turns it into a path."""
+"""Cars on roads: a road is a curvature and a speed limit per meter; a drive turns it into a path."""
 
 from dataclasses import dataclass
 
@@ -86,7 +86,7 @@ def loop_road(length: float, lap_seconds: float) -> Road:
 
 def drive(road: Road, t: FloatArray, rng: np.random.Generator) -> Path:
     """The path (times (g,), evenly spaced) of a car on a road: it slows for corners, rolls, pitches, climbs."""
-    s = _travelled(road, t)
+    s = _traveled(road, t)
     station = np.arange(len(road.curvature)) * STEP
     yaw_at = np.concatenate([[0.0], np.cumsum(0.5 * (road.curvature[1:] + road.curvature[:-1]) * STEP)])
     yaw = np.interp(s, station, yaw_at)
@@ -115,7 +115,7 @@ def drive(road: Road, t: FloatArray, rng: np.random.Generator) -> Path:
     return Path.through(t, poses)
 
 
-def _travelled(road: Road, t: FloatArray) -> FloatArray:
+def _traveled(road: Road, t: FloatArray) -> FloatArray:
     """Metres along the road (g,) at times (g,): within the limits, 1.5 m/s^2 up and 2 m/s^2 down, no sudden jerk."""
     station = np.arange(len(road.speed)) * STEP
     square = road.speed**2
@@ -129,11 +129,11 @@ def _travelled(road: Road, t: FloatArray) -> FloatArray:
         i = round(where / STEP)
         when = np.concatenate([when[: i + 1], when[i:] + seconds])
         station = np.concatenate([station[: i + 1], station[i:]])
-    travelled = np.interp(t - t[0], when, station)
+    traveled = np.interp(t - t[0], when, station)
     h = float(t[1] - t[0])
     window = np.hanning(2 * round(0.6 / h) + 1)[1:-1]
     half = len(window) // 2
-    velocity = np.pad(np.diff(travelled) / h, half, mode="edge")
+    velocity = np.pad(np.diff(traveled) / h, half, mode="edge")
     smooth = np.convolve(velocity, window / window.sum(), mode="valid")
     return np.concatenate([[0.0], np.cumsum(np.maximum(smooth, 0.0) * h)])
 

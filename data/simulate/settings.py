@@ -1,4 +1,4 @@
-"""What a simulated recording is to be like."""
+"""Settings of a simulated recording."""
 
 import math
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ class Simulation:
     """s: the velocity stamped t is that of the motion at t + time_offset"""
     velocity_of_interval: Interval = "after"
     """what sample k says: `after` moves frame k to k + 1 exactly; `before` moved k - 1 to k exactly; `mean` is the
-    velocity at the instant of frame k, so that the mean of neighbours moves k to k + 1 to second order in dt"""
+    velocity at the instant of frame k, so that the mean of neighbors moves k to k + 1 to second order in dt"""
     linear_axes: str = IDENTITY
     """axis convention of the recorded linear velocity, such as `x,-y,-z`: see `axes_matrix`"""
     angular_axes: str = IDENTITY

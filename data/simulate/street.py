@@ -1,7 +1,7 @@
-"""What stands along a street: where points that a camera can track lie, relative to the way the car takes.
+"""Street along the path of a car, with the positions of trackable points.
 
-The street follows the path. Beyond a corner it also goes on straight ahead, as a crossing does, and what lies round the
-corner is only seen from near it.
+The street follows the path. Beyond a corner it also continues straight ahead, as at a crossing. Objects around the
+corner are visible only near it.
 """
 
 import numpy as np
@@ -28,29 +28,29 @@ class Street:
     def __init__(self, path: Path, imu_above_ground: float, highway: bool, rng: np.random.Generator) -> None:
         self._scenery = StreetObjects(8.0 if highway else 0.0, rng)
         forward = np.einsum("ni,ni->n", path.poses[:-1, :3, 0], np.diff(path.poses[:, :3, 3], axis=0))
-        travelled = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(forward)]))
-        rising = np.concatenate([[True], np.diff(np.maximum.accumulate(travelled)) > 1e-9])
-        self._times, self._travelled = path.t[rising], travelled[rising]
-        whole = np.arange(0.0, self._travelled[-1], 1.0)
-        frames = path.at(np.interp(whole, self._travelled, self._times))
+        traveled = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(forward)]))
+        rising = np.concatenate([[True], np.diff(np.maximum.accumulate(traveled)) > 1e-9])
+        self._times, self._traveled = path.t[rising], traveled[rising]
+        whole = np.arange(0.0, self._traveled[-1], 1.0)
+        frames = path.at(np.interp(whole, self._traveled, self._times))
         beyond = np.repeat(path.at(path.t[-1:]), _AHEAD, axis=0)
         beyond[:, :3, 3] += beyond[:, :3, 0] * np.arange(_AHEAD)[:, None]
         self._frames = np.concatenate([frames, beyond])
-        """(g, 4, 4) one a metre, on the ground"""
+        """(g, 4, 4) one a meter, on the ground"""
         self._frames[:, :3, 3] -= imu_above_ground * self._frames[:, :3, 2]
         turn = se3.relative(self._frames)
         self._curvature = np.concatenate([np.arctan2(turn[:, 1, 0], turn[:, 0, 0]), [0.0]])
         bend = np.abs(self._curvature) > _CORNER
         index = np.arange(len(bend))
         self._straight = _next(index, ~bend)
-        """for each metre the next one that is not in a corner"""
+        """for each meter the next one that is not in a corner"""
         self._corner = _next(index, bend)
-        """for each metre the next one in a corner"""
+        """for each meter the next one in a corner"""
 
     def points(self, t: FloatArray, rng: np.random.Generator) -> FloatArray:
         """One point (n, 3) in the path's world, m, for each time (n,): before the car of that time, not always seen."""
         n = len(t)
-        here = np.interp(t, self._times, self._travelled).astype(np.int64)
+        here = np.interp(t, self._times, self._traveled).astype(np.int64)
         ahead = np.minimum(4.0 + rng.lognormal(np.log(23.0), 0.95, n), 280.0).astype(np.int64)
         last = len(self._frames) - 1
         driven = np.minimum(here + ahead, last)

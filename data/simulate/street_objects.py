@@ -1,7 +1,7 @@
-"""What stands at the sides of a street: house fronts, trees, parked cars, poles, the road, and what rises behind.
+"""Objects along a street: house fronts, trees, parked cars, poles, road surface and skyline.
 
 Coordinates are local to the street: x along it from a station, y to the left of its middle, z up from the ground, m.
-What is at one place is fixed (a house keeps its setback), points on it are drawn.
+Objects at a place are fixed (a house keeps its setback); points on them are random.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ _Points = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class StreetObjects:
-    """The things of one town, drawn once; `margin` m more between the middle of the street and what stands there."""
+    """Objects of one town; `margin` adds m between the middle of the street and the objects."""
 
     def __init__(self, margin: float, rng: np.random.Generator) -> None:
         self._margin = margin
@@ -31,7 +31,7 @@ class StreetObjects:
         )
 
     def points(self, station: IntArray, rng: np.random.Generator) -> tuple[FloatArray, BoolArray]:
-        """One point (n, 3) about each station (n,) in whole metres, NaN where nothing stands; and which stand up."""
+        """One point (n, 3) about each station (n,) in whole meters, NaN where nothing stands; and which stand up."""
         kind = rng.choice(len(self._kinds), len(station), p=[share for share, _ in self._kinds])
         side = rng.choice([-1.0, 1.0], len(station))
         local = np.empty((len(station), 3))

@@ -1,7 +1,7 @@
-"""Tracks: which points are followed over which frames, as a detector that tops up what its tracker loses.
+"""Feature tracks: a detector replaces points that the tracker loses.
 
-A point is found at some frame, followed until the tracker loses it, it leaves the images or comes too near, and is
-then gone (except for a share that is found again). Lifetimes are log-normal, as on the real recordings.
+A point is detected at a frame and tracked until the tracker loses it, it leaves the images or comes too near. A share
+of the points is found again. Track lengths are log-normal, as in the real recordings.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
-    """How a tracker goes about it."""
+    """Settings of the tracker."""
 
     features: float
     """points a frame, on average"""
@@ -81,7 +81,12 @@ class _Candidates:
 
 
 def follow(
-    source: Source, sight: CameraView, t: FloatArray, how: Tracking, rng: np.random.Generator, returns: np.random.Generator
+    source: Source,
+    sight: CameraView,
+    t: FloatArray,
+    how: Tracking,
+    rng: np.random.Generator,
+    returns: np.random.Generator,
 ) -> Tracks:
     """Tracks over the frames at times `t` (T,) s of points that `source` offers.
 

@@ -1,12 +1,12 @@
-"""What the velocity sensor records of a path."""
+"""Velocities recorded along a path."""
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3
 
 from ..axis_conventions import axes_matrix
-from .random_streams import RandomStream, generator
 from .path import Path
+from .random_streams import RandomStream, generator
 from .settings import Simulation
 
 

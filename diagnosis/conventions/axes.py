@@ -14,10 +14,9 @@ from .robust_regression import regress
 LAGS = (-2, -1, 0, 1, 2)
 """frames, tried with every convention so that a delay is not taken for another axis"""
 ENOUGH = 25.0
-"""log-likelihood by which a convention must lead for the data to have decided"""
+"""log-likelihood lead at which the data determine the convention"""
 MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.3, 0.05
-"""rad, baselines and share: how wrong an honest calibration may be; what it explains is no evidence for another
-convention"""
+"""rad, baselines and share: largest errors of a valid calibration; what they explain is no evidence for another"""
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
 MAX_BIAS = 1.0

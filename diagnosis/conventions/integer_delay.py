@@ -37,5 +37,5 @@ def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None
 
 
 def _relative(costs: FloatArray) -> FloatArray:
-    """(m,) 1 at the best shift, less where the fit is worse: how likely it is beside it, for errors as lasting."""
+    """Relative likelihood (m,) of each shift, 1 at the best, for time-correlated errors."""
     return np.asarray(np.exp(-(costs - costs.min()) / ENOUGH), dtype=np.float64)

@@ -10,12 +10,12 @@ TUKEY = 4.685
 """sigmas, beyond which a residual has no weight (Tukey's biweight at 95 % efficiency)"""
 ROUNDS = 8
 FARTHEST = 3.0
-"""prior deviations from zero at which a coefficient is held: a price alone, however high, is paid where there are many
-samples, and an error of 90° or of the whole speed is none of calibration"""
+"""Prior deviations from zero at which a coefficient is bounded. With many samples a penalty alone would allow more, but
+an error of 90° or of the whole speed is no calibration error."""
 
 
 class Regression(NamedTuple):
-    """y = X theta + noise, each axis of y with noise of its own."""
+    """Linear model y = X theta + noise, with separate noise for each axis of y."""
 
     theta: FloatArray
     """(p,)"""
@@ -24,7 +24,7 @@ class Regression(NamedTuple):
     sigma: FloatArray
     """(d,) deviation of the bulk of the residuals"""
     log_likelihood: float
-    """of the bulk, less the price of coefficients far from zero; for comparing models of the same data"""
+    """log-likelihood of the bulk minus the prior penalty, for the comparison of models"""
 
 
 def regress(y: FloatArray, X: FloatArray, prior: FloatArray) -> Regression:

@@ -53,6 +53,6 @@ def spline_through(x: FloatArray, y: FloatArray) -> Spline:
 def _at_the_end(
     outer: float, inner: float, outer_slope: FloatArray, inner_slope: FloatArray
 ) -> tuple[float, float, FloatArray]:
-    """What makes one cubic of the outer two pieces: the factors of the outer two slopes, and the right side."""
+    """Not-a-knot end condition: factors of the outer two slopes, and right-hand side."""
     both = outer + inner
     return inner, both, ((outer + 2.0 * both) * inner * outer_slope + outer**2 * inner_slope) / both

@@ -89,7 +89,7 @@ def _surrounded(known: BoolArray) -> BoolArray:
 
 
 def _moderate(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> FloatArray:
-    """(m, c) what the cameras see at the known intervals, about its mean, no farther out than the velocities go."""
+    """Odometry (m, c) at the known intervals, centered and clipped to the range of the velocities."""
     x = recorded[known] - np.median(recorded[known], axis=0)
     y = seen[known] - np.median(seen[known], axis=0)
     reach = np.abs(x).max(axis=0) + 3.0 * 1.4826 * np.median(np.abs(y - x), axis=0)
@@ -98,10 +98,10 @@ def _moderate(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Float
 
 
 def _energy(spline: Spline, k: FloatArray, weight: FloatArray, shifts: FloatArray) -> FloatArray:
-    """(m,) sum of squares about the mean of what the cameras see at k + shift: a window that takes in a stronger turn
-    at one end correlates more there, whatever the shift is.
+    """Sum of squares (m,) about the mean of the odometry at k + shift.
 
-    Interpolated between whole shifts, where the noise in it is the same for all; between samples the spline has less.
+    It normalizes the correlation: a window that includes a stronger turn correlates more at any shift. Interpolated
+    between integer shifts, where its noise is constant; between samples the spline has less.
     """
     whole = np.arange(-np.ceil(MAX_SHIFT), np.ceil(MAX_SHIFT) + 1.0)
     seen = np.array([spline(k + shift) for shift in whole])

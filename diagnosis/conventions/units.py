@@ -33,9 +33,9 @@ BASELINES = (0.01, 5.0)
 FARTHEST_CAMERA = 20.0
 """m from the IMU"""
 UNUSUAL = 1.5
-"""wrong units that an interval or baseline which does not exist is worth"""
+"""number of wrong units equivalent to an implausible interval or baseline"""
 LEAD = 1.0
-"""wrong units by which an explanation must lead"""
+"""number of wrong units by which a hypothesis must lead"""
 MIN_KNOWN = 20
 """intervals whose motion the cameras show"""
 OVERSHOOT, LARGE_RATE = 20.0, 0.3

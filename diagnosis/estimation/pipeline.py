@@ -18,7 +18,7 @@ from .result import Diagnosis
 from .velocity_calibration import calibrate_velocities
 
 TURNED = np.deg2rad(5.0)
-"""rad, misalignment against the velocities that a calibrated extrinsic does not have"""
+"""rad, misalignment beyond that of a calibrated extrinsic"""
 SURE = 16.0
 """squared standard errors of the misalignment by which one direction of the extrinsic must lead the other"""
 
@@ -81,9 +81,9 @@ def _may_be_inverse(given: Diagnosis) -> bool:
 
 
 def _leads(inverse: Diagnosis, given: Diagnosis) -> bool:
-    """Whether the inverse explains as one cause, and better, what takes several causes as recorded.
+    """True if the inverse explains by one cause, and better, what needs several causes as recorded.
 
-    Other axes of both velocities explain as much but for the small angles of a calibration, which they lack.
+    Other axes of both velocities explain as much, except for the small angles of a calibration.
     """
     if inverse.fit is None or inverse.angular.changed or inverse.linear.changed:
         return False

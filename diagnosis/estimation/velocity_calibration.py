@@ -27,7 +27,7 @@ def calibrate_velocities(sequence: Sequence, seen_by_cameras: Odometry, processe
     copies = repeated(sequence)
     known = seen_by_cameras.known
     if known.sum() < MIN_INTERVALS:
-        reason = f"the cameras tell the motion of only {int(known.sum())} of {len(known)} intervals"
+        reason = f"the cameras determine the motion of only {int(known.sum())} of {len(known)} intervals"
         return Diagnosis(sequence, reason, seen_by_cameras, repeated=copies)
     angular, linear = _axes_of(sequence, seen_by_cameras)
     return calibrate_with_axes(sequence, seen_by_cameras, angular, linear, copies, processes=processes)
@@ -77,7 +77,7 @@ def calibrate_with_axes(
     shift = found if given_shift is None else given_shift
     if fit is None or shift != Shift.AFTER:
         fit = fit_windows(sequence, seen_by_cameras, twist(shift), processes)
-    reason = "" if fit is not None else "no stretch of the recording has enough tracks to tell noise from error"
+    reason = "" if fit is not None else "no stretch of the recording has enough tracks to separate noise from error"
     return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
 
 

@@ -16,7 +16,7 @@ from .track_statistics import TrackStatistics, track_statistics
 from .velocity_findings import findings_of, not_identifiable
 
 SCHEMA = "fgbaseline/diagnosis/1"
-"""raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
+"""incremented when a key is renamed, removed or changes its meaning; new keys do not change it"""
 
 
 def to_json(
@@ -36,9 +36,11 @@ def to_json(
     }
     report |= _velocities(diagnosis) | _noise(diagnosis) | _tracks(tracks)
     notes: dict[str, str] = {}
-    clean: dict[str, Any] = _without_nan(report, "", notes, diagnosis.cannot_tell or "the recording does not tell it")
+    clean: dict[str, Any] = _without_nan(
+        report, "", notes, diagnosis.cannot_tell or "the recording does not determine it"
+    )
     if clean["cannot_tell"] is None:
-        notes["cannot_tell"] = "everything that was looked for could be told, but for what not_identifiable lists"
+        notes["cannot_tell"] = "everything was determined, except for what not_identifiable lists"
     return clean | {"notes": notes}
 
 
@@ -151,7 +153,7 @@ def _without_nan(tree: Any, path: str, notes: dict[str, str], reason: str) -> An
 
 
 REASONS = {
-    "wrong_matches": "frame 0 has no frame before it, and over some intervals the cameras do not tell the motion",
+    "wrong_matches": "frame 0 has no frame before it, and over some intervals the cameras do not determine the motion",
     "time_offset_s": "a delay needs turns that cameras and velocities both show",
     "time_offset_std_s": "a delay needs turns that cameras and velocities both show",
     "time_offset_frames": "a delay needs turns that cameras and velocities both show",

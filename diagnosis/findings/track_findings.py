@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import plural
+from fgbaseline.data.plural import percent, plural
 from fgbaseline.data.problem.velocity_gaps import GAP
 from fgbaseline.data.sequence import Sequence
 
@@ -13,9 +13,9 @@ from .phrases import spans
 from .track_statistics import BURST, MIN_USABLE, MOVING_LINKS, TrackStatistics
 
 MIN_WRONG = 0.10
-"""share of the links: every tracker has some that are wrong"""
+"""share of wrong links that is reported: every tracker has some"""
 MIN_DEPTHLESS, MIN_TINY, MIN_ROWS, MIN_MOVING = 0.0075, 0.02, 0.01, 0.01
-"""shares of the observations, or of the tracks for `MIN_MOVING`, that are worth a word"""
+"""shares of the observations, or of the tracks for `MIN_MOVING`, that are reported"""
 
 
 def track_findings(sequence: Sequence, repeated: BoolArray, tracks: TrackStatistics) -> tuple[Finding, ...]:
@@ -55,8 +55,8 @@ def _wrong_matches(tracks: TrackStatistics) -> list[Finding]:
     if wrong <= MIN_WRONG * links or links == 0:
         return []
     text = (
-        f"{wrong / links:.0%} of the matches from a frame to the next contradict the motion that the others of their "
-        f"frame agree on ({wrong:,} of {links:,})."
+        f"{percent(wrong / links)} of the matches from a frame to the next contradict the motion that the others "
+        f"of their frame agree on ({wrong:,} of {links:,})."
     )
     return [_counted("wrong_matches", text, wrong / links, tracks.wrong_after, "share of the matches")]
 
@@ -67,9 +67,9 @@ def _bursts(tracks: TrackStatistics) -> list[Finding]:
         return []
     worst = int(frames[np.argmax(tracks.wrong_share[frames])])
     text = (
-        f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than {BURST:.0%} of the matches "
+        f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than {percent(BURST)} of the matches "
         f"contradict the motion (from frames {spans(frames)}; worst from frame {worst}, "
-        f"{tracks.wrong_share[worst]:.0%} of {tracks.links[worst]})."
+        f"{percent(tracks.wrong_share[worst])} of {tracks.links[worst]})."
     )
     return [_counted("bursts", text, float(tracks.wrong_share[worst]), tracks.wrong_after, "share of the matches")]
 
@@ -89,14 +89,14 @@ def _disparities(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     n, found = max(1, len(sequence.observations)), []
     if tracks.not_positive > MIN_DEPTHLESS * n:
         text = (
-            f"{plural(tracks.not_positive, 'observation')} ({tracks.not_positive / n:.1%}) have a disparity of zero or "
-            "less: no point in front of the camera gives that."
+            f"{plural(tracks.not_positive, 'observation')} ({percent(tracks.not_positive / n, 1)}) have a disparity of "
+            "zero or less: no point in front of the camera gives that."
         )
         found.append(_counted("disparity_not_positive", text, tracks.not_positive, 0, "observations"))
     if tracks.tiny > MIN_TINY * n:
         text = (
-            f"{plural(tracks.tiny, 'observation')} ({tracks.tiny / n:.1%}) have a disparity of at most "
-            f"{MIN_DISPARITY:g} px, too little to tell a depth."
+            f"{plural(tracks.tiny, 'observation')} ({percent(tracks.tiny / n, 1)}) have a disparity of at most "
+            f"{MIN_DISPARITY:g} px, too small to determine a depth."
         )
         found.append(_counted("disparity_tiny", text, tracks.tiny, 0, "observations"))
     return found
@@ -107,8 +107,8 @@ def _rows(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     if tracks.rows <= MIN_ROWS * n:
         return []
     text = (
-        f"In {plural(tracks.rows, 'observation')} ({tracks.rows / n:.1%}) the rows of the left and right image differ "
-        f"by more than {MAX_ROW_MISMATCH:g} px: not matched, or not rectified."
+        f"In {plural(tracks.rows, 'observation')} ({percent(tracks.rows / n, 1)}) the rows of the left and right image "
+        f"differ by more than {MAX_ROW_MISMATCH:g} px: not matched, or not rectified."
     )
     return [_counted("row_mismatch", text, tracks.rows, 0, "observations")]
 
@@ -119,7 +119,7 @@ def _few_features(tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"{plural(len(frames), 'frame')} of {len(tracks.usable):,} have fewer than {MIN_USABLE} usable features "
-        f"({spans(frames)}): only the velocities tell the motion there."
+        f"({spans(frames)}): only the velocities give the motion there."
     )
     return [_counted("few_features", text, len(frames), len(frames), "frames")]
 
@@ -133,7 +133,7 @@ def _cuts(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
-        "tracker started anew, or the recording is cut there. Only the velocities tell the motion."
+        "tracker started anew, or the recording is cut there. Only the velocities give the motion."
     )
     return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
 

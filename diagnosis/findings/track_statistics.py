@@ -43,7 +43,7 @@ class TrackStatistics:
     usable: IntArray
     """(T,) observations of each frame that can be triangulated"""
     links: IntArray
-    """(T-1,) pairs of sound observations of one landmark over each interval whose motion the cameras tell"""
+    """(T-1,) track segments over each interval with a known motion"""
     wrong: IntArray
     """(T-1,) those that contradict this motion"""
     wrong_after: float

@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift, zero_order_hold
+from fgbaseline.data.plural import percent
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
@@ -22,7 +23,7 @@ MIN_SCALE = 0.02
 SURE_SHIFT = 2.0
 """standard errors from both usual shifts; `time_delay.INFLATION` is in the standard error already"""
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
-"""intervals: shifts that are a convention, and nobody's mistake"""
+"""intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
 """rad/s, share and rad: standard errors beyond which a figure is not identifiable"""
 
@@ -77,7 +78,7 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
     if (deviation > KNOWN_BIAS).any():
         sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
     if diagnosis.velocity_scale[1] > KNOWN_SCALE:
-        sentences.append(f"The scale of the velocities better than to {diagnosis.velocity_scale[1]:.1%}.")
+        sentences.append(f"The scale of the velocities better than to {percent(diagnosis.velocity_scale[1], 1)}.")
     angle = diagnosis.misalignment[1]
     loose = ["xyz"[i] for i in range(3) if angle[i] > KNOWN_ANGLE]
     if loose:
@@ -116,7 +117,7 @@ def _axes(which: str, axes: Axes, unit: str) -> Finding:
     else:
         what = f"The {which} velocity is recorded in other axes: the axes of imu_T_cam are its ({axes.name})"
     unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
-    part = f"; that of {listed(unseen)} is a guess, the cameras cannot tell" if unseen else ""
+    part = f"; that of {listed(unseen)} is a guess, the cameras do not determine it" if unseen else ""
     return Finding(
         f"{which}_axes",
         f"{what}{part}.",
@@ -172,12 +173,12 @@ def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
     more = "larger" if scale > 1.0 else "smaller"
     return Finding(
         "velocity_scale",
-        f"Recorded speeds are {abs(scale - 1.0):.1%} {more} than the stereo camera sees; which of the two is wrong "
-        "the recording cannot tell, so neither is changed unless that is set by hand.",
+        f"Recorded speeds are {percent(abs(scale - 1.0), 1)} {more} than the stereo speeds; the recording does not "
+        "show which of the two is wrong, so neither is changed without a user-specified repair.",
         scale,
         scale,
         "recorded over seen",
-        f"standard error {deviation:.1%}",
+        f"standard error {percent(deviation, 1)}",
     )
 
 

@@ -42,7 +42,7 @@ class CalibrationFit:
     """white noise within a window: `sigmas` without time-correlated errors"""
     motion: FloatArray
     """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
-    unit normal distribution where the noise is as found; NaN where the cameras tell nothing"""
+    unit normal distribution where the noise is as found; NaN where the cameras determine nothing"""
 
 
 def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> CalibrationFit | None:
@@ -71,11 +71,8 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, proce
         sigmas.linear_velocity * inflation.velocity,
         sigmas.angular_velocity * inflation.velocity,
     )
-    residual = np.concatenate([fit.motion_residual for fit in fits]) / np.repeat(
-        [sigmas.linear_velocity, sigmas.angular_velocity], 3
-    )
-    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
-    motion = np.where(redundancy > MIN_REDUNDANCY, residual / np.sqrt(np.maximum(redundancy, MIN_REDUNDANCY)), np.nan)
+    residual, redundancy = _redundant_residuals(fits)
+    motion = residual / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3) / np.sqrt(redundancy)
     return CalibrationFit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
 
 
@@ -93,17 +90,22 @@ def half_cost(
 
 
 def _components(fits: list[WindowFit], sigmas: NoiseSettings, baseline: float) -> NoiseSettings:
-    residual = np.concatenate([fit.motion_residual for fit in fits])
-    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
-    redundant = redundancy > MIN_REDUNDANCY
-    share = np.where(redundant, residual**2 / np.maximum(redundancy, MIN_REDUNDANCY), np.nan)
-    variance = np.nanmedian(share, axis=0) / CHI_SQUARE_MEDIAN if redundant.any(axis=0).all() else np.zeros(6)
+    residual, redundancy = _redundant_residuals(fits)
+    is_known = (~np.isnan(residual)).any(axis=0).all()
+    variance = np.nanmedian(residual**2 / redundancy, axis=0) / CHI_SQUARE_MEDIAN if is_known else np.zeros(6)
     pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
     return NoiseSettings(
         pixel=max(FLOOR.pixel, sigmas.pixel * float(np.sqrt(pixel))),
         linear_velocity=max(FLOOR.linear_velocity * baseline, float(np.sqrt(variance[:3].mean()))),
         angular_velocity=max(FLOOR.angular_velocity, float(np.sqrt(variance[3:].mean()))),
     )
+
+
+def _redundant_residuals(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
+    """Velocity residuals (n, 6), NaN where their redundancy is too small, and that redundancy, at least the minimum."""
+    residual = np.concatenate([fit.motion_residual for fit in fits])
+    redundancy = np.concatenate([fit.motion_redundancy for fit in fits])
+    return np.where(redundancy > MIN_REDUNDANCY, residual, np.nan), np.maximum(redundancy, MIN_REDUNDANCY)
 
 
 def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:

@@ -69,12 +69,12 @@ End = tuple[FloatArray, FloatArray]
 
 
 def _between(one: End, other: End) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """How far apart two halves of the tracks have the last pose (6,), and the covariance of that for white noise."""
+    """Difference (6,) of the last pose between two halves of the tracks, and its covariance for white noise."""
     return se3.log(se3.inverse(one[0]) @ other[0]), one[1] + other[1], np.zeros((6, 6))
 
 
 def _half(window: Window, parity: int) -> Window:
-    """That of the even or the odd landmarks."""
+    """Half of the window's landmarks, even or odd."""
     data, poses, points = window
     chosen = data.row % 2 == parity
     half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
@@ -84,14 +84,14 @@ def _half(window: Window, parity: int) -> Window:
 def _ends(
     sequence: Sequence, windows: list[Window], loose: NoiseSettings, shared: FloatArray, processes: int
 ) -> list[End]:
-    """Where each window ends, from the tracks."""
+    """Last pose of each window from the tracks."""
     common = [shared] * len(windows)
     fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
     return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 
 def _driven(data: WindowData, shared: FloatArray, sigmas: NoiseSettings) -> tuple[FloatArray, FloatArray]:
-    """The same from the velocities, without their bias, to scale and turned."""
+    """Last pose of each window from the velocities, corrected for bias, scale and misalignment."""
     back = so3.exp_so3(shared[TURN])
     velocity, rate = data.twist[:, :3] / (1.0 + shared[SCALE]), data.twist[:, 3:] - shared[:3]
     path = se3.compose(se3.exp(np.concatenate([velocity @ back, rate @ back], axis=1) * data.dt[:, None]))

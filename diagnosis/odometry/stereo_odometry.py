@@ -1,8 +1,8 @@
-"""Stereo visual odometry from frame to frame, robust and vectorized over all pairs of frames.
+"""Frame-to-frame stereo visual odometry, robust and vectorized over all pairs of frames.
 
-Hypotheses of a pair's motion come from three track segments each (Kabsch); the one of least truncated cost (MSAC, Torr
-and Zisserman 2000) is refined by iteratively reweighted least squares. Residuals are pixels of the second frame,
-whitened by their own noise and by that of the point from which they are predicted.
+Hypotheses of a motion come from samples of three track segments (Kabsch). The one with the smallest truncated cost
+(MSAC, Torr and Zisserman 2000) is refined by iteratively reweighted least squares. Residuals are pixels of the second
+frame, whitened by their own noise and by that of the point triangulated in the first.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from ..tracks.track_segments import TrackSegments, track_segments
 from .ransac import TRUNCATION, best_hypotheses
 
 MIN_LINKS = 6
-"""per pair of frames, for a motion to be estimated"""
+"""smallest number of links per pair of frames for a motion"""
 REFINEMENTS = 12
 SINGULAR_CONDITION = 1e12
-"""of a motion's information in baselines and radians: beyond it the motion is not determined"""
+"""condition number of a motion's information (baselines and rad) beyond which it is undetermined"""
 DAMPING = 1e-9
 """1/baseline^2 and 1/rad^2, of each step"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Odometry:
-    """The motion between consecutive frames, for those of the T-1 intervals that have one."""
+    """Motions between consecutive frames, for the T-1 intervals."""
 
     known: BoolArray
     """(T-1,)"""
@@ -44,7 +44,7 @@ class Odometry:
 
     @property
     def inlier(self) -> BoolArray:
-        """(n,) segments that agree with the motion of their pair."""
+        """Mask (n,) of the segments consistent with the motion of their pair."""
         return np.asarray(self.whitened < TRUNCATION, dtype=np.bool_)
 
     def twist(self, dt: FloatArray) -> FloatArray:
@@ -55,7 +55,7 @@ class Odometry:
 
 
 def odometry(sequence: Sequence) -> Odometry:
-    """The motion of every pair of consecutive frames with enough track segments."""
+    """Motions of all pairs of consecutive frames with enough track segments."""
     links, camera, n_pairs = track_segments(sequence), sequence.camera, sequence.n_frames - 1
     count = np.bincount(links.frame, minlength=n_pairs)
     known = count >= MIN_LINKS
@@ -65,7 +65,7 @@ def odometry(sequence: Sequence) -> Odometry:
     damping = DAMPING * np.diag([camera.baseline**-2] * 3 + [1.0] * 3)
     for step in range(REFINEMENTS):
         whitened, squared = _whitened(camera, blocks, M)
-        # Geman-McClure, its scale coming down to that of the noise.
+        # Geman-McClure kernel, with its scale annealed down to that of the noise.
         scale = _bulk_sigma(squared) ** 2 * max(9.0, 200.0 * 0.5**step)
         H, gradient = _normal_equations(blocks, whitened, scale / (scale + squared), n_pairs)
         delta = np.zeros((n_pairs, 6))
@@ -86,7 +86,7 @@ def odometry(sequence: Sequence) -> Odometry:
 def _of_imu(
     imu_T_cam: FloatArray, M: FloatArray, H: FloatArray, sigma: float, known: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Motions of the IMU, with their covariances, from those of points between camera frames (cam_k+1_T_cam_k)."""
+    """IMU motions with covariances, from the motions of points between camera frames (cam_k+1_T_cam_k)."""
     motion, covariance = np.full_like(M, np.nan), np.full((len(M), 6, 6), np.nan)
     motion[known] = imu_T_cam @ se3.inverse(M[known]) @ se3.inverse(imu_T_cam)
     A = se3.adjoint(se3.inverse(motion[known]) @ imu_T_cam)
@@ -95,10 +95,10 @@ def _of_imu(
 
 
 class _Block(NamedTuple):
-    """n links in succession, each coordinate in an array of its own: stacks of small matrices take far longer."""
+    """Consecutive links (n), each coordinate as a separate array, because stacks of small matrices are far slower."""
 
     chosen: slice
-    """of all links"""
+    """slice of these links among all"""
     pair: IntArray
     """(n,)"""
     point: FloatArray

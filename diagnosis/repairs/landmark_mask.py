@@ -11,13 +11,13 @@ from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 PIECE = 8
-"""observations of a track that are tested together: few, so that odometry has hardly drifted"""
+"""observations of a track tested together: few enough that odometry has little drift"""
 MOVING = 6.0
-"""times the median error of a piece, from which on its point is dynamic"""
+"""error of a dynamic piece, in median errors of the pieces"""
 MOVING_LEAST = 2.0
 """px"""
 UNDETERMINED = 2.0
-"""of its distance: the deviation of a point that may as well be behind the camera"""
+"""relative standard deviation of the distance at which a point may be behind the camera"""
 
 
 def exclude_landmarks(
@@ -43,7 +43,7 @@ def exclude_landmarks(
 
 
 def _moving(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
-    """(m,) landmarks that do not stand still."""
+    """Mask (m,) of dynamic landmarks."""
     piece, n_pieces = _pieces(row, o.frame)
     position = triangulate_tracks(model, world_T_cam, piece, o.pixel, n_pieces).position
     residual = o.pixel - model.camera.project(se3.transform(se3.inverse(world_T_cam), position[piece]))
@@ -67,7 +67,7 @@ def _pieces(row: IntArray, frame: IntArray) -> tuple[IntArray, int]:
 
 
 def _undetermined(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
-    """(m,) landmarks whose distance is open, or that lie behind a camera."""
+    """Mask (m,) of landmarks with an undetermined distance, or behind a camera."""
     position, information = triangulate_tracks(model, world_T_cam, row, o.pixel, int(row.max()) + 1)
     depth = se3.transform(se3.inverse(world_T_cam), position[row])[:, 2]
     behind = np.bincount(row, ~(depth > 0.0)) > 0

@@ -14,8 +14,8 @@ from fgbaseline.geometry.measurement import ROWS
 from .settings import JointSettings
 
 DISAGREEMENT = 1.0 - 1e-6
-"""Chi-square probability (5.5 sigma) beyond which an observation votes for rejecting the whole frame. Noise assumed too
-small by half stays below it; wrong matches do not."""
+"""Chi-square probability (5.5 sigma) beyond which an observation counts as an outlier for the rejection of its frame.
+Noise underestimated by half stays below it; wrong matches do not."""
 MIN_VOTES = 5
 """Smallest number of observations for which a frame can be rejected as a whole."""
 

@@ -1,7 +1,7 @@
-"""Map of the joint filter: last observation and reported estimate of every landmark of the drive.
+"""Map of the joint filter: latest observation and estimate of every landmark.
 
-The filter is causal: a landmark without an observation for some frames is marginalized. If it is observed again it is
-initialized as a new one, because the pose already contains the information of its first estimate.
+The filter is causal: a landmark without an observation for some frames is marginalized. If observed again, it is
+initialized as a new landmark, because the pose already contains the information of its first estimate.
 """
 
 import numpy as np

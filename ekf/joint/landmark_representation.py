@@ -1,13 +1,14 @@
-"""Landmark representation of the joint filter: world point or inverse depth, as three coordinates in a fixed chart.
+"""Landmark representation of the joint filter: world point or inverse depth, as three coordinates in a constant chart.
 
 A landmark's homogeneous world point is X = M [xi; 1] with a constant 4x4 matrix M, its chart:
 
-- M = I: xi is the point itself, in metres;
-- M = C Pi, with C = world_T_cam as estimated when the landmark was first seen and Pi [a, b, r, 1] = [a, b, 1, r]:
-  xi = (x/z, y/z, 1/z) as that camera saw it. What stereo measures (uL, uR, v) is linear in these three, so that their
-  error is as Gaussian as that of the pixels however far the point is, infinity included (Civera, Davison and Montiel,
-  IEEE T-RO 2008). There the anchor camera is part of the state; here C is constant, so that a landmark remains a
-  world point with three coordinates.
+- M = I: xi is the point itself, in m;
+- M = C Pi, with C = world_T_cam as estimated at the first observation and Pi [a, b, r, 1] = [a, b, 1, r]: xi is
+  (x/z, y/z, 1/z) in that camera.
+
+The rows (uL, uR, v) are linear in inverse-depth coordinates. Their error is therefore as Gaussian as the pixel noise at
+any distance, infinity included (Civera, Davison and Montiel, IEEE T-RO 2008). In that paper the anchor camera is part
+of the state; here C is constant, so that a landmark remains a world point with three coordinates.
 """
 
 from enum import StrEnum

@@ -54,7 +54,7 @@ class NotPositiveDefiniteError(Exception):
 
 
 class CholeskyFactor(NamedTuple):
-    """Cholesky factor of the innovation covariance, S = H P H^T + R = L L^T."""
+    """Cholesky factor of the innovation covariance: S = H P H^T + R = L L^T."""
 
     L: FloatArray
     """(3n, 3n), lower"""

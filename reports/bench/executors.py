@@ -1,4 +1,4 @@
-"""Executors of jobs: processes of this machine, or the workers of a Dask cluster; and their outcomes."""
+"""Executors of jobs, processes of this machine or workers of a Dask cluster, and the outcomes of the jobs."""
 
 import contextlib
 import os
@@ -7,136 +7,93 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol, TypeAlias
 from uuid import uuid4
 
 from fgbaseline.geometry import InputError
 
 from .job import Job
-from .progress_events import TOPIC, EventChannel, FileChannel, ProgressEvent
+from .progress import TOPIC, EventChannel, FileChannel, ProgressEvent
 from .worker import Outcome, work
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
 SECONDS_TO_CONNECT = 5
-SECONDS_TO_FOLLOW = 0.5
+PARENT_POLL = 0.5
+"""s between two checks of a worker process that its parent is alive"""
 PROGRESS = "progress"
 POLL = 0.1
-"""s between two looks at the jobs"""
-Look = Callable[[Iterable[ProgressEvent]], None]
-"""takes the progress of the workers, regularly"""
+"""s between two checks of the jobs"""
+ShowProgress: TypeAlias = Callable[[Iterable[ProgressEvent]], None]
+"""takes the last event of each worker, regularly"""
 
 
 class Future(Protocol):
-    """An outcome that is to come."""
+    """The outcome of a submitted job."""
 
     def done(self) -> bool:
-        """Whether it has come."""
+        """Whether the job has ended."""
         ...
 
     def result(self) -> Outcome:
-        """It, or what was raised in its place."""
+        """The outcome; raises where the worker died."""
         ...
 
 
-class Executor(Protocol):
-    """Workers."""
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Running workers."""
 
-    def submit(self, job: Job) -> Future:
-        """Gives them a job."""
-        ...
-
-    def events(self) -> Iterator[ProgressEvent]:
-        """The last event of each of them."""
-        ...
+    submit: Callable[[Job], Future]
+    events: Callable[[], Iterable[ProgressEvent]]
+    """the last event of each worker"""
 
 
-class Executors(Protocol):
-    """Starts workers, and ends them with the block."""
-
-    def __call__(self, count: int | None = None, /) -> AbstractContextManager[Executor]:
-        """So many of them (None: as many as there are to be had)."""
-        ...
+Executor: TypeAlias = Callable[..., AbstractContextManager[Workers]]
+"""starts workers, as many as its optional argument says, and ends them with the block"""
 
 
-class _Processes:
-    def __init__(self, pool: Any, channel: FileChannel) -> None:
-        self._pool, self._channel = pool, channel
-
-    def submit(self, job: Job) -> Future:
-        future: Future = self._pool.submit(work, job, self._channel)
-        return future
-
-    def events(self) -> Iterator[ProgressEvent]:
-        return self._channel.events()
-
-
-class Processes:
-    """Processes of this machine, that share nothing, with one BLAS thread each."""
-
-    def __init__(self, workers: int, folder: Path) -> None:
-        self._workers, self._folder = workers, folder / PROGRESS
+def processes(count: int, folder: Path) -> Executor:
+    """Processes of this machine, each with one BLAS thread; their progress goes through files in `folder`."""
+    progress = folder / PROGRESS
 
     @contextmanager
-    def __call__(self, count: int | None = None) -> Iterator[Executor]:
-        """New processes, that end with the block, if need be at once."""
+    def executor(count: int = count) -> Iterator[Workers]:
         from joblib.externals.loky import ProcessPoolExecutor
 
-        shutil.rmtree(self._folder, ignore_errors=True)
-        self._folder.mkdir()
-        pool = ProcessPoolExecutor(count or self._workers, env=ONE_THREAD, initializer=_follow, initargs=(os.getpid(),))
+        shutil.rmtree(progress, ignore_errors=True)
+        progress.mkdir()
+        channel = FileChannel(progress)
+        pool = ProcessPoolExecutor(count, env=ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),))
         try:
-            yield _Processes(pool, FileChannel(self._folder))
+            yield Workers(lambda job: pool.submit(work, job, channel), channel.events)
         finally:
             pool.shutdown(wait=True, kill_workers=True)
-            shutil.rmtree(self._folder, ignore_errors=True)
+            shutil.rmtree(progress, ignore_errors=True)
+
+    return executor
 
 
-def _follow(parent: int) -> None:
-    """Within a worker: leaves interrupts to the parent, and ends when that has been killed."""
+def _end_with_parent(parent: int) -> None:
+    """In a worker process: leaves interrupts to the parent, and exits when the parent was killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(SECONDS_TO_FOLLOW)
+            time.sleep(PARENT_POLL)
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
 
 
-class _Workers:
-    def __init__(self, client: "Client") -> None:
-        self._client = client
-        self._last: dict[str, ProgressEvent] = {}
-        client.subscribe_topic(TOPIC, self._hear)
-
-    def submit(self, job: Job) -> Future:
-        key = f"fgbaseline-{job.key}-{uuid4().hex[:8]}"
-        future: Future = self._client.submit(work, job, EventChannel(), key=key, pure=False, retries=0)
-        return future
-
-    def events(self) -> Iterator[ProgressEvent]:
-        return iter(list(self._last.values()))
-
-    def _hear(self, logged: tuple[float, Any]) -> None:
-        event = ProgressEvent(*logged[1])
-        self._last[event.worker] = event
-
-
-class Cluster:
-    """The workers of a Dask scheduler that is running."""
-
-    def __init__(self, address: str) -> None:
-        self._address = address
+def cluster(address: str) -> Executor:
+    """Workers of a running Dask scheduler; the block raises InputError where it does not answer or has none."""
 
     @contextmanager
-    def __call__(self, count: int | None = None) -> Iterator[Executor]:  # noqa: ARG002
-        """All of its workers. Raises InputError where it cannot be reached or has none."""
+    def executor(count: int | None = None) -> Iterator[Workers]:  # noqa: ARG001 - the scheduler has all its workers
         try:
             from distributed import Client
         except ImportError:
@@ -144,83 +101,97 @@ class Cluster:
                 "--scheduler needs Dask, which is not installed; pip install 'fgbaseline[cluster]'"
             ) from None
         try:
-            client = Client(self._address, timeout=SECONDS_TO_CONNECT)
+            client = Client(address, timeout=SECONDS_TO_CONNECT)
         except (OSError, ValueError, TypeError) as error:
             raise InputError(
-                f"--scheduler {self._address}: no Dask scheduler answers there ({error}); "
+                f"--scheduler {address}: no Dask scheduler answers there ({error}); "
                 "give its address, such as tcp://host:8786"
             ) from None
+        last: dict[str, ProgressEvent] = {}
+
+        def receive(logged: tuple[float, Any]) -> None:
+            event = ProgressEvent(*logged[1])
+            last[event.worker] = event
+
+        def submit(job: Job) -> Future:
+            key = f"fgbaseline-{job.key}-{uuid4().hex[:8]}"
+            future: Future = client.submit(work, job, EventChannel(), key=key, pure=False, retries=0)
+            return future
+
         try:
             if not client.scheduler_info()["workers"]:
-                raise InputError(f"--scheduler {self._address}: it has no workers; start some (dask worker ADDRESS)")
-            yield _Workers(client)
+                raise InputError(f"--scheduler {address}: it has no workers; start some (dask worker ADDRESS)")
+            client.subscribe_topic(TOPIC, receive)
+            yield Workers(submit, lambda: list(last.values()))
         finally:
             with contextlib.suppress(Exception):
                 client.unsubscribe_topic(TOPIC)
             client.close()
 
+    return executor
+
 
 def cores() -> int:
-    """How many this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def outcomes(jobs: Iterable[Job], executors: Executors, look: Look) -> Iterator[Outcome]:
-    """The outcome of every job, as they come.
+def outcomes(jobs: Iterable[Job], executor: Executor, show: ShowProgress) -> Iterator[Outcome]:
+    """Runs jobs and yields their outcomes as they end.
 
-    Where a process dies and takes the others with it (a segmentation fault, or no memory left), those jobs that were
-    being done are done again, each alone in a process; the one that dies again has failed.
+    A process that dies (a segmentation fault, out of memory) breaks the whole pool. The jobs that were running then run
+    again, each alone in a process; one that dies again has failed.
     """
     left = {job.key: job for job in jobs}
     while left:
-        with executors() as executor:
-            for outcome in _until_one_dies(executor, list(left.values()), look):
+        with executor() as workers:
+            for outcome in _until_one_dies(workers, list(left.values()), show):
                 del left[outcome.key]
                 yield outcome
-            begun = {event.key for event in executor.events()}
+            begun = {event.key for event in workers.events()}
         for job in [job for key, job in left.items() if key in begun or not begun & left.keys()]:
-            yield _alone(job, executors, look)
+            yield _alone(job, executor, show)
             del left[job.key]
 
 
-def _until_one_dies(executor: Executor, jobs: list[Job], look: Look) -> Iterator[Outcome]:
-    futures: dict[str, Future] = {job.key: executor.submit(job) for job in jobs}
-    dead = False
-    while futures and not dead:
+def _until_one_dies(workers: Workers, jobs: list[Job], show: ShowProgress) -> Iterator[Outcome]:
+    futures: dict[str, Future] = {job.key: workers.submit(job) for job in jobs}
+    is_broken = False
+    while futures and not is_broken:
         time.sleep(POLL)
-        look(executor.events())
+        show(workers.events())
         for key in [key for key, future in futures.items() if future.done()]:
             try:
                 outcome = futures[key].result()
             except Exception as error:
-                if not _is_the_end_of_all(error):
-                    yield Outcome(key, {}, _died(error), 0.0)
-                    del futures[key]
-                dead = dead or _is_the_end_of_all(error)
-                continue
+                if _breaks_pool(error):
+                    is_broken = True
+                    continue
+                outcome = _dead(key, error)
             del futures[key]
             yield outcome
 
 
-def _alone(job: Job, executors: Executors, look: Look) -> Outcome:
-    with executors(1) as executor:
-        future = executor.submit(job)
+def _alone(job: Job, executor: Executor, show: ShowProgress) -> Outcome:
+    with executor(1) as workers:
+        future = workers.submit(job)
         while not future.done():
             time.sleep(POLL)
-            look(executor.events())
+            show(workers.events())
         try:
             return future.result()
         except Exception as error:
-            return Outcome(job.key, {}, _died(error), 0.0)
+            return _dead(job.key, error)
 
 
-def _is_the_end_of_all(error: Exception) -> bool:
-    """Whether the executor is of no more use: a pool of processes is broken as a whole, a cluster is not."""
+def _breaks_pool(error: Exception) -> bool:
+    """Whether the error ends all workers: a pool of processes breaks as a whole, a cluster does not."""
     from concurrent.futures.process import BrokenProcessPool
 
     return isinstance(error, BrokenProcessPool)
 
 
-def _died(error: Exception) -> str:
-    said = " ".join(str(error).split()) or "no text"
-    return f"its process died, as from a fault in compiled code or for want of memory ({type(error).__name__}: {said})"
+def _dead(key: str, error: Exception) -> Outcome:
+    text = " ".join(str(error).split()) or "no text"
+    failure = f"its process died, by a fault in compiled code or out of memory ({type(error).__name__}: {text})"
+    return Outcome(key, {}, failure, 0.0)

@@ -1,4 +1,4 @@
-"""Jobs of a suite, with every fault that can be known reported before one of them runs."""
+"""Plan of a suite: its jobs, with faults of the suite reported before any job runs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,19 +12,17 @@ from fgbaseline.data.simulate import Simulation
 from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.run.problem import check_estimators
 
-from .cache_key import code_of, content_of
-from .job import File, Job, Planned, Recorded, Simulated
-from .simulated_cases import DriveError, drives
-from .suite import Entry, Suite, several
+from ..run.problem import check_estimators
+from .job import File, Job, Planned, Recorded, Simulated, code_hash, file_hash
+from .suite import DriveError, Entry, Suite, drives, several
 
 MOST_JOBS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A sequence of the suite, and what its rows are called."""
+    """A sequence of the suite with its name in tables."""
 
     name: str
     source: Recorded | Simulated
@@ -34,15 +32,15 @@ class Input:
 
 
 def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
-    """Every job of a suite in order, `data` being the folder of relative paths (None: that of the suite).
+    """Lists the jobs of a suite, `data` being the folder of relative paths (None: that of the suite).
 
-    Raises InputError naming the file and the place of what cannot be.
+    Raises InputError with the file and the key path of a fault.
     """
     _check_estimators(suite)
     sweep = _settings(suite)
     varied = {name for name in sweep[0] if len({_words(settings[name]) for settings in sweep}) > 1}
     content = suite.content
-    code = code_of(content.estimators, content.page != "none")
+    code = code_hash(content.estimators, content.page != "none")
     jobs: list[Planned] = []
     names: dict[str, int] = {}
     for index, entry in enumerate(content.sequence):
@@ -62,7 +60,7 @@ def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
                 )
                 jobs.append(_planned(job, each, {name: _words(settings[name]) for name in sorted(varied)}))
                 if len(jobs) > MOST_JOBS:
-                    raise suite.wrong((), f"the suite has more than {MOST_JOBS} jobs; ask for less")
+                    raise suite.wrong((), f"the suite has more than {MOST_JOBS} jobs; reduce its settings or seeds")
     for index, entry in enumerate(content.sequence):
         _check_repairs(suite, index, entry, sweep)
     return jobs
@@ -84,18 +82,18 @@ def _check_estimators(suite: TomlFile[Suite]) -> None:
 
 
 def _settings(suite: TomlFile[Suite]) -> list[dict[str, Any]]:
-    """Every combination of settings; those that a preset has no use for do not multiply its runs."""
+    """Every combination of settings; those that a preset does not use do not multiply its runs."""
     sweep = suite.content.sweep
     for name, value in sweep:
         values = several(value)
         for index, one in enumerate(values):
             if one in values[:index]:
-                raise suite.wrong(("sweep", name, index), f"{name}: {_words(_plain(one))} is named twice; name it once")
+                raise suite.wrong(("sweep", name, index), f"{name}: {_words(_plain(one))} is given twice; give it once")
     presets = several(sweep.preset)
     for name, preset in (("noise", "calibrated"), ("landmarks", "documented")):
         if getattr(sweep, name) is not None and preset not in presets:
             raise suite.wrong(
-                ("sweep", name), f"{name} is a setting of the {preset} preset alone; add that preset, or leave it out"
+                ("sweep", name), f"{name} is a setting of the {preset} preset only; add that preset, or leave it out"
             )
     found: list[dict[str, Any]] = []
     for preset, features, noise, landmarks, held_out in product(
@@ -118,12 +116,12 @@ def _settings(suite: TomlFile[Suite]) -> list[dict[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
-    """Given noise as a mapping of numbers."""
+    """User-specified noise as a mapping of numbers."""
     return value.model_dump(exclude_none=True) if hasattr(value, "model_dump") else value
 
 
 def _words(value: Any) -> str:
-    """A setting as it stands in names: `all`, `0.5`, `pixel 1.5 linear_velocity 0.3`."""
+    """A setting as text in names: `all`, `0.5`, `pixel:1.5,linear_velocity:0.3`."""
     if isinstance(value, Mapping):
         return ",".join(f"{name}:{_words(one)}" for name, one in value.items())
     if isinstance(value, list | tuple):
@@ -157,18 +155,16 @@ def _check_repairs(suite: TomlFile[Suite], index: int, entry: Entry, sweep: list
             why = "the documented preset" if settings["preset"] == "documented" else 'noise = "assumed"'
             raise suite.wrong(
                 ("sequence", index, "repairs"),
-                f"{why} takes a recording as it is, and repairs would have no effect; leave one of the two out",
+                f"{why} uses no repairs; leave out one of the two",
             )
         if isinstance(settings["noise"], Mapping):
-            raise suite.wrong(
-                ("sequence", index, "repairs"), "noise is set by [sweep] as well; leave one of the two out"
-            )
+            raise suite.wrong(("sequence", index, "repairs"), "[sweep] sets the noise too; leave out one of the two")
 
 
 def _recordings(
     suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None
 ) -> Iterator[tuple[str, Recorded, float]]:
-    """Name, source and number of observations of each. Raises InputError naming the place."""
+    """Yields name, source and number of observations of each. Raises InputError with the key path."""
     folder = (data or Path(suite.path).parent).absolute()
     found = _files(suite, index, entry, folder)
     truth = None if entry.truth is None else folder / entry.truth
@@ -177,7 +173,7 @@ def _recordings(
         if getattr(entry, key) is not None and len(found) > 1:
             raise suite.wrong(
                 ("sequence", index, key),
-                f"{key} is for one recording, and files names {len(found)}; give each a [[sequence]] of its own",
+                f"{key} is for one recording, and files matches {len(found)}; give each its own [[sequence]]",
             )
     for path, place in found:
         try:
@@ -186,20 +182,22 @@ def _recordings(
             sequence = read(path, truth, entry.truth_frame)
         except InputError as error:
             raise suite.wrong(place, str(error)) from None
-        source = Recorded(_known(path), _file(truth), entry.truth_frame, _file(repairs))
+        source = Recorded(File(str(path), file_hash(path)), _file(truth), entry.truth_frame, _file(repairs))
         yield entry.name or path.stem, source, float(len(sequence.observations))
 
 
 def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> list[tuple[Path, tuple[str | int, ...]]]:
-    """The files and where each is named, sorted within a pattern; none twice."""
-    left_out = {path for pattern in several(entry.leave_out) for path in _matching(folder, pattern)}
+    """The files with their key paths, sorted within a pattern, each once."""
+    excluded = {path for pattern in several(entry.leave_out) for path in _matching(folder, pattern)}
     found: dict[Path, tuple[str | int, ...]] = {}
     for number, pattern in enumerate(entry.patterns):
         place = ("sequence", index, "files", number)
-        paths = [path for path in _matching(folder, pattern) if path.is_file() and path not in left_out]
+        paths = [path for path in _matching(folder, pattern) if path.is_file() and path not in excluded]
         if not paths:
             what = "matches no file" if has_magic(pattern) else "is no file"
-            raise suite.wrong(place, f"files: '{pattern}' {what} in {folder}; correct it, or say where with --data")
+            raise suite.wrong(
+                place, f"files: '{pattern}' {what} in {folder}; correct it, or give the folder with --data"
+            )
         for path in paths:
             found.setdefault(path, place)
     return list(found.items())
@@ -212,8 +210,4 @@ def _matching(folder: Path, pattern: str) -> list[Path]:
 
 
 def _file(path: Path | None) -> File | None:
-    return None if path is None else _known(path)
-
-
-def _known(path: Path) -> File:
-    return File(str(path), content_of(path))
+    return None if path is None else File(str(path), file_hash(path))

@@ -1,37 +1,44 @@
-"""The report of a bench: results collected from the runs, tables that repeat, costs apart, figures and page."""
+"""Report of a bench: results of its runs, reproducible tables, tables of time and memory, figures and page."""
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.figures.bench import draw
 
+from ..figures.bench import draw
 from ..figures.saving import encoded
-from ..phrases.bench import TABLE
-from ..results.bench import ANSWERED, COSTS, OF_THE_RUN, Results
+from ..figures.style import colors
+from ..html.environment import environment, picture
+from ..phrases.bench import FIGURES, NEES, TABLE, sentences
+from ..results import bench as statistics
+from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
 from ..results.reader import RunFolder
-from ..results.tree import INFINITE, at
-from ..tables import bench_statistics as statistics
+from ..results.statistics import INFINITE, at
 from ..tables import latex, markdown
-from ..tables.bench import main_table
-from ..tables.bench_statistics import METRICS
+from ..tables.bench import main_table, ranking_tables, runs_table
 from .job import Planned
-from .page import render
-from .run_cache import RunCache
+from .progress import duration
+from .run_cache import RUNS, RunCache
 from .worker import COSTS as COSTS_FILE
 
 SCHEMA: Final = "fgbaseline/bench/1"
 OF_A_RUN = ("problem", "reference", "held_out", "estimators")
-NOT_THE_SAME = ("seconds", "frames_per_second")
+TIMINGS = ("seconds", "frames_per_second")
 """keys of an estimator's summary that differ between two runs of one job"""
+COSTS_NOTE = "Time and memory are of this machine and in separate files."
+MOST_OPEN = 24
+"""rows up to which a table is open from the start"""
 
 
-def write_report(name: str, results: Results, store: RunCache) -> None:
-    """Writes all of it, each file atomically; `summary.json` last."""
+def write_report(name: str, results: Results, cache: RunCache) -> None:
+    """Writes the report, each file atomically, `summary.json` last."""
     same = {
         "cases": statistics.cases(results),
         "runs": results.runs,
@@ -42,29 +49,58 @@ def write_report(name: str, results: Results, store: RunCache) -> None:
     }
     for title, frame in same.items():
         if len(frame):
-            store.write(f"tables/{title}.csv", _csv(frame))
+            cache.write(f"tables/{title}.csv", _csv(frame))
     table = main_table(results, with_costs=False, caption=TABLE)
-    store.write("tables/table.md", markdown(table).encode())
-    store.write("tables/table.tex", latex(table).encode())
-    store.write("costs/cases.csv", _csv(statistics.costs(results)))
-    store.write("costs/runs.csv", _csv(results.costs))
+    cache.write("tables/table.md", markdown(table).encode())
+    cache.write("tables/table.tex", latex(table).encode())
+    cache.write("costs/cases.csv", _csv(statistics.costs(results)))
+    cache.write("costs/runs.csv", _csv(results.costs))
     with_costs = main_table(results, with_costs=True, caption=TABLE)
-    store.write("costs/table.md", markdown(with_costs).encode())
-    store.write("costs/table.tex", latex(with_costs).encode())
+    cache.write("costs/table.md", markdown(with_costs).encode())
+    cache.write("costs/table.tex", latex(with_costs).encode())
     figures = draw(results, statistics.judge(results), statistics.cases(results), statistics.costs(results))
     for title, figure in figures.items():
         for form in ("png", "svg"):
-            store.write(f"figures/{title}.{form}", encoded(figure, form))
-    store.write("report.html", render(name, results, figures).encode())
-    store.write("summary.json", summarize(name, results).encode())
+            cache.write(f"figures/{title}.{form}", encoded(figure, form))
+    cache.write("report.html", render(name, results, figures).encode())
+    cache.write("summary.json", summarize(name, results).encode())
 
 
 def _csv(table: pd.DataFrame) -> bytes:
     return table.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode()
 
 
+def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
+    """The page `report.html`, which opens offline; it links to the pages of the runs."""
+    palette = colors(results.estimators, results.reference)
+    return (
+        environment()
+        .get_template("bench.html")
+        .render(
+            name=name,
+            results=results,
+            spent=duration(results.seconds),
+            verdict=sentences(results),
+            table=main_table(results, with_costs=True, caption=f"{TABLE} {COSTS_NOTE}"),
+            swatches={name: Markup(f'style="background: {color}"') for name, color in palette.items()},
+            figures=[
+                replace(picture(key, figure), caption=NEES if key.startswith("nees_") else FIGURES.get(key, ""))
+                for key, figure in figures.items()
+            ],
+            tables=list(ranking_tables(results)),
+            runs=runs_table(results, RUNS),
+            most_open=MOST_OPEN,
+            trees={"Versions": _part(results, "versions"), "Machine": _part(results, "machine")},
+        )
+    )
+
+
+def _part(results: Results, part: str) -> Mapping[str, Any]:
+    return next((summary[part] for summary in results.summaries.values()), {})
+
+
 def summarize(name: str, results: Results) -> str:
-    """`summary.json` as `fgbaseline check` reads it: figures without timings, the same for the same jobs."""
+    """`summary.json` for `fgbaseline check`: metrics without timings, the same for the same jobs."""
     runs: dict[str, Any] = {}
     for one in results.planned:
         record = {
@@ -92,19 +128,19 @@ def summarize(name: str, results: Results) -> str:
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def collected(planned: Sequence[Planned], store: RunCache) -> Results:
-    """The results of jobs, all of which are done."""
+def collect_results(planned: Sequence[Planned], cache: RunCache) -> Results:
+    """Collects the results of jobs, all of which have run."""
     rows: list[dict[str, Any]] = []
     costs: list[dict[str, Any]] = []
     summaries, failures = {}, {}
     nees: dict[tuple[str, str], list[FloatArray]] = {}
     for one in planned:
-        failure = store.failure(one.job.key)
+        failure = cache.failure(one.job.key)
         if failure:
             failures[one.name] = failure
             rows += _failed(one, failure)
             continue
-        folder = RunFolder(store.run(one.job.key))
+        folder = RunFolder(cache.run(one.job.key))
         summary = folder.summary
         of_run = _of_run(one, summary)
         spent = json.loads((folder.folder / COSTS_FILE).read_text(encoding="utf-8"))["estimators"]
@@ -115,10 +151,10 @@ def collected(planned: Sequence[Planned], store: RunCache) -> Results:
             if estimator["nees"] is not None:
                 column = folder.series(name)["nees"].to_numpy(dtype=np.float64)
                 nees.setdefault((one.case, name), []).append(column)
-            for key in NOT_THE_SAME:
+            for key in TIMINGS:
                 del estimator[key]
         summaries[one.name] = summary
-    seconds = sum(store.record(key)["seconds"] for key in {one.job.key for one in planned})
+    seconds = sum(cache.record(key)["seconds"] for key in {one.job.key for one in planned})
     table = pd.DataFrame(costs, columns=list(COSTS))
     return Results(planned, pd.DataFrame(rows), table, summaries, failures, nees, seconds)
 

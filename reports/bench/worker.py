@@ -1,4 +1,4 @@
-"""The work of a worker: a job in, the files of its run out as bytes. Objects of GTSAM live and die in here."""
+"""Work of a worker process: a job in, the files of its run out as bytes. GTSAM objects do not leave it."""
 
 import json
 import time
@@ -19,42 +19,41 @@ from fgbaseline.data.solving import describe, solve_all
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
-from fgbaseline.reports.run.folder import write_numbers, write_page, write_run
 
-from .cache_key import code_of, content_of
-from .job import File, Job, Recorded
+from ..run.folder import write_numbers, write_page, write_run
+from .job import File, Job, Recorded, code_hash, file_hash
 
 COSTS = "costs.json"
 RESET_PEAK = "5"
-"""makes Linux forget the peak so far (man 5 proc, clear_refs)"""
+"""makes Linux reset the peak memory (man 5 proc, clear_refs)"""
 Channel = Callable[[str, str, int, int], None]
-"""takes progress: the job's key, its step, frames done, frames there are"""
+"""takes progress: key of the job, step, frames done, frames in total"""
 Report = Callable[[str, int, int], None]
-"""takes progress of a job: step or estimator, frames done, frames there are"""
-_one_at_a_time = Lock()
-"""memory and BLAS threads are the process's, and GTSAM holds the interpreter: threads would only spoil the figures"""
+"""takes progress of a job: step or estimator, frames done, frames in total"""
+_one_job = Lock()
+"""one job per process: memory and BLAS threads are the process's, and GTSAM holds the interpreter lock"""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a job."""
+    """Outcome of a job."""
 
     key: str
     files: Mapping[str, bytes]
-    """by path within the run's folder; empty where the job failed"""
+    """by path in the run's folder; empty where the job failed"""
     failure: str
-    """why there are none; empty where there are"""
+    """reason of the failure; empty for a success"""
     seconds: float
 
 
 def work(job: Job, channel: Channel) -> Outcome:
-    """Runs a job; whatever goes wrong is its outcome, and never raised."""
+    """Runs a job; an error is its outcome, and never raised."""
     key = job.key
 
     def report(doing: str, done: int, total: int) -> None:
         channel(key, doing, done, total)
 
-    with _one_at_a_time, threadpool_limits(limits=1):
+    with _one_job, threadpool_limits(limits=1):
         start = time.perf_counter()
         try:
             files, failure = _files(job, report), ""
@@ -66,12 +65,12 @@ def work(job: Job, channel: Channel) -> Outcome:
 
 
 def _files(job: Job, report: Report) -> dict[str, bytes]:
-    if code_of(job.estimators, job.page != "none") != job.code:
-        raise FgbaselineError("this worker has another version of fgbaseline or of its libraries; install the same")
+    if code_hash(job.estimators, job.page != "none") != job.code:
+        raise FgbaselineError("this worker has a different version of fgbaseline or of its libraries; install the same")
     report("reading", 0, 0)
     sequence = _sequence(job)
     kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
-    report("posing the problem", 0, 0)
+    report("building the problem", 0, 0)
     problem = _problem(kept, job)
     watch = CostWatch(report)
     run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
@@ -96,9 +95,9 @@ def _sequence(job: Job) -> Sequence:
 def _require_unchanged(file: File) -> None:
     path = Path(file.path)
     if not path.is_file():
-        raise FgbaselineError(f"{path}: there is no such file where this worker runs; put it there")
-    if content_of(path) != file.content:
-        raise FgbaselineError(f"{path}: the file is another than when the bench was planned; run the bench again")
+        raise FgbaselineError(f"{path}: there is no such file on the worker's machine; copy it there")
+    if file_hash(path) != file.content:
+        raise FgbaselineError(f"{path}: the file has changed since the bench was planned; run the bench again")
 
 
 def _problem(sequence: Sequence, job: Job) -> Problem:
@@ -126,7 +125,7 @@ def _write(run: Run, folder: Path, job: Job) -> None:
 
 
 def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
-    """By estimator; what one run gave along with another has the cost of that run."""
+    """Costs by estimator; a by-product has the cost of its run."""
     source = {by: name for name, r in run.results.items() for by in r.estimate.by_products if by not in peak_mb}
     return {
         "estimators": {
@@ -137,24 +136,24 @@ def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
 
 
 class CostWatch:
-    """Around the work of estimators, one at a time: notes the peak memory of each, and reports progress."""
+    """Measures the peak memory of estimators, one at a time, and reports their progress."""
 
     def __init__(self, report: Report) -> None:
         self.peak_mb: dict[str, float] = {}
-        """peak resident memory of the process, MB, by estimator; missing where the system has no measure of it"""
+        """peak resident memory of the process, MB, by estimator; missing where the system does not measure it"""
         self._report = report
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[Progress]:
         """The `Watch` of `solve_all`."""
         self._report(name, 0, 0)
-        forgotten = _forget_peak()
+        is_reset = _reset_peak()
         yield lambda done, total, /: self._report(name, done, total)
-        if forgotten and (peak := _peak_mb()) is not None:
+        if is_reset and (peak := _peak_mb()) is not None:
             self.peak_mb[name] = peak
 
 
-def _forget_peak() -> bool:
+def _reset_peak() -> bool:
     try:
         Path("/proc/self/clear_refs").write_text(RESET_PEAK)
     except OSError:

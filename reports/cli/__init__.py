@@ -1,4 +1,4 @@
-"""The command `fgbaseline`. Nothing heavy is imported before a command that needs it runs."""
+"""The command `fgbaseline`. A command imports what it needs when it runs, so that `--help` answers at once."""
 
 from .main import main
 

@@ -1,7 +1,6 @@
-"""The entry point: finds the command, and turns bad input into one sentence and exit code 2."""
+"""Entry point: the group of commands, and bad input as one sentence with exit code 2."""
 
 import gc
-import importlib
 import os
 import signal
 import sys
@@ -10,51 +9,42 @@ from typing import NoReturn
 
 import click
 
+from .evaluation_commands import bench, check, compare, figures, reproduce
+from .recording_commands import diagnose, export, run, simulate
+
 COMMANDS = {
-    "run": "run",
-    "compare": "compare",
-    "diagnose": "diagnose",
-    "export": "export",
-    "figures": "figures",
-    "check": "check",
-    "bench": "bench",
-    "reproduce": "reproduce",
-    "simulate": "simulate",
+    command.name: command
+    for command in (run, compare, diagnose, export, figures, check, bench, reproduce, simulate)
+    if command.name is not None
 }
-"""command -> module of this package that holds it under the name `command`"""
+"""in the order of `--help`"""
 BAD_INPUT, INTERRUPTED = 2, 130
 NEW_OBJECTS = 50_000
-"""between two searches for cyclic garbage, of which there is little; Python has 700, as suits what runs for days"""
+"""between two searches for cyclic garbage, of which there is little; Python's 700 suits processes that run for days"""
 
 
 class _Commands(click.Group):
-    """Imports the module of a command when it is asked for."""
-
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = importlib.import_module(f".{COMMANDS[cmd_name]}", __package__).command
-        return command
 
 
 @click.group(
     cls=_Commands,
+    commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Example: fgbaseline run drive.npz --out out/drive",
 )
 @click.version_option(package_name="fgbaseline")
 def group() -> None:
-    """How far is a visual-inertial filter from what the data supports?
+    """Compare a visual-inertial filter with a factor-graph reference.
 
-    Runs an EKF and a factor-graph reference (GTSAM iSAM2) on the same problem and shows where they part.
+    Runs an EKF and a reference (GTSAM iSAM2) on the same problem, and reports divergence, reprojection errors and
+    consistency.
     """
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
-    """Runs the command line and exits: 0 well, 1 with a failed estimator, 2 on bad input, 130 when interrupted."""
+    """Runs the command line and exits: 0 success, 1 a failed estimator, 2 bad input, 130 interrupted."""
     # Small matrices everywhere: more than one BLAS thread only makes them wait for each other.
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
@@ -85,7 +75,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def _sentence(error: click.ClickException) -> str:
-    """What is wrong with the command line, on one line, and where help is."""
+    """Fault of the command line, on one line, and the command that prints help."""
     text = " ".join(error.format_message().split()).rstrip(".")
     context = error.ctx if isinstance(error, click.UsageError) else None
     return text if context is None else f"{text}; see {context.command_path} --help"

@@ -1,8 +1,14 @@
-"""Options that several commands have, and their types."""
+"""Option types, and options that several commands share."""
 
+from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 
 import click
+
+PATH = click.Path(path_type=Path)
+UNITS = click.Choice(["s", "ms", "us", "ns"])
+BODY = click.Choice(["imu", "camera"])
 
 
 class FeatureCount(click.ParamType[int | str]):
@@ -23,17 +29,58 @@ class FeatureCount(click.ParamType[int | str]):
         return number
 
 
+class Numbers(click.ParamType[tuple[float, ...]]):
+    """Numbers with a separator, in the form that `name` shows: `X,Y,Z`, `START:END`, or of any length `N,N,...`."""
+
+    def __init__(self, name: str, expected: str, *, of: Callable[[str], float] = float) -> None:
+        self.name, self._expected, self._of = name, expected, of
+        self._separator = ":" if ":" in name else ","
+        self._is_list = name.endswith("...")
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """The numbers; those of a list of any length are positive."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(self._of(part) for part in str(value).split(self._separator))
+        except ValueError:
+            numbers = ()
+        if self._is_list:
+            is_valid = bool(numbers) and all(isfinite(number) and number > 0 for number in numbers)
+        else:
+            is_valid = len(numbers) == len(self.name.split(self._separator))
+        if not is_valid:
+            self.fail(f"expected {self._expected}, got {value!r}", param, ctx)
+        return numbers
+
+
+class Formats(click.ParamType[tuple[str, ...]]):
+    """File formats, separated by commas."""
+
+    name = "pdf,svg,png"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        """The formats, each once."""
+        if isinstance(value, tuple):
+            return value
+        wanted = tuple(dict.fromkeys(part.strip().lower() for part in str(value).split(",")))
+        for form in wanted:
+            if form not in ("pdf", "svg", "png"):
+                self.fail(f"there is no format {form!r}; choose from pdf, svg and png", param, ctx)
+        return wanted
+
+
 preset = click.option(
     "--preset",
     type=click.Choice(["calibrated", "documented"]),
     default="calibrated",
     show_default=True,
-    help="How the problem is posed: what the data supports, or as the report has it.",
+    help="The problem: diagnosed and repaired, or as the source paper has it.",
 )
 features = click.option(
     "--features",
     type=FeatureCount(),
-    help="How many landmarks, those seen most often.  [default: all; 1000 for the documented preset]",
+    help="Number of landmarks, those with the most observations.  [default: all; documented: 1000]",
 )
 imu = click.option(
     "--imu",
@@ -49,6 +96,24 @@ imu_calibration = click.option(
 )
 time_unit = click.option(
     "--time-unit",
-    type=click.Choice(["s", "ms", "us", "ns"]),
-    help="What the time stamps of SEQUENCE count.  [default: seconds, unless the recording shows another unit]",
+    type=UNITS,
+    help="Unit of the time stamps of SEQUENCE.  [default: seconds, unless the recording shows another unit]",
+)
+as_recorded = click.option(
+    "--as-recorded",
+    is_flag=True,
+    help="No diagnosis and no repairs: velocity k moves frame k to k + 1, the noise is assumed (calibrated).",
+)
+repairs = click.option(
+    "--repairs",
+    type=PATH,
+    help="TOML file of user-specified repairs; the diagnosis finds the others (calibrated).",
+)
+held_out = click.option(
+    "--held-out",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of the tracks that diagnosis and estimators do not use; they rank the paths.",
 )

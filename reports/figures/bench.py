@@ -15,14 +15,14 @@ from fgbaseline.geometry import FloatArray
 
 from .layout import lay_out
 from .panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, intervals
-from .style import BAND, GRAY, GREEN, SCREEN, head, in_style, plain, sheet, swatch
+from .style import BAND, GRAY, GREEN, SCREEN, in_style, safe_text, stacked_panels, swatch, title_and_legend
 from .style import colors as colors_of
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results
-    from fgbaseline.reports.tables.bench_statistics import Metric
+    from fgbaseline.reports.results.metrics import Metric
 
-MARKS = "osD^vP*Xh<>p"
+MARKERS = "osD^vP*Xh<>p"
 MOST_CASES = 12
 """that a figure has room for"""
 FEW_DECADES = 100.0
@@ -56,7 +56,7 @@ def accuracy(results: "Results", metric: "Metric", cases: pd.DataFrame) -> Figur
     key, group = metric.name, len(results.estimators) + 1
     names = [case for case in results.cases if cases[cases["case"] == case][key].notna().any()][:MOST_CASES]
     rows = len(names) * group
-    figure, (axes,) = sheet(1.2 + 0.17 * max(rows, 8))
+    figure, (axes,) = stacked_panels(1.2 + 0.17 * max(rows, 8))
     color = _colors(results)
     dots = []
     for row in cases[cases["case"].isin(names)].to_dict("records"):
@@ -66,11 +66,11 @@ def accuracy(results: "Results", metric: "Metric", cases: pd.DataFrame) -> Figur
         dots.append((float(y), max(low, 0.02 * value) if low == low else nan, value, high, color[name]))
     intervals(axes, dots, 4.5, 1.4, "projecting")
     middles = [i * group + 0.5 * (group - 2) for i in range(len(names))]
-    axes.set_yticks(middles, [plain(case) for case in names])
+    axes.set_yticks(middles, [safe_text(case) for case in names])
     axes.set_ylim(rows - 0.5, -1.0)
     _logarithmic(axes, "x")
     axes.set_xlabel(metric.heading)
-    head(figure, "Accuracy, with 95 % intervals over seeds", _legend(results))
+    title_and_legend(figure, "Accuracy, with 95 % intervals over seeds", _legend(results))
     return figure
 
 
@@ -84,7 +84,7 @@ def accuracy_against_time(
     table = table[table[metric.name] > 0.0]
     if table.empty:
         return None
-    figure, (axes,) = sheet(4.6)
+    figure, (axes,) = stacked_panels(4.6)
     color, marks = _colors(results), _marks(results)
     look: dict[str, Any] = {"markersize": 6.5, "markeredgecolor": "white", "markeredgewidth": 0.5}
     for row in table.to_dict("records"):
@@ -94,7 +94,7 @@ def accuracy_against_time(
     _logarithmic(axes, "y")
     axes.set_xlabel("time per frame, ms")
     axes.set_ylabel(metric.heading)
-    head(figure, "Accuracy against time: lower left is better", _legend(results))
+    title_and_legend(figure, "Accuracy against time: lower left is better", _legend(results))
     _case_legend(figure, results)
     return figure
 
@@ -105,13 +105,13 @@ def scaling(results: "Results") -> Figure | None:
     if spent.empty or spent["observations"].max() < 1.5 * spent["observations"].min():
         return None
     panels = {"seconds": "time, s"} | ({"memory_mb": "peak memory, MB"} if spent["memory_mb"].notna().any() else {})
-    figure, axes = sheet(2.4 + 2.2 * len(panels), rows=len(panels))
+    figure, axes = stacked_panels(2.4 + 2.2 * len(panels), rows=len(panels))
     handles = []
     for name, color in _colors(results).items():
         own = spent[spent["estimator"] == name]
         n, seconds = (own[column].to_numpy(dtype=np.float64) for column in ("observations", "seconds"))
         power = _power(n, seconds)
-        handles.append(swatch(color, plain(name) + (f": n to the {power[0]:.2g}" if power else "")))
+        handles.append(swatch(color, safe_text(name) + (f": n to the {power[0]:.2g}" if power else "")))
         if power:
             ends = np.array([n.min(), n.max()])
             axes[0].plot(ends, power[1] * ends ** power[0], color=color, linewidth=1.0, linestyle=(0, (4, 2)))
@@ -122,7 +122,7 @@ def scaling(results: "Results") -> Figure | None:
         _logarithmic(axis, "x")
     _logarithmic(axes[0], "y")
     axes[-1].set_xlabel("observations of the run")
-    head(figure, "How cost grows with the number of observations n", handles)
+    title_and_legend(figure, "How cost grows with the number of observations n", handles)
     return figure
 
 
@@ -140,11 +140,11 @@ def nees_over_time(results: "Results", case: str) -> Figure | None:
     runs = max((len(values) for values in columns.values()), default=0)
     if runs < 2:
         return None
-    figure, (axes,) = sheet(3.9)
+    figure, (axes,) = stacked_panels(3.9)
     color, handles, values = _colors(results), [], []
     for name, own in columns.items():
         table = compare.average_nees(own)
-        handles += axes.plot(table.index, table["anees"], color=color[name], linewidth=1.2, label=plain(name))
+        handles += axes.plot(table.index, table["anees"], color=color[name], linewidth=1.2, label=safe_text(name))
         values.append(table["anees"].to_numpy(dtype=np.float64))
         if len(own) == runs:
             bounds = table[["low", "high"]]
@@ -155,7 +155,7 @@ def nees_over_time(results: "Results", case: str) -> Figure | None:
     axes.axhline(DEGREES_OF_FREEDOM, color=GREEN, linewidth=0.9, zorder=1.5)
     axes.set_xlabel("frame")
     axes.set_ylabel("ANEES (above: overconfident)")
-    head(figure, f"NEES over time, mean of {plural(runs, 'run')}: {plain(case)}", [*handles, band])
+    title_and_legend(figure, f"NEES over time, mean of {plural(runs, 'run')}: {safe_text(case)}", [*handles, band])
     return figure
 
 
@@ -171,18 +171,18 @@ def _colors(results: "Results") -> dict[str, str]:
 
 
 def _marks(results: "Results") -> dict[str, str]:
-    return {case: MARKS[index % len(MARKS)] for index, case in enumerate(results.cases)}
+    return {case: MARKERS[index % len(MARKERS)] for index, case in enumerate(results.cases)}
 
 
 def _legend(results: "Results") -> list[Any]:
-    return [swatch(color, plain(name)) for name, color in _colors(results).items()]
+    return [swatch(color, safe_text(name)) for name, color in _colors(results).items()]
 
 
 def _case_legend(figure: Figure, results: "Results") -> None:
     """Legend of the marks of the cases, below the panel."""
     if not 1 < len(results.cases) <= MOST_CASES:
         return
-    names = {plain(case): mark for case, mark in _marks(results).items()}
+    names = {safe_text(case): mark for case, mark in _marks(results).items()}
     marks = [
         Line2D([], [], color=GRAY, marker=mark, linestyle="none", markersize=6, label=name)
         for name, mark in names.items()

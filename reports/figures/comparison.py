@@ -1,6 +1,8 @@
-"""Figures of a comparison of trajectories."""
+"""Figures of a comparison of trajectories, and of one that a check of accuracy failed."""
 
 from collections.abc import Callable, Mapping
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,27 +11,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline import compare
-from fgbaseline.compare import Align
+from fgbaseline.compare import Align, MatchedTrajectories
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
-from .accuracy import maps_by_depth
-from .consistency import three_sigma_of
+from .evidence import maps_by_depth, three_sigma_of
 from .layout import lay_out
 from .over_time import TITLE_ROOM, columns, component_panels
 from .panels import Line, fit_log_or_linear
-from .paths import from_above
+from .paths import frame_top_view
 from .reprojection import distribution
-from .style import GRAY, SCREEN, WHITE, head, in_style, plain, sheet, swatch
+from .style import GRAY, SCREEN, TRUTH, WHITE, in_style, safe_text, stacked_panels, swatch, title_and_legend
 from .style import colors as colors_of
 from .style import line as line_of
-from .view import common_window
+from .window import common_window
 
 if TYPE_CHECKING:
     from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 
-SLIMMEST = (0.35, 1.1)
+ASPECT = (0.35, 1.1)
 """height over width of the plan, at least and at most"""
+CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
+CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
 ALIGNED = {
     Align.NONE: "not aligned",
     Align.FIRST_POSE: "first poses aligned",
@@ -63,7 +67,7 @@ def paths(comparison: "Comparison") -> Figure:
     start = comparison.reference.trajectory.position[0]
     reference = view.plane(comparison.reference.trajectory.position - start)
     every = {n: view.plane(r.matched.estimate.position - start) for n, r in comparison.results.items()}
-    box = common_window(every.values(), reference).shaped(SLIMMEST, 1e-3)
+    box = common_window(every.values(), reference).shaped(ASPECT, 1e-3)
     width, height = box.high - box.low
     figure = Figure(figsize=(SCREEN.width, (SCREEN.width - 0.7) * height / width + 1.4))
     axes = figure.subplots()
@@ -75,8 +79,8 @@ def paths(comparison: "Comparison") -> Figure:
         axes.plot(*path[-1:].T, "s", color=color[name], markersize=5, zorder=4)
     handles += axes.plot(*reference[:1].T, "o", label="start of the reference", markersize=8, **WHITE)
     handles.append(swatch(GRAY, "end"))
-    from_above(axes, box, *labels)
-    head(figure, f"Paths from above, {_alignment(comparison)}", handles)
+    frame_top_view(axes, box, *labels)
+    title_and_legend(figure, f"Paths from above, {_alignment(comparison)}", handles)
     return figure
 
 
@@ -88,9 +92,9 @@ def errors(comparison: "Comparison") -> Figure:
     axes[-1].set_xlabel("time, s" if reference.trajectory.stamped else "frame")
     rivals = [r for r in comparison.ranked if not r.entry.by_product] or comparison.ranked
     ranking = comparison.ranking
-    nearest = [f"{plain(r.name)} {ranking.rmse(r.name):.3g} m" for r in rivals if r.name in ranking.at]
+    nearest = [f"{safe_text(r.name)} {ranking.rmse(r.name):.3g} m" for r in rivals if r.name in ranking.at]
     each = ", ".join(nearest) if sum(map(len, nearest)) < TITLE_ROOM else f"nearest {nearest[0]}"
-    head(figure, f"Difference from {plain(reference.name)} (RMSE: {each})", handles)
+    title_and_legend(figure, f"Difference from {safe_text(reference.name)} (RMSE: {each})", handles)
     return figure
 
 
@@ -98,7 +102,7 @@ def growth(comparison: "Comparison") -> Figure:
     """Distance and heading over the length of the path."""
     tables, line = _departures(comparison), _lines(comparison)
     has_heading = any(np.isfinite(table["heading_deg"]).any() for table in tables.values())
-    figure, axes = sheet(4.6 if has_heading else 2.7, rows=1 + has_heading)
+    figure, axes = stacked_panels(4.6 if has_heading else 2.7, rows=1 + has_heading)
     handles: list[Any] = []
     for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
         for name, table in tables.items():
@@ -109,7 +113,7 @@ def growth(comparison: "Comparison") -> Figure:
         axes[1].set_ylabel("heading, °")
         axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
     axes[-1].set_xlabel("length of the reference's path so far, m")
-    head(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
+    title_and_legend(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
     return figure
 
 
@@ -128,7 +132,7 @@ def relative(comparison: "Comparison") -> Figure | None:
             panel.set_xlabel(f"over {delta}: {'translation' if unit == 'm' else 'rotation'}, {unit}")
             panel.set_xlim(left=0.0)
     pairs = "all pairs" if comparison.settings.all_pairs else "consecutive pairs"
-    head(figure, f"Errors of the motion between {pairs} of poses")
+    title_and_legend(figure, f"Errors of the motion between {pairs} of poses")
     return figure
 
 
@@ -148,7 +152,7 @@ def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, pd.DataF
             whiskerprops={"color": color[name]},
             capprops={"color": color[name]},
         )
-    panel.set_yticks(range(len(names)), [plain(name) for name in names])
+    panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.grid(axis="y", visible=False)
 
@@ -172,7 +176,7 @@ def segments(comparison: "Comparison") -> Figure | None:
         panel.set_ylim(bottom=0.0)
     official = all(found.official for found in known.values())
     which = "KITTI's lengths" if official else "lengths fitted to the path, not KITTI's"
-    head(figure, f"Segment errors ({which})", handles)
+    title_and_legend(figure, f"Segment errors ({which})", handles)
     return figure
 
 
@@ -229,3 +233,55 @@ def _named(direction: FloatArray) -> str:
     k = int(np.argmax(np.abs(direction)))
     sign = "" if direction[k] > 0 else "\N{MINUS SIGN}"
     return f"{sign}{'xyz'[k]}" + ("" if abs(direction[k]) > 1 - 1e-9 else ", level") + " from the start"
+
+
+def draw_failed_check(
+    aligned: MatchedTrajectories, errors: Mapping[str, tuple[pd.DataFrame, float | None]], path: Path
+) -> None:
+    """Draws into the PNG `path`, whose folder is made: both paths, and each table's `translation` with its bound.
+
+    `errors` has the tables of `absolute_errors` by what was aligned, and the largest distance allowed, m.
+    """
+    with in_style():
+        figure = Figure(figsize=(SCREEN.width, 7.0))
+        above, below = figure.subplots(2, 1, height_ratios=(2, 1))
+        _aligned_paths(above, aligned)
+        for name, (table, largest) in errors.items():
+            below.plot(
+                table["t"] - table["t"].iloc[0],
+                table["translation"],
+                color=CHECK_COLORS[name],
+                label=CHECK_LABELS[name],
+            )
+            if largest is not None:
+                below.axhline(largest, color=CHECK_COLORS[name], linestyle=(0, (4, 2)), linewidth=1.0)
+        below.set(
+            xlabel="time since the first pose, s" if aligned.reference.stamped else "frame",
+            ylabel="distance, m",
+            ylim=(0, None),
+        )
+        below.legend()
+        stream = BytesIO()
+        figure.savefig(stream, format="png", dpi=120)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as file:
+        file.write(stream.getvalue())
+
+
+def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
+    plane = widest_plane(aligned.reference.position)
+    here = aligned.reference.position @ plane
+    axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=safe_text(aligned.reference.name))
+    axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_COLORS["ate"], label=safe_text(aligned.estimate.name))
+    axes.plot(*here[0], color=TRUTH, marker="o", linestyle="none", label="start")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(
+        xlabel="m", ylabel="m", title=f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
+    )
+    axes.legend()
+
+
+def widest_plane(positions: FloatArray) -> FloatArray:
+    """(3, 2) orthonormal directions in which positions (n, 3) spread most."""
+    _, _, Vt = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=True)
+    return np.asarray(Vt[:2].T)

@@ -1,4 +1,4 @@
-"""Evidence of a diagnosis: what the cameras see beside what was recorded, and how the answers were chosen."""
+"""Figures of a diagnosis: visual odometry beside the recorded velocities, and the likelihood of each convention."""
 
 from typing import Any
 
@@ -15,12 +15,12 @@ from fgbaseline.geometry import FloatArray
 
 from .layout import lay_out
 from .panels import moving_sum
-from .style import GRAY, SCREEN, head, in_style, sheet, swatch
+from .style import GRAY, SCREEN, in_style, stacked_panels, swatch, title_and_legend
 
 SEEN, RECORDED, REPAIRED = "#111111", "#D55E00", "#0072B2"
 """the cameras, the recording and what the repair makes of it"""
 WRONG, COPIED, OTHERS = "#c0392b", "#E69F00", "#b8c4d0"
-SMOOTH = 1.0
+AVERAGED_OVER = 1.0
 """s over which rates are averaged, so that the noise of one frame does not hide the rest"""
 BINS = np.linspace(-5.0, 5.0, 61)
 
@@ -35,7 +35,7 @@ def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, F
             if len(diagnosis.timing.shifts):
                 figures["delay"] = delay(diagnosis)
             figures["velocity_residuals"] = velocity_residuals(diagnosis)
-        figures["tracks"] = matches_over_time(diagnosis, tracks)
+        figures["tracks"] = tracks_over_time(diagnosis, tracks)
         for figure in figures.values():
             lay_out(figure)
     return figures
@@ -52,14 +52,14 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     repaired = twist_in_imu_axes(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
     seen = odometry.twist(sequence.dt)[:, 3:]
     t = sequence.t[:-1] - sequence.t[0]
-    width = SMOOTH / float(np.median(sequence.dt))
-    figure, axes = sheet(6.4, 3)
+    width = AVERAGED_OVER / float(np.median(sequence.dt))
+    figure, axes = stacked_panels(6.4, 3)
     changed = diagnosis.angular.changed or bool(bias.any()) or diagnosis.shift != 0.0
     handles: list[Any] = []
     for i, axis in enumerate(axes):
         known = odometry.known
         values = smoothed(np.where(known, seen[:, i], np.nan), width)
-        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="seen by the cameras", zorder=2)
+        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="visual odometry", zorder=2)
         lines += axis.plot(t, smoothed(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
         if changed:
             lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
@@ -70,7 +70,9 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
         handles = handles or lines
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(0.0, float(t[-1]))
-    head(figure, f"Angular velocity about the axes of imu_T_cam, averaged over {SMOOTH:g} s", handles)
+    title_and_legend(
+        figure, f"Angular velocity about the axes of imu_T_cam, averaged over {AVERAGED_OVER:g} s", handles
+    )
     return figure
 
 
@@ -102,7 +104,7 @@ def conventions(diagnosis: Diagnosis) -> Figure:
     handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
     handles += [swatch(RECORDED, "as recorded")] if changed else []
     handles.append(swatch(OTHERS, "others"))
-    head(figure, "Which of the 24 axis conventions agrees with the cameras", handles)
+    title_and_legend(figure, "Likelihood of the 24 axis conventions, by visual odometry", handles)
     return figure
 
 
@@ -110,7 +112,7 @@ def delay(diagnosis: Diagnosis) -> Figure:
     """Agreement of the recorded rates with the cameras at each shift in time."""
     timing = diagnosis.timing
     dt = float(np.median(diagnosis.sequence.dt))
-    figure, (axes,) = sheet(3.6)
+    figure, (axes,) = stacked_panels(3.6)
     axes.plot(timing.shifts, 100.0 * timing.agreement, color=REPAIRED, linewidth=1.8)
     best = timing.shift / dt
     handles: list[Any] = []
@@ -136,8 +138,8 @@ def delay(diagnosis: Diagnosis) -> Figure:
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 100.0])
     axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
     axes.set_ylabel("agreement, % of the variance")
-    title = "When the recorded rates agree with what the cameras see"
-    head(figure, title if timing.identifiable else f"{title}: no shift stands out", handles)
+    title = "Agreement of the recorded rates with visual odometry"
+    title_and_legend(figure, title if timing.identifiable else f"{title}: no shift is identifiable", handles)
     return figure
 
 
@@ -152,7 +154,7 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     for i, panel in enumerate(panels):
         values = fit.motion[np.isfinite(fit.motion[:, i]), i]
         panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color=OTHERS)
-        handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="what the noise found predicts")
+        handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="normal distribution")
         beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
         panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {beyond:.1%} beyond 3 sigma")
     for panel in panels[3:]:
@@ -162,15 +164,15 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
     sigma = fit.sigmas
     noise = f"{sigma.linear_velocity:.3f} m/s, {sigma.angular_velocity:.4f} rad/s"
     title = f"Residuals of the velocities over the noise found: {noise}"
-    head(figure, title, [swatch(OTHERS, plural(len(fit.motion), "interval")), *handles])
+    title_and_legend(figure, title, [swatch(OTHERS, plural(len(fit.motion), "interval")), *handles])
     return figure
 
 
-def matches_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
+def tracks_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     """Features of each frame, and the share of its matches that contradict the motion."""
     sequence = diagnosis.sequence
     t = sequence.t - sequence.t[0]
-    figure, (upper, lower) = sheet(5.0, 2)
+    figure, (upper, lower) = stacked_panels(5.0, 2)
     handles: list[Any] = list(upper.plot(t, tracks.usable, color=GRAY, linewidth=1.0, label="usable features"))
     upper.set_ylabel("features per frame")
     upper.set_ylim(bottom=0)
@@ -187,8 +189,8 @@ def matches_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     lower.set_ylim(bottom=0)
     lower.set_xlabel("time, s")
     lower.set_xlim(0.0, float(t[-1]))
-    title = "Tracks: how many, how many wrong" + (", and when they were copied" if len(copied) else "")
-    head(figure, title, handles)
+    title = "Tracks: usable features and wrong matches" + (", copied frames" if len(copied) else "")
+    title_and_legend(figure, title, handles)
     return figure
 
 

@@ -1,8 +1,8 @@
-"""Place of everything in a figure: found once, then held, however often and in whatever form it is written.
+"""Layout of a figure: computed once, then fixed for every format it is written in.
 
 Panels are placed by matplotlib's constrained layout in closed form, for figures that are one grid of panels below one
-legend. That engine solves for sizes, looks, and solves again, and looking at every label of every tick is most of what
-it does. Here it is done once, at sizes near those that come of it, and again only where that changed the ticks.
+legend. That engine measures every tick label and solves repeatedly, which takes most of its time. Here it is done once
+at approximate sizes, and again only where that changed the ticks.
 Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where these would be long.
 """
 
@@ -27,7 +27,7 @@ from fgbaseline.geometry import FloatArray
 
 PAD = 0.042
 """inches around each panel with its labels, and around the legend"""
-USUAL = (0.6, 0.12, 0.25)
+DEFAULT_MARGINS = (0.6, 0.12, 0.25)
 """inches to the left and right of a panel and above it, by which it is sized before anything is measured"""
 BELOW, BELOW_INNER = 0.5, 0.1
 """inches under a panel of the lowest row, and of those above"""
@@ -36,7 +36,7 @@ PASSES = 3
 LEFT, RIGHT, BOTTOM, TOP = range(4)
 LONG = (1e-4, 1e5)
 """an axis that reaches beyond these is labeled with powers of ten"""
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def lay_out(figure: Figure) -> None:
@@ -51,20 +51,20 @@ def lay_out(figure: Figure) -> None:
     draw_minor_ticks_at_once(figure.axes)
     fill_grid(figure)
     # "none" would leave a layout engine that does nothing, but for which every figure is drawn twice
-    with held():
+    with without_layout_engine():
         figure.set_layout_engine(None)
     for axes in figure.axes:
         axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))
         axes.apply_aspect()
-    _hold_labels(figure)
+    _fix_labels(figure)
 
 
-def held() -> AbstractContextManager[None]:
-    """Within it nothing gives a figure a layout engine anew, as saving it would."""
+def without_layout_engine() -> AbstractContextManager[None]:
+    """Context in which saving a figure adds no layout engine."""
     return mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False})
 
 
-def _hold_labels(figure: Figure) -> None:
+def _fix_labels(figure: Figure) -> None:
     """Labels stay where they are, those of the ordinates of a column of panels in one line."""
     inches = figure.dpi_scale_trans
     columns: dict[int, list[tuple[Axes, float]]] = defaultdict(list)
@@ -92,10 +92,10 @@ def fill_grid(figure: Figure) -> None:
     FigureCanvasAgg(figure)  # measures without drawing
     size = figure.get_size_inches()
     head = max((legend.get_window_extent().height / figure.dpi + 2.0 * PAD for legend in figure.legends), default=0.0)
-    _place(panels, np.array([_usual(spec) for _, spec in panels]), size, head)
+    _place(panels, np.array([_default_margins(spec) for _, spec in panels]), size, head)
     for _ in range(PASSES):
         ticks = _ticks(panels)
-        _place(panels, np.array([_around(axes) for axes, _ in panels]) / figure.dpi, size, head)
+        _place(panels, np.array([_outer_margins(axes) for axes, _ in panels]) / figure.dpi, size, head)
         if _ticks(panels) == ticks:
             break
 
@@ -105,12 +105,12 @@ def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:
     return [axis.get_majorticklocs().tolist() for axes, _ in panels for axis in (axes.xaxis, axes.yaxis)]
 
 
-def _usual(spec: SubplotSpec) -> tuple[float, float, float, float]:
-    left, right, above = USUAL
+def _default_margins(spec: SubplotSpec) -> tuple[float, float, float, float]:
+    left, right, above = DEFAULT_MARGINS
     return left, right, BELOW if spec.is_last_row() else BELOW_INNER, above
 
 
-def _around(axes: Axes) -> tuple[float, float, float, float]:
+def _outer_margins(axes: Axes) -> tuple[float, float, float, float]:
     """px that labels, ticks and title take to the left and right of a panel, below and above it."""
     own, everything = axes.get_window_extent(), axes.get_tightbbox(for_layout_only=True)
     if everything is None:  # it is not visible
@@ -155,7 +155,7 @@ class Numbers(LogFormatter):
         if LONG[0] <= low and high <= LONG[1]:
             return f"{x:g}"
         mantissa, _, exponent = f"{x:e}".partition("e")
-        power = f"10{str(int(exponent)).translate(RAISED)}"
+        power = f"10{str(int(exponent)).translate(SUPERSCRIPTS)}"
         return power if float(mantissa) == 1.0 else f"{float(mantissa):g}×{power}"
 
 

@@ -1,4 +1,4 @@
-"""Figures over time: divergence from the reference, error to the truth, height, and the time that frames took."""
+"""Figures over time: divergence from the reference, error to ground truth, height, and time per frame."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from fgbaseline.geometry import FloatArray
 
-from .panels import Line, few_ticks, fit_log, fit_log_or_linear, fit_signed, note_leaving, plot_series
+from .panels import Line, few_ticks, fit_log, fit_log_or_linear, fit_signed, note_out_of_range, plot_series
 from .run_data import RunData
-from .style import SCREEN, Style, head, plain, sheet
-from .view import common_window, span
+from .style import SCREEN, Style, safe_text, stacked_panels, title_and_legend
+from .window import common_window, signed_range
 
 COMPONENTS = {
     "position": "distance, m",
@@ -25,7 +25,7 @@ COMPONENTS = {
 }
 """columns of `compare.pose_errors`, as the panels have them"""
 SIGNED = ("along", "across", "up")
-LEVEL = 0.1
+MIN_HEIGHT_RANGE = 0.1
 """height over extent, up to which any path is shown"""
 TITLE_ROOM = 58
 """letters that a title has for numbers"""
@@ -48,7 +48,7 @@ class Panel:
     expected: Expected | None = None
 
 
-def over_time(
+def time_panels(
     run: RunData, wanted: Sequence[Panel], title: str, style: Style, *, without: str | None = None, **look: Any
 ) -> Figure | None:
     """Panels that have something to show above one another, `look` being that of the lines; None where none has."""
@@ -59,7 +59,7 @@ def over_time(
     if not shown:
         return None
     heights = [panel.height for panel, _ in shown]
-    figure, axes = sheet(style.room + sum(heights), len(shown), style, height_ratios=heights)
+    figure, axes = stacked_panels(style.room + sum(heights), len(shown), style, height_ratios=heights)
     handles: list[Any] = []
     for on, (panel, series) in zip(axes, shown, strict=True):
         handles += plot_series(on, run.t, series, run.line(style), **look)
@@ -73,7 +73,7 @@ def over_time(
             few_ticks(on)
         on.set_ylabel(panel.label)
     time_axis(run, axes, style)
-    head(figure, title, handles, style)
+    title_and_legend(figure, title, handles, style)
     return figure
 
 
@@ -91,22 +91,22 @@ def divergence(run: RunData, style: Style = SCREEN) -> Figure | None:
             Panel("distance, m", "divergence_position", 0.95),
             Panel("angle, °", "divergence_rotation_deg", 0.95),
         ]
-        return over_time(run, panels, "", style, without=run.reference)
+        return time_panels(run, panels, "", style, without=run.reference)
     names = [name for name in run.names if name != run.reference and "divergence_position" in run.series[name]]
     if not names or run.reference is None:
         return None
     doubt = "" if run.trust == "trusted" else f" ({run.trust})"
     rivals = [name for name in names if name not in run.by_products] or names
-    return _errors(run, "divergence", names, f"Divergence from {plain(run.reference)}{doubt}", rivals)
+    return _errors(run, "divergence", names, f"Divergence from {safe_text(run.reference)}{doubt}", rivals)
 
 
 def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Distance, angle and (on the screen) the components of the difference from the unaligned truth; None without."""
     if not style.titled:
         panels = [Panel("error, m", "truth_position", 0.95), Panel("error, °", "truth_rotation_deg", 0.95)]
-        return over_time(run, panels, "", style)
+        return time_panels(run, panels, "", style)
     names = [name for name in run.names if "truth_position" in run.series[name]]
-    return _errors(run, "truth", names, "Error, unaligned", names) if names else None
+    return _errors(run, "truth", names, "Unaligned error to ground truth", names) if names else None
 
 
 def component_panels(
@@ -116,7 +116,7 @@ def component_panels(
     every = {column: columns(tables, column) for column in COMPONENTS}
     shown = {c: series for c, series in every.items() if any(np.isfinite(v).any() for v in series.values())} or every
     ratios = [1.7, *[1.0] * (len(shown) - 1)]
-    figure, axes = sheet(8.6 * sum(ratios) / 5.7, len(shown), height_ratios=ratios)
+    figure, axes = stacked_panels(8.6 * sum(ratios) / 5.7, len(shown), height_ratios=ratios)
     handles: list[Any] = []
     for panel, (column, series) in zip(axes, shown.items(), strict=True):
         for name, values in series.items():
@@ -138,31 +138,31 @@ def height(run: RunData) -> Figure:
     """Height above the start over time."""
     heights = {name: path[:, 2] for name, path in run.paths.items()}
     true = None if run.truth is None else run.truth[:, 2]
-    figure, axes = sheet(3.4)
+    figure, axes = stacked_panels(3.4)
     handles = axes[0].plot(run.t, true, **SCREEN.truth) if true is not None else []
     handles += plot_series(axes[0], run.t, heights, run.line())
-    least = LEVEL * common_window(run.paths.values(), run.truth).side
+    least = MIN_HEIGHT_RANGE * common_window(run.paths.values(), run.truth).side
     box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
     box = box.grown(0.06 * box.side + 0.05)
     axes[0].set_ylim(float(box.low[0]), float(box.high[0]))
     axes[0].set_ylabel("height, m")
-    note_leaving(axes[0], run.t, heights, float(box.low[0]), float(box.high[0]))
+    note_out_of_range(axes[0], run.t, heights, float(box.low[0]), float(box.high[0]))
     time_axis(run, axes)
-    head(figure, "Height above the start", handles)
+    title_and_legend(figure, "Height above the start", handles)
     return figure
 
 
 def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Time that each frame took, on the screen beside the interval between frames; None where none is known."""
+    """Time per frame, on the screen beside the interval between frames; None where none is known."""
     if not style.titled:
-        return over_time(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0)], "", style)
+        return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0)], "", style)
     times = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
     if not times:
         return None
-    figure, axes = sheet(3.4)
+    figure, axes = stacked_panels(3.4)
     handles: list[Any] = []
-    for names in _shared(times):
-        together = " and ".join(map(plain, names))
+    for names in _names_by_times(times):
+        together = " and ".join(map(safe_text, names))
         handles += plot_series(axes[0], run.t, {names[0]: times[names[0]]}, run.line(), linewidth=0.9, label=together)
     interval = 1e3 * float(np.median(np.diff(run.t)))
     fit_log(axes[0], {**times, "": np.array([interval])})
@@ -171,7 +171,7 @@ def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
     )
     axes[0].set_ylabel("time, ms")
     time_axis(run, axes)
-    head(figure, "Time per frame", [*handles, real_time])
+    title_and_legend(figure, "Time per frame", [*handles, real_time])
     return figure
 
 
@@ -181,28 +181,28 @@ def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals:
     t = dict.fromkeys(names, run.t)
     figure, axes, handles = component_panels(tables, t, run.line())
     travelled = max((float(np.nanmax(v)) for v in columns(tables, "travelled").values()), default=0.0)
-    reach = span(
+    reach = signed_range(
         [table[list(SIGNED)].to_numpy(dtype=np.float64).ravel() for table in tables.values()], 0.05 * travelled
     )
     for panel, column in zip(axes, COMPONENTS, strict=True):
         if column in SIGNED:
             fit_signed(panel, run.t, columns(tables, column), reach)
     time_axis(run, axes)
-    head(figure, title + _farthest({name: tables[name] for name in rivals}), handles)
+    title_and_legend(figure, title + _maxima({name: tables[name] for name in rivals}), handles)
     return figure
 
 
-def _farthest(tables: Mapping[str, pd.DataFrame]) -> str:
+def _maxima(tables: Mapping[str, pd.DataFrame]) -> str:
     """Largest distance of each, nearest first; only the farthest where there is no room for all."""
     farthest = {name: float(t["position"].max()) for name, t in tables.items() if t["position"].notna().any()}
     if not farthest:
         return ""
-    each = [f"{plain(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
+    each = [f"{safe_text(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
     return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else each[-1])
 
 
-def _shared(times: Mapping[str, FloatArray]) -> list[list[str]]:
-    """Names that share their times, because one run gave both answers."""
+def _names_by_times(times: Mapping[str, FloatArray]) -> list[list[str]]:
+    """Groups of estimators with equal times, which one run gave."""
     shared: list[list[str]] = []
     for name, ms in times.items():
         same = next((names for names in shared if np.array_equal(times[names[0]], ms)), None)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.compare import chi_square_bounds
 from fgbaseline.geometry import FloatArray
 
-from .style import BAND, GREEN, note, plain
+from .style import BAND, GREEN, note, safe_text
 
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
@@ -76,10 +76,10 @@ def fit_signed(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], reac
     low, high = max(low, -reach), min(high, reach)
     margin = max(0.06 * (high - low), 1e-9)
     axes.set_ylim(low - margin, high + margin)
-    note_leaving(axes, t, series, -reach, reach)
+    note_out_of_range(axes, t, series, -reach, reach)
 
 
-def note_leaving(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], low: float, high: float) -> None:
+def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], low: float, high: float) -> None:
     """Note of which series (T,), m, go beyond the panel, from when on and how far."""
     leaving = []
     for name, values in series.items():
@@ -87,7 +87,7 @@ def note_leaving(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], lo
         if len(beyond):
             farthest = values[beyond[np.argmax(np.abs(values[beyond]))]]
             text = f"to {farthest:.3g}".replace("-", "\N{MINUS SIGN}")
-            leaving.append(f"{plain(name)} leaves the panel at {t[beyond[0]]:.1f} s, {text} m")
+            leaving.append(f"{safe_text(name)} leaves the panel at {t[beyond[0]]:.1f} s, {text} m")
     if leaving:
         note(axes, "; ".join(leaving))
 

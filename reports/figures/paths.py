@@ -11,21 +11,21 @@ from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from .run_data import RunData
-from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, head, label, note, plain, swatch
-from .view import Window, common_window, known, robust_window
+from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, label, note, safe_text, swatch, title_and_legend
+from .window import Window, common_window, known, robust_window
 
 ARROWS = 40
 """along a path"""
 SURROUNDINGS = (40.0, 0.15)
 """m, and share of the path's extent: landmarks farther from the path's box are not shown"""
-SLIMMEST = (0.42, 1.1)
+ASPECT = (0.42, 1.1)
 """height over width of a panel, at least and at most"""
-SLIMMEST_PRINTED, SURROUNDINGS_PRINTED = (0.35, 1.2), (20.0, 0.15)
-LEAST = 0.5
+PAPER_ASPECT, PAPER_SURROUNDINGS = (0.35, 1.2), (20.0, 0.15)
+MIN_MARGIN = 0.5
 """m of a margin, at least"""
 
 
-def from_above(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
+def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
     """Frames a panel: equal scales, the box and the labels of its axes."""
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(box.low[0], box.high[0])
@@ -35,11 +35,11 @@ def from_above(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
 
 
 def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
-    """All paths in one panel, with the truth where there is one."""
+    """All paths in one panel, with ground truth where there is one."""
     if style is not SCREEN:
-        return _printed(run, style, run.names)
+        return _paper_paths(run, style, run.names)
     paths, truth = _flat(run)
-    box = common_window(paths.values(), truth).shaped(SLIMMEST, LEAST)
+    box = common_window(paths.values(), truth).shaped(ASPECT, MIN_MARGIN)
     figure, (axes,) = _panels(box, 1, 1)
     line = run.line()
     handles = axes.plot(*truth.T, **style.truth) if truth is not None else []
@@ -50,15 +50,15 @@ def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
         axes.plot(*known(truth)[-1:].T, "s", color=TRUTH, markersize=5, zorder=3)
     handles += axes.plot(0.0, 0.0, "o", markersize=8, label="start", **WHITE)
     handles.append(swatch(GRAY, "end"))
-    from_above(axes, box, "ahead of the start, m", "left of the start, m")
-    head(figure, "All paths from above", handles)
-    remarks = [f"{plain(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
+    frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
+    title_and_legend(figure, "All paths from above", handles)
+    remarks = [f"{safe_text(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
     if remarks:
-        note(axes, "; ".join(remarks) + " outside the picture")
+        note(axes, "; ".join(remarks) + " outside the panel")
     return figure
 
 
-def mapped(run: RunData) -> str | None:
+def estimator_with_landmarks(run: RunData) -> str | None:
     """Estimator whose landmarks a paper shows: the reference, or the first that has any; None without landmarks."""
     return run.reference if run.reference in run.landmarks else next(iter(run.landmarks), None)
 
@@ -68,28 +68,28 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     if name is None:
         return None
     if style is not SCREEN:
-        return _printed(run, style, (name,), run.landmarks[name][:, :2])
+        return _paper_paths(run, style, (name,), run.landmarks[name][:, :2])
     path, landmarks = run.paths[name][:, :2], run.landmarks.get(name, np.empty((0, 3)))[:, :2]
     box = robust_window(path) or Window(-np.ones(2), np.ones(2))
-    box = box.with_points(landmarks, max(SURROUNDINGS[0], SURROUNDINGS[1] * box.side)).shaped(SLIMMEST, LEAST)
+    box = box.with_points(landmarks, max(SURROUNDINGS[0], SURROUNDINGS[1] * box.side)).shaped(ASPECT, MIN_MARGIN)
     figure, (axes,) = _panels(box, 1, 1)
     handles = [_draw_landmarks(axes, landmarks)] if len(landmarks) else []
     handles += axes.plot(*path.T, **run.line()(name))
     if run.observed is not None:
         _draw_orientation(axes, path, run.observed.directions[name], run.colors[name])
     handles += _draw_ends(axes, path)
-    from_above(axes, box, "ahead of the start, m", "left of the start, m")
-    head(figure, f"{label(name, run.reference)}: path from above and landmarks", handles)
+    frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
+    title_and_legend(figure, f"{label(name, run.reference)}: path from above and landmarks", handles)
     remarks = _outside(box, landmarks, "landmark") + _outside(box, path, "pose")
     if remarks:
-        note(axes, " and ".join(remarks) + " outside the picture")
+        note(axes, " and ".join(remarks) + " outside the panel")
     return figure
 
 
 def paths_side_by_side(run: RunData) -> Figure:
-    """A panel for each estimator, all with the same limits, the reference and the truth thin behind each."""
+    """A panel for each estimator, all with the same limits, the reference and ground truth thin behind each."""
     paths, truth = _flat(run)
-    box = common_window(paths.values(), truth).shaped(SLIMMEST, LEAST)
+    box = common_window(paths.values(), truth).shaped(ASPECT, MIN_MARGIN)
     columns = {1: 1, 2: 2, 4: 2}.get(len(paths), 3)
     figure, panels = _panels(box, -(-len(paths) // columns), columns)
     line = run.line()
@@ -107,25 +107,25 @@ def paths_side_by_side(run: RunData) -> Figure:
         axes.set_title(f"{label(name, run.reference)}{_divergence(run, name)}", color=run.colors[name])
         place = axes.get_subplotspec()
         assert place is not None
-        from_above(axes, box, "ahead, m" if place.is_last_row() else "", "left, m" if place.is_first_col() else "")
+        frame_top_view(axes, box, "ahead, m" if place.is_last_row() else "", "left, m" if place.is_first_col() else "")
         outside = _outside(box, path, "pose")
         if outside:
             note(axes, outside[0] + " outside")
     for axes in panels[len(paths) :]:
         axes.set_visible(False)
-    apart = f", and the greatest distance of each from {plain(run.reference)}" if run.reference is not None else ""
-    head(figure, f"Paths from above, side by side{apart}", behind)
+    apart = f", and the greatest distance of each from {safe_text(run.reference)}" if run.reference is not None else ""
+    title_and_legend(figure, f"Paths from above, side by side{apart}", behind)
     return figure
 
 
-def _printed(run: RunData, style: Style, names: tuple[str, ...], points: FloatArray | None = None) -> Figure:
+def _paper_paths(run: RunData, style: Style, names: tuple[str, ...], points: FloatArray | None = None) -> Figure:
     """Paths and landmarks (m, 2) in one column, without marks that a caption explains."""
     paths, truth = _flat(run)
     paths = {name: paths[name] for name in names}
     box = common_window(paths.values(), truth)
     if points is not None:
-        box = box.with_points(points, max(SURROUNDINGS_PRINTED[0], SURROUNDINGS_PRINTED[1] * box.side))
-    box = box.shaped(SLIMMEST_PRINTED, LEAST)
+        box = box.with_points(points, max(PAPER_SURROUNDINGS[0], PAPER_SURROUNDINGS[1] * box.side))
+    box = box.shaped(PAPER_ASPECT, MIN_MARGIN)
     width, height = box.high - box.low
     figure = Figure(figsize=(style.width, (style.width - 0.5) * height / width + 0.75))
     axes = figure.subplots()
@@ -140,8 +140,8 @@ def _printed(run: RunData, style: Style, names: tuple[str, ...], points: FloatAr
     for name, path in paths.items():
         handles += axes.plot(*path.T, **line(name))
     handles += axes.plot(0.0, 0.0, "o", markersize=4, label="start", **WHITE)
-    from_above(axes, box, "ahead of the start, m", "to its left, m")
-    head(figure, "", handles, style)
+    frame_top_view(axes, box, "ahead of the start, m", "to its left, m")
+    title_and_legend(figure, "", handles, style)
     return figure
 
 
@@ -167,7 +167,7 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
 
 
 def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> None:
-    """Arrows where the camera looks, every so many frames."""
+    """Arrows along the optical axis, at some of the frames."""
     there = np.flatnonzero(np.isfinite(path).all(axis=1))
     chosen = there[:: max(1, len(there) // ARROWS)]
     look: dict[str, Any] = {"scale": 32, "width": 0.0028, "headwidth": 5, "headlength": 6, "alpha": 0.75, "zorder": 3}

@@ -21,13 +21,12 @@ from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
 from .layout import lay_out
-from .paths import from_above
-from .style import SCREEN, head, in_style, note, plain, swatch
-from .view import Window, common_window, known, robust_window
+from .paths import frame_top_view
+from .style import SCREEN, in_style, note, safe_text, swatch, title_and_legend
+from .window import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.reproduction.study import Study
-    from fgbaseline.reports.reproduction.trial import Outcome
+    from fgbaseline.reports.reproduction.study import Outcome, Study
 
 PATH, ENDS, ARROW, LANDMARK = "#d62728", "#1f4e9c", "#1f4e9c", "#2ca02c"
 DEAD_RECKONING, BROKEN = "#444444", "#b3261e"
@@ -42,7 +41,7 @@ SQUARE = (0.6, 1.0 / 0.6)
 COLUMNS = 2
 MARGIN = 1.1
 """times the largest box: all stages have one scale"""
-SLIMMEST_STAGE = 0.3
+STAGE_ASPECT = 0.3
 """height over width of the panel of a stage, at least"""
 COLORS = colormaps["cividis_r"]
 LEAST, MOST = 1e-3, 1.0
@@ -70,8 +69,8 @@ def draw(studies: Several["Study"]) -> dict[str, Figure]:
 
 def numbered(study: "Study") -> dict[str, Figure]:
     """Figures of a recording by name, `figure_01` and so on where the report has them under a number."""
-    reported, name, label = study.subject.reported, plain(study.subject.name), plain(study.subject.label)
-    of_path, of_arrows, of_slam = (reported.path, reported.arrows, reported.slam) if reported else (None,) * 3
+    paper, name, label = study.subject.paper, safe_text(study.subject.name), safe_text(study.subject.label)
+    of_path, of_arrows, of_slam = (paper.path, paper.arrows, paper.slam) if paper else (None,) * 3
     figures: dict[str, Figure] = {}
 
     def add(kind: str, number: int | None, title: str, path: FloatArray, **shown: Any) -> None:
@@ -81,7 +80,7 @@ def numbered(study: "Study") -> dict[str, Figure]:
     add("path", of_path, f"path of the IMU after prediction, {name}", study.predicted)
     add("arrows", of_arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
     for n, mapped in study.mapped.items():
-        number, estimate = reported.mapped.get(n) if reported else None, mapped.estimate
+        number, estimate = paper.mapped.get(n) if paper else None, mapped.estimate
         title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position
         add(f"mapped_{n}", number, title, estimate.world_T_imu, landmarks=landmarks)
     title, landmarks = f"visual-inertial SLAM, {label}, N = {study.recorded.features}", study.slam.landmarks.position
@@ -115,8 +114,8 @@ def plot(
     handles += axes.plot(*known(xy)[-1:].T, marker="o", label="end", **ends)
     width, height = box.high - box.low
     figure.set_size_inches(SIDE, (SIDE - 0.7) * height / width + HEAD)
-    from_above(axes, box, "x, m", "y, m")
-    head(figure, _headline(title, number), handles)
+    frame_top_view(axes, box, "x, m", "y, m")
+    title_and_legend(figure, _headline(title, number), handles)
     return figure
 
 
@@ -155,7 +154,7 @@ def stages_figure(study: "Study") -> Figure:
     pairs = [tuple(view.plane(poses[:, :3, 3]) for poses in (s.path, s.predicted)) for s in study.staged]
     boxes = [common_window([path], predicted) for path, predicted in pairs]
     width, height = np.max([box.high - box.low for box in boxes], axis=0) * MARGIN
-    height = max(height, SLIMMEST_STAGE * width)
+    height = max(height, STAGE_ASPECT * width)
     columns = min(COLUMNS, len(study.staged))
     rows = -(-len(study.staged) // columns)
     panel = (SCREEN.width / columns - 0.6) * height / width
@@ -168,12 +167,16 @@ def stages_figure(study: "Study") -> Figure:
         handles += axes.plot(*path.T, color=PATH, linewidth=1.0, label="SLAM, part (c)")
         handles += axes.plot(*predicted[:1].T, "s", color=ENDS, markersize=5, zorder=5, label="start")
         half = 0.5 * np.array([width, height])
-        from_above(axes, Window(middle - half, middle + half))
+        frame_top_view(axes, Window(middle - half, middle + half))
         axes.set_title(f"{staged.stage.name}: {meters(staged.outcome.apart_rmse)}", fontsize=9)
         axes.tick_params(labelsize=7)
     for axes in panels[len(study.staged) :]:
         axes.set_visible(False)
-    head(figure, f"{plain(study.subject.label)}, N = {study.recorded.features}: cause by cause, from above, m", handles)
+    title_and_legend(
+        figure,
+        f"{safe_text(study.subject.label)}, N = {study.recorded.features}: cause by cause, from above, m",
+        handles,
+    )
     return figure
 
 
@@ -186,11 +189,11 @@ def sweep_figure(studies: Several["Study"]) -> Figure:
         for column, (name, outcomes) in enumerate((("as recorded", study.swept), ("repaired", study.swept_repaired))):
             axes = figure.add_subplot(grid[2 * i, column])
             _map(axes, study, outcomes)
-            axes.set_title(f"{plain(study.subject.label)}: {name}")
+            axes.set_title(f"{safe_text(study.subject.label)}: {name}")
         _bars(figure.add_subplot(grid[2 * i + 1, :]), study)
     broken = "the printed equations break: frames at which (I - KH)Σ is no covariance"
     frame = Rectangle((0, 0), 1, 1, fill=False, edgecolor=BROKEN, linewidth=2.0, label=broken)
-    head(figure, "Where the documented filter breaks: distance from dead reckoning (RMS)", [frame])
+    title_and_legend(figure, "Where the documented filter breaks: distance from dead reckoning (RMS)", [frame])
     return figure
 
 

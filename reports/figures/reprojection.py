@@ -1,4 +1,4 @@
-"""Reprojection errors: over time with the matches they rest on, as a distribution, by classes, and by track."""
+"""Reprojection errors: over time with the observations, as a distribution, by classes, and by track."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -13,47 +13,47 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 
-from .over_time import Panel, over_time, time_axis
+from .over_time import Panel, time_axis, time_panels
 from .panels import Line, fit_log, log_where_positive, plot_series, short
-from .run_data import Observed, RunData
-from .style import GRAY, GREEN, SCREEN, Style, head, sheet, swatch
+from .run_data import RunData, RunDetails
+from .style import GRAY, GREEN, SCREEN, Style, stacked_panels, swatch, title_and_legend
 
-NEAR = 3.0
-"""px: what the tables count as explained"""
+SMALL_ERROR = 3.0
+"""px, a column of the tables"""
 COARSE = (Excluded.DISPARITY, Excluded.SHORT)
-"""reasons that say a match determines little"""
+"""reasons of observations that determine little"""
 BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
 DASHED: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
-CLASSES = {"distance": "by distance", "track age": "by age of the track, sights", "region": "by place in the image"}
+CLASSES = {"distance": "by distance", "track age": "by age of the track, frames", "region": "by place in the image"}
 
 
 def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Median error of each frame, on the screen over its numbers of used and excluded matches; None without any."""
+    """Median error of each frame, on screen above the numbers of observations; None without any."""
     if not style.titled:
-        return over_time(run, [Panel("median error, px", "reprojection_median", 1.2, decades=5.0)], "", style)
+        return time_panels(run, [Panel("median error, px", "reprojection_median", 1.2, decades=5.0)], "", style)
     if run.observed is None or len(run.observed.problem.sequence.observations) == 0:
         return None
-    figure, (upper, lower) = sheet(5.6, 2, height_ratios=[2, 1])
+    figure, (upper, lower) = stacked_panels(5.6, 2, height_ratios=[2, 1])
     medians = run.column("reprojection_median")
     handles = plot_series(upper, run.t, medians, run.line(), linewidth=1.0)
     fit_log(upper, medians)
-    _mark_near(upper, vertical=False)
+    _mark_small_error(upper, vertical=False)
     upper.set_ylabel("median error, px")
-    counts = matches_by_frame(run.observed.problem)
+    counts = observations_by_frame(run.observed.problem)
     colors = [BANDS[name] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
-    lower.set_ylabel("matches per frame")
+    lower.set_ylabel("observations per frame")
     lower.set_ylim(bottom=0)
     time_axis(run, [upper, lower])
     bands = [swatch(BANDS[name], name) for name in counts if counts[name].any()]
-    head(figure, "Reprojection error by frame, and the matches it rests on", [*handles, *bands])
+    title_and_legend(figure, "Median reprojection error by frame, and the observations", [*handles, *bands])
     return figure
 
 
 def reprojection_distribution(run: RunData) -> Figure | None:
-    """Share of observations that each estimator explains to within so many pixels; None without any."""
+    """Share of observations below a reprojection error, for each estimator; None without any."""
     tables = {} if run.observed is None else {n: t for n, t in run.observed.reprojection.items() if len(t)}
     if not tables:
         return None
@@ -64,7 +64,7 @@ def reprojection_distribution(run: RunData) -> Figure | None:
         run.line(),
         ("of its landmarks", "those it used"),
     )
-    _mark_near(figure.axes[0], vertical=True)
+    _mark_small_error(figure.axes[0], vertical=True)
     return figure
 
 
@@ -75,7 +75,7 @@ def distribution(
     labels: Iterable[str],
 ) -> Figure:
     """Shares of `errors` and, in dashed lines, of others of the same names, by their limit; `labels` are of both."""
-    figure, (axes,) = sheet(4.2)
+    figure, (axes,) = stacked_panels(4.2)
     handles: list[Any] = []
     for name, known in errors.items():
         handles += axes.plot(GRID, 100.0 * share_within(known, GRID), **line(name))
@@ -89,7 +89,7 @@ def distribution(
     axes.set_ylabel("share of observations, %")
     for label, look in zip(labels, ({}, DASHED), strict=False):
         handles += axes.plot([], [], color=GRAY, label=label, **look)
-    head(figure, "Share of the observations explained to within so many pixels", handles)
+    title_and_legend(figure, "Share of observations below a reprojection error", handles)
     return figure
 
 
@@ -106,7 +106,7 @@ def reprojection_classes(run: RunData) -> Figure | None:
         log_where_positive(panel)
         panel.set_ylabel("median error, px")
     handles += _probabilities(panels[3], run.observed, run.line())
-    head(figure, "Reprojection errors in classes, and tracks against chi-square", handles)
+    title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
     return figure
 
 
@@ -133,8 +133,8 @@ def medians_by_class(
     return handles
 
 
-def matches_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) numbers of matches of each frame in the problem, too coarse, and contradicting, by the names of BANDS."""
+def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
+    """(T,) observations per frame: in the problem, too coarse, and contradicting, by the names of BANDS."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
     reasons = [(Excluded.NO,), COARSE, WRONG_MATCH]
     return {
@@ -154,7 +154,7 @@ def _medians(panel: Axes, classes: Mapping[str, pd.DataFrame], by: str, line: Li
     return medians_by_class(panel, tables, line, label=str if by == "region" else short)
 
 
-def _probabilities(panel: Axes, observed: Observed, line: Line) -> list[Any]:
+def _probabilities(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
     """Share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
     for name in observed.classes:
         tracks = track_chi_square(observed.problem, evaluated_rows(observed.problem, observed.reprojection[name]))
@@ -170,12 +170,12 @@ def _probabilities(panel: Axes, observed: Observed, line: Line) -> list[Any]:
     return list(diagonal)
 
 
-def _mark_near(axes: Axes, *, vertical: bool) -> None:
+def _mark_small_error(axes: Axes, *, vertical: bool) -> None:
     style: dict[str, Any] = {"color": "#888888", "linewidth": 0.9, "linestyle": ":", "zorder": 1.8}
     letters: dict[str, Any] = {"fontsize": 8.5, "color": GRAY}
     if vertical:
-        axes.axvline(NEAR, **style)
-        axes.text(NEAR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="bottom", **letters)
+        axes.axvline(SMALL_ERROR, **style)
+        axes.text(SMALL_ERROR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="bottom", **letters)
     else:
-        axes.axhline(NEAR, **style)
-        axes.text(1.003, NEAR, "3 px", transform=axes.get_yaxis_transform(), ha="left", va="center", **letters)
+        axes.axhline(SMALL_ERROR, **style)
+        axes.text(1.003, SMALL_ERROR, "3 px", transform=axes.get_yaxis_transform(), ha="left", va="center", **letters)

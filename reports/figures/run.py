@@ -10,14 +10,13 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data.parallel import background_map
 
-from .accuracy import held_out, map_difference
-from .consistency import consistency, nees, three_sigma
+from .evidence import consistency, held_out, map_difference, nees, three_sigma
 from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
-from .paths import mapped, path_with_landmarks, paths_overlaid, paths_side_by_side
+from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojection import reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
-from .saving import Written, written
+from .saving import EncodedFigure, encode_figure
 from .style import PAPER, in_style
 
 if TYPE_CHECKING:
@@ -37,18 +36,18 @@ OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
     reprojection_classes,
     map_difference,
 )
-"""each answers None where the run has nothing for it to show"""
-PRINTED: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
+"""each gives None where the run has no data for it"""
+PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     "paths": (partial(paths_overlaid, style=PAPER), "Paths on {sequence} from above."),
     "landmarks": (
-        lambda run: path_with_landmarks(run, mapped(run), PAPER),
+        lambda run: path_with_landmarks(run, estimator_with_landmarks(run), PAPER),
         "Path and landmarks of {mapped} on {sequence} from above.",
     ),
     "divergence": (
         partial(divergence, style=PAPER),
-        "Distance and angle from the reference, {reference} ({trust}), on {sequence}, without alignment.",
+        "Position and rotation divergence from the reference, {reference} ({trust}), on {sequence}, without alignment.",
     ),
-    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to the truth on {sequence}, without alignment."),
+    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to ground truth on {sequence}, without alignment."),
     "reprojection": (
         partial(reprojection_over_time, style=PAPER),
         "Median reprojection error of each frame of {sequence} (norm of the four pixel differences).",
@@ -56,15 +55,15 @@ PRINTED: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     "consistency": (
         partial(consistency, style=PAPER),
         "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
-        "sigmas are those of the position over those of {reference}.",
+        "sigma ratios of the position are to {reference}.",
     ),
     "held_out": (
         partial(held_out, style=PAPER),
-        "Median error on tracks of {sequence} that no estimator saw, with 95 % intervals.",
+        "Median held-out error on {sequence}, with 95 % intervals.",
     ),
     "map_difference": (
         partial(map_difference, style=PAPER),
-        "Median distance of landmarks from those of {reference}, as the cameras see them, by depth.",
+        "Median distance of landmarks from those of {reference}, in the camera frame, by depth.",
     ),
     "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}."),
 }
@@ -79,14 +78,14 @@ def draw(run: "Run") -> dict[str, Figure]:
     `three_sigma_NAME` of each that has covariances, where there is truth.
     """
     with in_style():
-        drawn = {name: draw_one() for name, draw_one in drawings(of_run(run)).items()}
+        drawn = {name: draw_one() for name, draw_one in figure_functions(of_run(run)).items()}
         figures = {name: figure for name, figure in drawn.items() if figure is not None}
         for figure in figures.values():
             lay_out(figure)
     return figures
 
 
-def drawings(run: RunData) -> dict[str, Callable[[], Figure | None]]:
+def figure_functions(run: RunData) -> dict[str, Callable[[], Figure | None]]:
     """Functions that draw each of these figures, within `in_style()` and without layout; each may answer None."""
     if not run.names:
         return {}
@@ -100,12 +99,17 @@ def drawings(run: RunData) -> dict[str, Callable[[], Figure | None]]:
     return {**overlaid, **paths, **over_time, **bands}
 
 
-def draw_printed(run: RunData) -> dict[str, tuple[Figure, str]]:
+def draw_for_paper(run: RunData) -> dict[str, tuple[Figure, str]]:
     """Figures of a run for a paper in two columns: name -> figure and caption."""
-    words = {"sequence": run.sequence, "reference": run.reference, "trust": run.trust, "mapped": mapped(run) or ""}
+    words = {
+        "sequence": run.sequence,
+        "reference": run.reference,
+        "trust": run.trust,
+        "mapped": estimator_with_landmarks(run) or "",
+    }
     drawn = {}
     with in_style(PAPER):
-        for name, (draw_one, caption) in PRINTED.items():
+        for name, (draw_one, caption) in PAPER_FIGURES.items():
             figure = draw_one(run)
             if figure is not None:
                 lay_out(figure)
@@ -114,35 +118,35 @@ def draw_printed(run: RunData) -> dict[str, tuple[Figure, str]]:
 
 
 @contextmanager
-def being_drawn(run: "Run", processes: int) -> Iterator[Callable[[], dict[str, Written]]]:
+def drawn_in_background(run: "Run", processes: int) -> Iterator[Callable[[], dict[str, EncodedFigure]]]:
     """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, written as PNG and SVG.
 
     The bytes are the same however many processes share the work. The figures over time, which take longest, are the
     last and come first.
     """
-    each = drawings(of_run(run))
+    each = figure_functions(of_run(run))
     names = list(each)
     with background_map(lambda number: _one(each[names[number]]), len(names), processes) as gathered:
         yield lambda: {name: one for name, one in zip(names, gathered(), strict=True) if one is not None}
 
 
-def draw_and_write(run: "Run", processes: int = 1) -> dict[str, Written]:
-    """Figures as `being_drawn` gives them, with nothing else to do meanwhile."""
-    with being_drawn(run, processes) as drawn:
+def draw_and_write(run: "Run", processes: int = 1) -> dict[str, EncodedFigure]:
+    """Figures as `drawn_in_background` gives them, with nothing else to do meanwhile."""
+    with drawn_in_background(run, processes) as drawn:
         return drawn()
 
 
-def _one(draw_one: Callable[[], Figure | None]) -> Written | None:
-    with _not_collecting(), in_style():
+def _one(draw_one: Callable[[], Figure | None]) -> EncodedFigure | None:
+    with _without_garbage_collection(), in_style():
         figure = draw_one()
         if figure is None:
             return None
         lay_out(figure)
-        return written(figure, FORMS)
+        return encode_figure(figure, FORMS)
 
 
 @contextmanager
-def _not_collecting() -> Iterator[None]:
+def _without_garbage_collection() -> Iterator[None]:
     """Without the search for cyclic garbage, a seventh of the time; that garbage is 13 MB for seven estimators."""
     collected = gc.isenabled()
     gc.disable()

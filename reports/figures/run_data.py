@@ -1,7 +1,6 @@
 """Data of a run as its figures show it, made from a run in memory or from the folder that it left behind."""
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,23 +9,21 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline import compare
-from fgbaseline.data import Problem, read_tum
-from fgbaseline.data.formats import read_landmarks
-from fgbaseline.data.formats.named_file import reading, regular_file
+from fgbaseline.data import Problem
+from fgbaseline.data.formats.named_file import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..results.reader import SUMMARY, RunFolder
 from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
 
-SUMMARY, TRUTH_FILE = "summary.json", "truth.tum"
-
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Observed:
+class RunDetails:
     """Data that only a run in memory has."""
 
     problem: Problem
@@ -69,7 +66,7 @@ class RunData:
     """see `compare.held_out_ranking`, best first; None without held-out tracks"""
     by_depth: Mapping[str, pd.DataFrame]
     """by estimator: see `compare.map_by_depth`"""
-    observed: Observed | None = None
+    observed: RunDetails | None = None
     """None where the data come from a folder"""
 
     @property
@@ -121,7 +118,7 @@ def of_run(run: "Run") -> RunData:
         series={r.name: _series(r, len(sequence.t)) for r in answered},
         held_out=None if held is None or len(held.ranking) == 0 else held.ranking.reset_index(),
         by_depth={name: compare.map_by_depth(m) for name, m in maps.items() if m is not None and len(m)},
-        observed=Observed(
+        observed=RunDetails(
             problem=run.problem,
             reprojection={r.name: r.reprojection for r in answered},
             classes={r.name: r.evidence.patterns for r in answered if len(r.evidence.patterns)},
@@ -159,24 +156,24 @@ def _series(result: "Result", n_frames: int) -> pd.DataFrame:
 
 def of_folder(folder: Path) -> RunData:
     """Data of the run that left a folder. Raises InputError, naming the file, where it is none or lacks a file."""
-    path = folder / SUMMARY
-    if not path.is_file():
+    files = RunFolder(folder)
+    if not (folder / SUMMARY).is_file():
         raise InputError(f"{folder}: this folder has no {SUMMARY}; give the folder that fgbaseline run wrote")
-    with reading(path):
+    summary = files.summary
+    with reading(folder / SUMMARY):
         try:
-            summary = json.loads(regular_file(path).read_text(encoding="utf-8"))
             every = {str(name): e["status"] != "failed" for name, e in summary["estimators"].items()}
-            names = tuple(name for name, answered in every.items() if answered)
             sequence, reference = dict(summary["sequence"]), dict(summary["reference"])
             axes = _axes(sequence)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
+        names = tuple(name for name, answered in every.items() if answered)
         if not names:
             raise InputError("none of the run's estimators gave an answer, so there is nothing to draw; run it again")
-    landmarks = {name: read_landmarks(folder / "landmarks" / f"{name}.csv").position @ axes.T for name in names}
-    series = {name: _read_series(folder / "series" / f"{name}.csv") for name in names}
-    by_depth = _table(folder / "tables" / "map_by_depth.csv")
-    t = series[names[0]]["t"].to_numpy(dtype=np.float64)
+    landmarks = {name: files.landmarks(name).position @ axes.T for name in names}
+    series = {name: _with_nis_per_row(files.series(name)) for name in names}
+    by_depth, t = files.table("map_by_depth"), series[names[0]]["t"].to_numpy(dtype=np.float64)
+    truth = files.truth
     return RunData(
         sequence=str(sequence["name"]),
         every=tuple(every),
@@ -185,12 +182,14 @@ def of_folder(folder: Path) -> RunData:
         by_products=frozenset(),
         trust=str(reference["trust"]),
         t=t - t[0],
-        paths={name: _positions(folder / "trajectories" / f"{name}.tum") @ axes.T for name in names},
-        truth=_positions(folder / TRUTH_FILE) @ axes.T if (folder / TRUTH_FILE).is_file() else None,
+        paths={name: files.trajectory(name).position @ axes.T for name in names},
+        truth=None if truth is None else truth.position @ axes.T,
         landmarks={name: points for name, points in landmarks.items() if len(points)},
         series=series,
-        held_out=_table(folder / "tables" / "held_out.csv"),
-        by_depth={} if by_depth is None else _by_estimator(by_depth, names),
+        held_out=files.table("held_out"),
+        by_depth={}
+        if by_depth is None
+        else {str(name): part.set_index("depth") for name, part in by_depth.groupby("estimator") if name in names},
     )
 
 
@@ -204,31 +203,7 @@ def _axes(sequence: Mapping[str, Any]) -> FloatArray:
     return np.stack([ahead, np.cross(up, ahead), up])
 
 
-def _positions(path: Path) -> FloatArray:
-    positions: FloatArray = read_tum(path)[1][:, :3, 3]
-    return positions
-
-
-def _read_series(path: Path) -> pd.DataFrame:
-    table = _table(path)
-    if table is None or "t" not in table:
-        raise InputError(f"{path}: the file is missing, or has no column t; run it again")
-    if "nis" in table:
-        table["nis_per_row"] = table["nis"] / table["nis_degrees"].where(table["nis_degrees"] > 0)
-    return table
-
-
-def _by_estimator(table: pd.DataFrame, names: Iterable[str]) -> dict[str, pd.DataFrame]:
-    parts = {name: table[table["estimator"] == name].set_index("depth") for name in names}
-    return {name: part for name, part in parts.items() if len(part)}
-
-
-def _table(path: Path) -> pd.DataFrame | None:
-    """CSV file of the run; None where it was not written."""
-    if not path.is_file():
-        return None
-    with reading(path):
-        try:
-            return pd.read_csv(path)
-        except (ValueError, pd.errors.ParserError) as error:
-            raise InputError(f"it is not the table that a run writes ({error}); run it again") from error
+def _with_nis_per_row(table: pd.DataFrame) -> pd.DataFrame:
+    if "nis" not in table:
+        return table
+    return table.assign(nis_per_row=table["nis"] / table["nis_degrees"].where(table["nis_degrees"] > 0))

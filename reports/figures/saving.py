@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from .layout import held
+from .layout import without_layout_engine
 from .style import SCREEN, Style, in_style
 
 FORMATS: Final = ("pdf", "svg", "png")
@@ -28,7 +28,7 @@ _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class EncodedFigure:
     """Figure of which only what was written is left."""
 
     title: str
@@ -38,14 +38,14 @@ class Written:
     """by form"""
 
 
-def written(figure: Figure, forms: Iterable[str]) -> Written:
+def encode_figure(figure: Figure, forms: Iterable[str]) -> EncodedFigure:
     """Remainder of a figure once it was written in these forms."""
     width, height = (float(side) for side in figure.get_size_inches())
-    return Written(str(figure.get_label()), (width, height), {form: encoded(figure, form) for form in forms})
+    return EncodedFigure(str(figure.get_label()), (width, height), {form: encoded(figure, form) for form in forms})
 
 
 def save(
-    figures: Mapping[str, Figure | Written],
+    figures: Mapping[str, Figure | EncodedFigure],
     folder: Path,
     forms: Iterable[str] = ("png", "svg"),
     style: Style = SCREEN,
@@ -63,13 +63,13 @@ def save_captions(captions: Mapping[str, str], folder: Path) -> None:
     (folder / CAPTIONS).write_text(json.dumps(captions, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def encoded(figure: Figure | Written, form: str, style: Style = SCREEN) -> bytes:
+def encoded(figure: Figure | EncodedFigure, form: str, style: Style = SCREEN) -> bytes:
     """File of a figure in the form `png`, `svg` or `pdf`; written once, remembered as long as the figure lives."""
-    if isinstance(figure, Written):
+    if isinstance(figure, EncodedFigure):
         return figure.files[form]
     forms = _written.setdefault(figure, {})
     if form not in forms:
-        with in_style(style), held():
+        with in_style(style), without_layout_engine():
             if form == "png":
                 forms[form] = _png(figure, style.dpi)
             else:

@@ -20,7 +20,7 @@ REFERENCE = "#000000"
 TRUTH = "#7f7f7f"
 LANDMARK = "#5fb98c"
 
-OWN: Mapping[str, str] = {
+ESTIMATOR_COLORS: Mapping[str, str] = {
     "dead-reckoning": "#0072B2",
     "ekf": "#D55E00",
     "joint-ekf": "#E69F00",
@@ -32,9 +32,9 @@ OWN: Mapping[str, str] = {
 }
 """by the name an estimator is registered under; the reference of a run is black instead, whatever its name"""
 
-SPARE = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
+EXTRA_COLORS = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
 """for estimators of other packages, once the colors are used up that this run leaves"""
-ON_DARK: Mapping[str, str] = {
+COLORS_ON_DARK: Mapping[str, str] = {
     REFERENCE: "#FFFFFF",
     TRUTH: "#A8A8A8",
     "#0072B2": "#2E96D3",
@@ -44,13 +44,13 @@ ON_DARK: Mapping[str, str] = {
 }
 """colors that dark ground would swallow: the same hue, lighter"""
 
-LONGEST = 48
+MAX_NAME = 48
 """characters of a name that a figure has room for"""
 GREEN, BAND, GRAY = "#6b9a72", "#d7e8d9", "#555555"
 """expected values, the band around them, and marks of no estimator"""
-MARKS = "os^Dv<P*X>"
-"""of lines on paper, told apart without color"""
-MARKED = 8
+MARKERS = "os^Dv<P*X>"
+"""of lines on paper, distinguished without color"""
+MARKS_PER_LINE = 8
 """marks of a line on paper"""
 WHITE: Mapping[str, Any] = {"color": "white", "markeredgecolor": "black", "zorder": 5}
 """marks of a start or an end"""
@@ -159,9 +159,9 @@ def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
     none of the names has.
     """
     every = list(names)
-    taken = {name: OWN[name] for name in every if name in OWN}
-    free = [color for color in OWN.values() if color not in taken.values()]
-    rest = chain(free, SPARE, cycle(SPARE))
+    taken = {name: ESTIMATOR_COLORS[name] for name in every if name in ESTIMATOR_COLORS}
+    free = [color for color in ESTIMATOR_COLORS.values() if color not in taken.values()]
+    rest = chain(free, EXTRA_COLORS, cycle(EXTRA_COLORS))
     chosen: dict[str, str] = {}
     for name in every:
         if name == reference:
@@ -173,7 +173,7 @@ def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
 
 def on_dark(color: str) -> str:
     """Color in place of `color` where the ground is dark."""
-    return ON_DARK.get(color, color)
+    return COLORS_ON_DARK.get(color, color)
 
 
 def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
@@ -181,14 +181,14 @@ def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
     return rc_style.context(dict(style.settings), after_reset=True)
 
 
-def sheet(height: float, rows: int = 1, style: Style = SCREEN, **grid: Any) -> tuple[Figure, list[Axes]]:
+def stacked_panels(height: float, rows: int = 1, style: Style = SCREEN, **grid: Any) -> tuple[Figure, list[Axes]]:
     """Empty figure with `rows` panels above one another that share the abscissa."""
     figure = Figure(figsize=(style.width, height))
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False, **grid)
     return figure, list(axes[:, 0])
 
 
-def head(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
+def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
     """Title on top of a figure (not on paper) and below it one legend: each label once, in rows."""
     by_label = {str(handle.get_label()): handle for handle in handles}
     figure.set_label(title)
@@ -222,11 +222,11 @@ def marked_line(name: str, color: str, reference: str | None, others: Sequence[s
     look: dict[str, Any] = {"color": color, "label": label(name, reference)}
     if name == reference:
         return look | {"linewidth": 1.6, "zorder": 2.0}
-    number, apart = others.index(name), max(1, points // MARKED)
+    number, apart = others.index(name), max(1, points // MARKS_PER_LINE)
     return look | {
         "linewidth": 0.8,
         "zorder": 2.5,
-        "marker": MARKS[number % len(MARKS)],
+        "marker": MARKERS[number % len(MARKERS)],
         "markevery": (apart * number // len(others), apart),
         "markersize": 3.0,
         "markerfacecolor": "white",
@@ -236,7 +236,7 @@ def marked_line(name: str, color: str, reference: str | None, others: Sequence[s
 
 def label(name: str, reference: str | None) -> str:
     """Name of an estimator in a legend."""
-    return plain(name) + (" (reference)" if name == reference else "")
+    return safe_text(name) + (" (reference)" if name == reference else "")
 
 
 def note(axes: Axes, text: str) -> None:
@@ -260,15 +260,15 @@ def swatch(color: str, text: str, size: float = 7.0) -> Line2D:
     return Line2D([], [], color=color, marker="s", linestyle="none", markersize=size, label=text)
 
 
-def plain(text: str) -> str:
+def safe_text(text: str) -> str:
     """`text` as it can stand in a figure: no mathematics, no line breaks, nothing the font cannot draw, not too long.
 
     A dollar sign would begin mathematics and a leading underscore would hide a line from the legend.
     """
     known = _drawable()
     letters = "".join(c if ord(c) in known and c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    if len(letters) > LONGEST:
-        letters = letters[: LONGEST - 1] + "…"
+    if len(letters) > MAX_NAME:
+        letters = letters[: MAX_NAME - 1] + "…"
     letters = letters.replace("$", r"\$")
     return " " + letters if letters.startswith("_") else letters
 

@@ -16,18 +16,17 @@ from ..tables.comparison import comparison_table
 from .environment import environment, picture
 
 CAPTIONS: Mapping[str, str] = {
-    "paths": "Aligned as said above, seen along the direction that points up.",
-    "errors": "Of each pair of poses, along the reference's direction of travel, to its left and up.",
-    "growth": "The same distance over the length of the path; a heading is seen from above, to the left positive.",
-    "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. No alignment and no early "
-    "mistake can hide in these.",
-    "segments": "Mean over all segments of a length, per metre.",
-    "map": "Landmarks of the same number. In the world the drift of the paths is in it; as the "
-    "cameras see them it is not.",
-    "three_sigma": "The error of each pose in its own body frame and the band that its covariances claim; both since "
-    "the first pose where an alignment was asked for and the covariances grow from there.",
-    "reprojection": "Solid with landmarks triangulated along each path in the same way, dotted with those that came "
-    "with it.",
+    "paths": "Aligned as the caption of the table describes, seen from above.",
+    "errors": "Differences of paired poses along the reference's direction of travel, to its left and up.",
+    "growth": "Difference over the length of the path; a heading to the left is positive.",
+    "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. Relative errors do not "
+    "depend on alignment or earlier errors.",
+    "segments": "Mean over all segments of a length, per meter.",
+    "map": "Landmarks are matched by number. Distances in the world include the drift of the paths; those in the "
+    "camera frames do not.",
+    "three_sigma": "Error of each pose in its own body frame between three sigmas of its covariance; both are "
+    "relative to the first pose where an alignment was requested and the covariances grow from there.",
+    "reprojection": "Solid with landmarks triangulated along each path, dotted with the landmarks of the estimate.",
 }
 """captions by the beginning of a figure's name"""
 
@@ -38,7 +37,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     table = comparison_table(comparison, summary, mark_reference=True)
     palette = colors([reference.name, *estimates], reference.name)
     titles = {name: f"{name} (reference)" if name == reference.name else name for name in palette}
-    notes = {f"What {name} has no figure for": estimate.notes for name, estimate in estimates.items()}
+    notes = {f"Missing figures of {name}": estimate.notes for name, estimate in estimates.items()}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
     return (
         environment()
@@ -49,7 +48,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             table=replace(
                 table,
                 name="figure",
-                caption=f"{table.caption} Best of a line in bold.",
+                caption=f"{table.caption} Best of a row in bold.",
                 rows=tuple(_with_intervals_below(row) for row in table.rows),
             ),
             swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in palette.items()},

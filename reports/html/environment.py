@@ -1,4 +1,4 @@
-"""The templates of all pages, and figures inside them, each an image of its own: nothing can reach out or run."""
+"""Templates of all pages, and figures as images inside them. A page without a script cannot run or load anything."""
 
 import re
 from base64 import b64encode
@@ -11,9 +11,10 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fgbaseline.reports.figures import Written, encoded
+from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..formatting import counted, number
+from ..results.metrics import TERMS
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""
@@ -21,29 +22,29 @@ LARGEST_SVG = 200_000
 """bytes, from which on the PNG takes its place"""
 
 CAPTIONS: Mapping[str, str] = {
-    "paths_overlaid": "Seen from above, along the direction that points up; all start from the same pose. "
-    "Squares mark the ends.",
-    "paths_side_by_side": "The same limits in each panel, landmarks in green. Where there is truth it is dashed, "
-    "else the reference is drawn thin.",
-    "divergence": "Distance and angle from the reference, and the distance split along its direction of travel, "
-    "to its left and up.",
-    "error_to_truth": "The same from the truth, without any alignment: all start at the true pose.",
-    "height": "Along the direction that the recording's reader says is up.",
+    "paths_overlaid": "Seen from above; all start at the same pose. Squares mark the ends.",
+    "paths_side_by_side": "The limits of all panels are equal; landmarks are green. Ground truth is dashed; without "
+    "it the reference is thin.",
+    "divergence": "Position and rotation difference from the reference, without alignment, and the position "
+    "difference along the reference's direction of travel, to its left and up.",
+    "error_to_truth": "Difference from ground truth in the same components, without alignment: all start at the true "
+    "pose.",
+    "height": "Along the up direction of the recording.",
     "reprojection_over_time": "Above, the median error over all observations of the landmarks that an estimator has. "
-    "Below, the matches of each frame; the mask excludes those that contradict their own track.",
+    "Below, the observations of each frame; the mask excludes those that contradict their own track.",
     "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over "
-    "those it used. Farther left is better.",
-    "nees": "Inside the band a covariance tells the truth about the error; above it the estimator claims to know more "
-    "than it does.",
-    "held_out": "Each half of a track predicted from its other half, along each path. Intervals that overlap may still "
-    "be told apart: the table has the difference from the best.",
-    "consistency": "The band of the NEES and of the NIS holds 95 % of the single frames of a consistent filter; frames "
-    "of the NEES are correlated. A filter's sigmas should be above the reference's.",
-    "reprojection_classes": "Flat lines say that errors do not depend on where a point is or how long it was followed. "
-    "Tracks below the dots have smaller errors than the noise assumed, above them larger ones.",
-    "map_difference": "Landmarks matched by number. In the world the paths' drift is part of the distance, as seen by "
-    "the cameras it is not.",
-    "time_per_frame": "Below the dotted line an estimator keeps up with the camera.",
+    "those it used. Curves farther left are better.",
+    "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "
+    "below it conservative.",
+    "held_out": "Each half of a track is predicted from its other half along each path. Paths whose intervals overlap "
+    "can still be separated: the table has the paired difference from the best.",
+    "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
+    "time-correlated. The sigma ratio of a filter is expected above 1.",
+    "reprojection_classes": "Flat lines: errors do not depend on the place of a point or the age of its track. The "
+    "dotted diagonal is expected where the noise is as assumed; above it residuals are larger, below it smaller.",
+    "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "
+    "in the camera frames do not.",
+    "time_per_frame": "An estimator below the dotted line runs in real time.",
 }
 
 
@@ -60,11 +61,11 @@ class Picture:
     height: int
 
 
-def picture(name: str, figure: Figure | Written) -> Picture:
+def picture(name: str, figure: Figure | EncodedFigure) -> Picture:
     """The figure as SVG, or as PNG where that would be too large."""
     svg = encoded(figure, "svg")
     form, content = ("svg+xml", svg) if len(svg) <= LARGEST_SVG else ("png", encoded(figure, "png"))
-    if isinstance(figure, Written):
+    if isinstance(figure, EncodedFigure):
         title, (width, height) = figure.title, figure.size
     else:
         title, (width, height) = str(figure.get_label()), figure.get_size_inches()
@@ -83,22 +84,22 @@ def environment() -> Environment:
     jinja = Environment(
         loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    jinja.filters |= {"number": number, "counted": counted, "flat": flat, "anchor": anchor}
-    jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT)}
+    jinja.filters |= {"number": number, "counted": counted, "flattened": flattened, "anchor": anchor}
+    jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
     return jinja
 
 
 def anchor(text: str) -> str:
-    """A title as the name of a place on the page."""
+    """Identifier of an element under a title."""
     return re.sub(r"\W+", "-", text).strip("-").lower()
 
 
-def flat(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
-    """The leaves of nested settings as (dotted name, text)."""
+def flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """Leaves of nested settings as (dotted name, text)."""
     leaves: list[tuple[str, str]] = []
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            leaves += flat(value, f"{above}{key}.")
+            leaves += flattened(value, f"{above}{key}.")
         elif isinstance(value, list | tuple):
             leaves.append((f"{above}{key}", ", ".join(map(str, value))))
         else:

@@ -13,13 +13,12 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 
-from ..figures import Written
+from ..figures import EncodedFigure
 from ..figures.style import TRUTH, colors, on_dark
 from ..phrases.run import verdict
 from ..tables import run as tables
-from ..tables import run_details as details
 from .environment import asset, environment, picture
-from .run_data import TRUTH_LINE, embedded_json, payload
+from .plot_data import TRUTH_LINE, embedded_json, page_data
 
 FIRST_SENTENCES = 3
 """of the verdict that stand above the table"""
@@ -27,18 +26,18 @@ EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_dif
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
 """figures that stand beside the interactive charts, because they show what these do not"""
-SCRIPTS = ("data.js", "state.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
+SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
 """the page's script in the order of its dependencies"""
 
 
-def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | Written]) -> str:
+def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
     """`report.html`: one file that needs no other and makes no request.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
     `figures.draw_and_write(run)` gave. All text that comes from files is escaped.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
-    data = payload(run)
+    data = page_data(run)
     numbered = list(enumerate(data["charts"]))
     keys = {name: str(i) for i, name in enumerate(run.results)}
     estimators = summary.get("estimators", {})
@@ -55,9 +54,9 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             policy=policy(),
             data=embedded_json(data),
             groups=[(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
-            jumps=data["jumps"],
+            bookmarks=data["bookmarks"],
             frames_seen=data["observations"] is not None,
-            classes={name: f"who-{key}" for name, key in keys.items()},
+            classes={name: f"estimator-{key}" for name, key in keys.items()},
             shown=shown,
             run=run,
             summary=summary,
@@ -68,11 +67,11 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             trust_in_reference=run.trust.verdict.name.lower(),
             table=tables.main_table(run, estimators),
             evidence=tables.evidence_table(run, estimators),
-            long_tables=details.long_tables(run),
-            components=details.components_table(estimators),
-            findings=details.findings_table(run.problem.findings),
-            excluded=details.exclusions_table(summary),
-            events=details.events_tables(run),
+            long_tables=tables.long_tables(run),
+            components=tables.components_table(estimators),
+            findings=tables.findings_table(run.problem.findings),
+            excluded=tables.exclusions_table(summary),
+            events=tables.events_tables(run),
             pictures=pictures,
             bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
             stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))],
@@ -96,10 +95,10 @@ def policy() -> Markup:
 
 
 def _color_rules(run: Run, keys: Mapping[str, str]) -> Markup:
-    """`.who-KEY` sets `--who`, the color of an estimator on light and on dark ground."""
+    """`.estimator-KEY` sets `--estimator`, the color of an estimator on light and on dark ground."""
     light = {keys[name]: color for name, color in colors(run.results, run.reference).items()} | {"truth": TRUTH}
     rules = [
-        "\n".join(f".who-{key} {{ --who: {color}; }}" for key, color in ground.items())
+        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
         for ground in (light, {key: on_dark(color) for key, color in light.items()})
     ]
     return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")

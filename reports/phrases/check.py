@@ -1,4 +1,4 @@
-"""Sentences and texts of a check that every form of output shares."""
+"""Sentences and texts of a check, for every form of output."""
 
 from fgbaseline.compare.limits import Bounds, Outcome
 from fgbaseline.data.plural import plural
@@ -9,25 +9,27 @@ from ..results.check import NEW, Checked, Line
 def verdict(checked: Checked) -> str:
     """The outcome, in a sentence."""
     n, count = len(checked.lines), checked.count
-    short, unknown = count[Outcome.FALLS_SHORT], count[Outcome.CANNOT_TELL]
-    parts = [f"{short} of {n} limits {'falls' if short == 1 else 'fall'} short"] if short else []
-    parts += [f"{unknown} of {n} cannot be told"] if unknown else []
+    parts = [falling_short(checked)] if count[Outcome.FALLS_SHORT] else []
+    if undecided := count[Outcome.CANNOT_TELL]:
+        parts.append(f"{undecided} of {plural(n, 'limit')} {'is' if undecided == 1 else 'are'} undecided")
     if parts:
         return f"{' and '.join(parts)}."
-    hold = "the limit holds" if n == 1 else f"all {n} limits hold"
-    if checked.undecided:
-        return f"By the figures {hold}, but the reference is not trusted enough to say so."
-    return f"{hold[0].upper()}{hold[1:]}."
+    hold = "The limit holds" if n == 1 else f"All {n} limits hold"
+    return f"{hold}, but the reference is not trusted enough: undecided." if checked.undecided else f"{hold}."
+
+
+def falling_short(checked: Checked) -> str:
+    """Number of limits that fall short: `1 of 12 limits falls short`."""
+    short = checked.count[Outcome.FALLS_SHORT]
+    return f"{short} of {plural(len(checked.lines), 'limit')} {'falls' if short == 1 else 'fall'} short"
 
 
 def remarks(checked: Checked) -> list[str]:
-    """Reasons why there is no value, or nothing to hold it against: a sentence for each such line."""
+    """Why a line has no value or no baseline, and errors that its value leaves out: a sentence for each such line."""
     several = len(checked.measured.runs) > 1
     sentences = []
     for line in checked.lines:
-        left_out = (
-            f"{plural(line.missing, 'error is', 'errors are')} missing (NaN) and left out" if line.missing else ""
-        )
+        left_out = f"{plural(line.missing, 'NaN error')} left out" if line.missing else ""
         reasons = [reason for reason in (line.reason, left_out) if reason not in ("", NEW)]
         if reasons:
             name = f"{f'{line.run}, ' if several else ''}{line.estimator}, {line.metric}"
@@ -36,7 +38,7 @@ def remarks(checked: Checked) -> list[str]:
 
 
 def bound(bounds: Bounds | None, tolerance: str = "") -> str:
-    """Such as '<= 0.5' or '0.3 to 0.6'."""
+    """Bounds as text: `<= 0.5` or `0.3 to 0.6`."""
     if bounds is None:
         return f"baseline, {tolerance} allowed"
     low, high = f"{bounds.at_least:.5g}", f"{bounds.at_most:.5g}"
@@ -45,7 +47,7 @@ def bound(bounds: Bounds | None, tolerance: str = "") -> str:
 
 
 def change(line: Line) -> str:
-    """Change against the baseline, and its share of that."""
+    """Change from the baseline, in the metric's unit and in percent."""
     if line.change is None or line.before is None:
         return "new" if line.reason == NEW else "-"
     share = f" ({100.0 * line.change / abs(line.before):+.2g} %)" if line.before and line.change else ""
@@ -53,5 +55,5 @@ def change(line: Line) -> str:
 
 
 def number(value: float | None, *, sign: bool = False) -> str:
-    """Five significant digits, of a margin or a change three; a dash for none."""
+    """Five significant digits, three of a margin or a change; a dash for None."""
     return "-" if value is None else f"{value:+.3g}" if sign else f"{value:.5g}"

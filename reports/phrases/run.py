@@ -1,69 +1,73 @@
-"""Verdict on a run: sentences that each have a number or a reason, and none flatters."""
+"""Verdict on a run: sentences with one fact each, its number and its threshold."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, Verdict, reprojection_summary, time_coverage
+from fgbaseline.compare import (
+    CovarianceState,
+    divergence_summary,
+    held_out_ranking,
+    reprojection_summary,
+    time_coverage,
+)
+from fgbaseline.compare.divergence_onset import (
+    AROUND,
+    divergence_onset,
+    divergence_threshold,
+    worst_second,
+    wrong_share,
+)
 from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
-from fgbaseline.reports.formatting import counted, listed, number, per_cent
 
-from .run_accuracy import nearest_sentences, truth_sentences
-from .run_evidence import (
-    consistency_sentences,
-    covariance_sentences,
-    departure_sentences,
-    held_out_sentences,
-    mask_sentences,
-)
+from ..formatting import counted, listed, number, per_cent
+from ..results.evidence import frame_ranges
+from .evidence import DEGREES_OF_FREEDOM, held_out_sentences, reference_sentence, sample_requirement, threshold
+from .run_accuracy import ate_sentences, divergence_sentences
+
+LONGEST_LIST = 80
+"""letters of a list of frames; of a longer one only the first and the last frame are named"""
 
 
 def verdict(run: Run) -> list[str]:
     """All sentences, in the order in which later ones rest on earlier ones."""
     parts: tuple[Callable[[Run], list[str]], ...] = (
-        _little_truth,
+        _too_little_truth,
         _reference,
         _coverage,
-        truth_sentences,
-        nearest_sentences,
-        departure_sentences,
-        _ends,
-        consistency_sentences,
-        covariance_sentences,
-        held_out_sentences,
+        ate_sentences,
+        divergence_sentences,
+        _maximum_divergence,
+        _failures,
+        _consistency,
+        _invalid_covariances,
+        _held_out,
         _common_observations,
-        mask_sentences,
-        _noise,
+        _mask,
+        _assumed_noise,
     )
     return [sentence for part in parts for sentence in part(run)]
 
 
-def _little_truth(run: Run) -> list[str]:
+def _too_little_truth(run: Run) -> list[str]:
     sample = truth_sample(run)
     if sample is None or not insufficient_truth(run):
         return []
     n = int(sample["n"])
     return [
-        f"Too little truth to judge by: {number(n)} of {number(run.problem.n_frames)} frames "
-        f"{'has' if n == 1 else 'have'} one, over {per_cent(sample['coverage'])} of the recording's time; "
-        f"fgbaseline check asks for {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}."
+        f"Too little ground truth for an ATE: {number(n)} of {counted(run.problem.n_frames, 'frame')} "
+        f"{'has' if n == 1 else 'have'} it, over {per_cent(sample['coverage'])} of the recording's time; "
+        f"{sample_requirement()}."
     ]
 
 
 def _reference(run: Run) -> list[str]:
     if run.reference is None:
         return [f"There is no reference, so nothing is compared: {listed(run.trust.reasons)}."]
-    reasons = "; ".join(run.trust.reasons[:3])
-    if run.trust.verdict is Verdict.TRUSTED:
-        return [f"The reference, {run.reference}, is trusted on its own evidence: {reasons}."]
-    meaning = {
-        Verdict.DOUBTFUL: "a small distance from it says more than a large one",
-        Verdict.UNTRUSTED: "distances from it say how much two answers disagree, and not which one is right",
-    }[run.trust.verdict]
-    so = f"; {meaning}" if run.compared else ""
-    return [f"The reference, {run.reference}, is {run.trust.verdict.name.lower()}: {reasons}{so}."]
+    return [reference_sentence(run.reference, run.trust, is_compared=bool(run.compared))]
 
 
 def _coverage(run: Run) -> list[str]:
@@ -75,16 +79,43 @@ def _coverage(run: Run) -> list[str]:
     each = listed(f"{name} {per_cent(time_coverage(t[there], t))}" for name, there in frames.items())
     common = {name: run.results[name].divergence_common for name in frames}
     counts = {c.frames for c in common.values() if c is not None}
-    apart = [name for name, c in common.items() if c is None]
-    text = f"The estimators do not cover the same share of the recording's time: {each}."
+    unranked = [name for name, c in common.items() if c is None]
+    sentences = [f"The estimators cover different shares of the recording's time: {each}."]
     if not counts:
-        return [f"{text} They have no frame in common, so they are not ranked."]
-    who = "the others have" if apart else "all have"
-    ranked = f"{text} They are ranked by their errors over the {number(counts.pop())} frames that {who}"
-    return [f"{ranked}; {listed(apart)} {'is' if len(apart) == 1 else 'are'} not ranked." if apart else f"{ranked}."]
+        return [*sentences, "They are not ranked: they have no frame in common."]
+    having = "the others have" if unranked else "all have"
+    sentences.append(f"They are ranked over the {counted(counts.pop(), 'frame')} that {having}.")
+    if unranked:
+        sentences.append(f"{listed(unranked)} {'is' if len(unranked) == 1 else 'are'} not ranked.")
+    return sentences
 
 
-def _ends(run: Run) -> list[str]:
+def _maximum_divergence(run: Run) -> list[str]:
+    """Largest divergence of each estimator, or when it first exceeds the threshold."""
+    sentences = []
+    overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
+    for result in run.compared:
+        if result.divergence is None or result.name in run.by_products or not known(result.divergence).any():
+            continue
+        limit, exceeded = divergence_threshold(result), divergence_onset(run, result)
+        most = number(divergence_summary(result.divergence)["max"])
+        sentence = f"{result.name}: maximum divergence {most} m; {threshold(limit)}."
+        if exceeded is not None:
+            then = "all frames" if exceeded.beyond == 1.0 else f"{per_cent(exceeded.beyond)} of the frames"
+            sentence += (
+                f" The threshold is first exceeded at {exceeded.seconds:.1f} s (frame {exceeded.frame}), and in {then} "
+                "from then on."
+            )
+            if exceeded.wrong is not None and overall is not None:
+                sentence += (
+                    f" Within {AROUND:g} s of that the mask excluded {per_cent(exceeded.wrong)} of the observations as "
+                    f"wrong matches ({per_cent(overall)} in the whole recording)."
+                )
+        sentences.append(sentence)
+    return sentences
+
+
+def _failures(run: Run) -> list[str]:
     sentences = []
     for status in (Status.FAILED, Status.RECOVERED):
         reasons: dict[str, list[str]] = {}
@@ -95,8 +126,56 @@ def _ends(run: Run) -> list[str]:
     for result in run.answered:
         missing = int(np.isnan(result.estimate.world_T_imu[:, 0, 0]).sum())
         if missing:
-            sentences.append(f"{result.name} has no pose in {missing} of {run.problem.n_frames} frames.")
+            sentences.append(f"{result.name} has no pose in {missing} of {counted(run.problem.n_frames, 'frame')}.")
     return sentences
+
+
+def _consistency(run: Run) -> list[str]:
+    """Normalized error RMS, the most consistent estimator first."""
+    known = {r.name: r.nees[~np.isnan(r.nees)] for r in run.answered if r.nees is not None}
+    mean = {name: float(nees.mean()) for name, nees in known.items() if len(nees)}
+    if not mean:
+        return []
+    each = (
+        f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} for {name} (NEES {number(value)})"
+        for name, value in sorted(mean.items(), key=lambda item: abs(np.log(max(item[1], 1e-300) / DEGREES_OF_FREEDOM)))
+    )
+    return [f"Normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): {listed(each)}."]
+
+
+def _invalid_covariances(run: Run) -> list[str]:
+    sentences = []
+    for result in run.answered:
+        bad = np.flatnonzero(result.evidence.covariance == CovarianceState.NOT_POSITIVE_DEFINITE)
+        if len(bad):
+            where = frame_ranges(bad)
+            if len(where) > LONGEST_LIST:
+                where = f"first {bad[0]}, last {bad[-1]}"
+            sentences.append(
+                f"{result.name} has {counted(len(bad), 'pose covariance that is', 'pose covariances that are')} not "
+                f"positive definite ({'frame' if len(bad) == 1 else 'frames'} {where}); NEES leaves "
+                f"{'it' if len(bad) == 1 else 'them'} out."
+            )
+    return sentences
+
+
+def _held_out(run: Run) -> list[str]:
+    """Held-out errors; without other minima of the reference's graph, which do not compete with it."""
+    if run.held_out is None:
+        return []
+    ranking, held, errors = run.held_out.ranking, run.held_out.held, run.held_out.errors
+    if errors is not None and (unranked := list(run.same_graph & set(ranking.index))):
+        ranking = held_out_ranking(replace(errors, error=errors.error.drop(columns=unranked)))
+    if len(ranking) == 0 or errors is None:
+        return [f"There is no held-out error: none of {counted(held.n_tracks, 'held-out track')} can be predicted."]
+    sample = (
+        f"{counted(errors.inliers, 'track piece')}; all estimators have poses in {number(errors.pieces)} of "
+        f"{number(held.n_pieces)}"
+    )
+    return [
+        *held_out_sentences(ranking, sample),
+        "The held-out error measures the motion over the length of a track, not drift.",
+    ]
 
 
 def _common_observations(run: Run) -> list[str]:
@@ -110,15 +189,25 @@ def _common_observations(run: Run) -> list[str]:
             medians[result.name] = reprojection_summary(table[table["observation"].isin(common)])["median"]
     if len(medians) < 2:
         return []
-    ranked = sorted(medians, key=lambda name: medians[name])
-    each = listed(f"{number(medians[name])} px for {name}" for name in ranked)
+    each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
-        f"Over the {counted(len(common), 'observation')} that all of them used, the median reprojection error is "
-        f"{each}."
+        f"Median reprojection error over the {counted(len(common), 'observation')} that all estimators used: {each}."
     ]
 
 
-def _noise(run: Run) -> list[str]:
+def _mask(run: Run) -> list[str]:
+    """Share of the observations that the mask excluded as wrong matches, and the worst second."""
+    overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
+    worst = worst_second(run.problem)
+    if overall is None or worst is None:
+        return []
+    return [
+        f"The mask excluded {per_cent(overall)} of the observations as wrong matches, which contradict their tracks; "
+        f"at most {per_cent(worst.share)}, in the second from {worst.second:.0f} s on."
+    ]
+
+
+def _assumed_noise(run: Run) -> list[str]:
     problem = run.problem
     if problem.diagnosed:
         return []
@@ -129,7 +218,6 @@ def _noise(run: Run) -> list[str]:
         ]
     sigma = np.sqrt(np.median(np.diagonal(problem.increment_covariance, axis1=1, axis2=2), axis=0))
     return [
-        f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px, {number(float(sigma[:3].max()))} m and "
-        f"{number(float(np.rad2deg(sigma[3:].max())))}° per frame are assumed as noise (one sigma), not estimated from "
-        "this recording."
+        f"Not diagnosed: the noise (1-sigma) is assumed, {number(float(np.sqrt(problem.pixel_variance)))} px, "
+        f"{number(float(sigma[:3].max()))} m and {number(float(np.rad2deg(sigma[3:].max())))}° per frame."
     ]

@@ -1,1 +1,1 @@
-"""The report that documents the filter, reproduced: its figures, its claims tested, and where its filter breaks."""
+"""Reproduction of the source paper of the documented filter: its figures, its claims, and causes of failure."""

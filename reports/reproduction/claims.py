@@ -1,4 +1,4 @@
-"""Claims of the report, each tested: verdict, measured figure, cause, and the same filter on the repaired recording."""
+"""Claims of the source paper: verdict, measured value, cause, and the same filter on the repaired recording."""
 
 from collections.abc import Callable
 from collections.abc import Sequence as Several
@@ -11,24 +11,23 @@ from fgbaseline.data import Status
 from fgbaseline.data.plural import plural
 
 from ..formatting import meters, per_cent, pixels
-from .recordings import REPORTED, Reported
-from .study import Staged, Study
-from .trial import Outcome, path_length
+from .recordings import PAPER_RECORDINGS, PaperRecording
+from .study import Outcome, Staged, Study, path_length
 
-SIGNIFICANT = 1.5
-"""a cause is named where its repair changes the figure at least by this factor"""
-LEVEL = 0.03
-"""of the path's length: a climb beyond it is no town's"""
-ALIKE = 0.02
-"""of the path's length: two paths that stay closer look the same on a page"""
-SMOOTH = 0.1
-"""m and degrees that an update may add to a frame's motion, before the path looks noisy"""
-WELL = 3.0
-"""px, median error below which a filter may be said to work"""
+MIN_CAUSE_FACTOR = 1.5
+"""a cause is named where its repair changes the value at least by this factor"""
+MAX_CLIMB = 0.03
+"""largest plausible height of the end, as a share of the path's length"""
+MAX_DISTANCE = 0.02
+"""share of the path's length, below which two paths look the same in a figure"""
+MAX_CORRECTION = 0.1
+"""m and degrees; a path with larger corrections by an update looks noisy"""
+MAX_REPROJECTION = 3.0
+"""px, median; a filter below it works"""
 
 
 class Verdict(StrEnum):
-    """Result of the test of a claim."""
+    """Verdict on a claim."""
 
     HOLDS = "holds"
     IN_PART = "holds in part"
@@ -38,7 +37,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A claim of the report on one recording, tested."""
+    """A claim of the source paper on one recording, with its test."""
 
     code: str
     recording: str
@@ -46,11 +45,11 @@ class Claim:
     verdict: Verdict
     measured: str
     cause: str
-    """cause of the figure, as the diagnosis finds it"""
+    """cause of the measured value, by the diagnosis"""
     repaired: str
-    """the same filter on the repaired recording; empty where that has no bearing"""
+    """the same filter on the repaired recording; empty where it does not apply"""
     simulated: bool
-    """whether the filter saw simulated features"""
+    """whether the filter used simulated features"""
 
 
 def claim_on(
@@ -62,34 +61,34 @@ def claim_on(
 
 
 def causes(study: Study, figure: Callable[[Staged], float], text: Callable[[float], str]) -> str:
-    """The causes whose repair changes a figure, each with the figure before and after."""
+    """The causes whose repair changes a value, each with the value before and after."""
     before, parts = figure(study.staged[0]), []
     for staged in study.staged[1:]:
         after = figure(staged)
-        alike = before / SIGNIFICANT < after < before * SIGNIFICANT
+        alike = before / MIN_CAUSE_FACTOR < after < before * MIN_CAUSE_FACTOR
         if not alike and text(before) != text(after):
             parts.append(f"{staged.stage.cause}: {text(before)} → {text(after)}")
         before = after
     if not study.causes:
-        return "nothing that the diagnosis finds"
-    return "; ".join(parts) or "none of what was repaired changes it"
+        return "no fault detected"
+    return "; ".join(parts) or "no repair changes it"
 
 
 def claims_of(study: Study) -> list[Claim]:
-    """All claims that bear on a recording."""
-    reported = study.subject.reported
+    """All claims that apply to a recording."""
+    paper = study.subject.paper
     tests: list[Callable[[Study], Claim]] = [_predicted, _mapped]
-    if reported is None or reported.slam is not None:
+    if paper is None or paper.slam is not None:
         tests += [_works, _like_dead_reckoning]
     tests.append(_low_noise)
-    if reported is None or reported.slam is None:
+    if paper is None or paper.slam is None:
         tests.append(_every_noise)
-    counts = [] if reported is None else [_samples(study, reported), _features(study, reported)]
+    counts = [] if paper is None else [_samples(study, paper), _features(study, paper)]
     return [*counts, *(test(study) for test in tests)]
 
 
 def missing_claims(studies: Several[Study]) -> list[Claim]:
-    """Claims on the report's recordings that are not given: none of them is tested."""
+    """Claims on the source paper's recordings that are not given; they are not tested."""
     given = {study.subject.name for study in studies}
     return [
         Claim(
@@ -102,34 +101,34 @@ def missing_claims(studies: Several[Study]) -> list[Claim]:
             "",
             False,
         )
-        for r in REPORTED
+        for r in PAPER_RECORDINGS
         if r.name not in given
     ]
 
 
-def _samples(study: Study, reported: Reported) -> Claim:
+def _samples(study: Study, paper: PaperRecording) -> Claim:
     sequence = study.subject.recorded
     seconds = float(sequence.t[-1] - sequence.t[0])
     return claim_on(
         study,
         "samples",
-        f"the data is given over {reported.frames} seconds",
+        f"the data is given over {paper.frames} seconds",
         Verdict.FALSE,
         f"{plural(sequence.n_frames, 'frame')} in {seconds:.1f} s",
-        f"{reported.frames} is the number of samples, taken {1 / np.median(sequence.dt):.1f} times a second",
+        f"{paper.frames} is the number of samples, at {1 / np.median(sequence.dt):.1f} Hz",
     )
 
 
-def _features(study: Study, reported: Reported) -> Claim:
-    claim = f"it has {reported.tracks} features"
+def _features(study: Study, paper: PaperRecording) -> Claim:
+    claim = f"it has {paper.tracks} features"
     if study.subject.stand_in is not None:
         return claim_on(
             study,
             "features",
             claim,
             Verdict.CANNOT_TELL,
-            "the recording has no features here",
-            "so many were simulated in their place",
+            "the given recording has no features",
+            "this number was simulated in their place",
         )
     o = study.subject.recorded.observations
     tracks = len(np.unique(o.landmark))
@@ -137,10 +136,10 @@ def _features(study: Study, reported: Reported) -> Claim:
         study,
         "features",
         claim,
-        Verdict.HOLDS if tracks == reported.tracks else Verdict.FALSE,
+        Verdict.HOLDS if tracks == paper.tracks else Verdict.FALSE,
         f"{plural(tracks, 'track')}, {plural(len(o), 'observation')}",
-        f"on average {len(o) / max(1, tracks):.0f} frames a track and "
-        f"{len(o) / study.subject.recorded.n_frames:.0f} tracks a frame",
+        f"on average {len(o) / max(1, tracks):.0f} frames per track and "
+        f"{len(o) / study.subject.recorded.n_frames:.0f} tracks per frame",
     )
 
 
@@ -154,8 +153,8 @@ def _predicted(study: Study) -> Claim:
         study,
         "prediction",
         "the predicted trajectory may be assumed to be correct",
-        Verdict.FALSE if abs(end) > LEVEL * road else Verdict.HOLDS,
-        f"it ends {meters(abs(end))} {way} the start after {meters(road)} on the road, which a view from above hides",
+        Verdict.FALSE if abs(end) > MAX_CLIMB * road else Verdict.HOLDS,
+        f"it ends {meters(abs(end))} {way} the start after {meters(road)}, not visible from above",
         causes(study, climb, meters),
         f"{meters(climb(study.staged[-1]))} in height",
     )
@@ -172,19 +171,18 @@ def _mapped(study: Study) -> Claim:
         Verdict.IN_PART if apart == 0.0 else Verdict.FALSE,
         f"{_apart(apart)}, while the median reprojection error of {mapped.after.features} landmarks goes from "
         f"{before:.3g} to {after:.3g} px",
-        "equal by construction: mapping takes the poses as given, so this says nothing of the landmarks, which keep "
-        "the errors of the path they are seen from",
+        "equal by construction: mapping does not change the poses. The landmarks have the errors of the path",
     )
 
 
 def _works(study: Study) -> Claim:
     now, features = study.recorded, study.recorded.features
-    good = not now.breaks and now.reprojection < WELL
+    good = not now.breaks and now.reprojection < MAX_REPROJECTION
     lost = (
         ""
         if now.lost == 0
         else (
-            f", and the printed equations lose their covariance at {plural(now.lost, 'frame')}, "
+            f", and the printed covariance is not positive definite at {plural(now.lost, 'frame')}, "
             f"first at {now.first_lost}"
         )
     )
@@ -193,27 +191,28 @@ def _works(study: Study) -> Claim:
         "works",
         f"SLAM worked perfectly with {features} features",
         Verdict.HOLDS if good else Verdict.FALSE,
-        f"median reprojection error {pixels(now.reprojection)}, {per_cent(now.behind)} of the observations of points "
-        f"behind the camera{lost}",
+        f"median reprojection error {pixels(now.reprojection)}, {per_cent(now.behind)} of the observations violate "
+        f"cheirality{lost}",
         causes(study, lambda s: s.outcome.reprojection, pixels),
-        f"{pixels(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} behind, {_lost(study.repaired)}",
+        f"{pixels(study.repaired.reprojection)}, {per_cent(study.repaired.behind)} violate cheirality, "
+        f"{_lost(study.repaired)}",
     )
 
 
 def _like_dead_reckoning(study: Study) -> Claim:
     now, road = study.recorded, path_length(study.predicted)
-    noisy = now.correction_m > SMOOTH or now.correction_deg > SMOOTH
-    alike = now.apart_rmse < ALIKE * road
+    noisy = now.correction_m > MAX_CORRECTION or now.correction_deg > MAX_CORRECTION
+    alike = now.apart_rmse < MAX_DISTANCE * road
     verdict = Verdict.HOLDS if alike and noisy else Verdict.IN_PART if alike or noisy else Verdict.FALSE
     return claim_on(
         study,
         "like dead reckoning",
         "SLAM looks like dead reckoning, but noisy",
         verdict,
-        f"{meters(now.apart_rmse)} (RMS) and up to {meters(now.apart_max)} from dead reckoning, of a path of "
-        f"{meters(road)}; an update moves a frame by {_moved(now)}",
+        f"{meters(now.apart_rmse)} (RMS) and up to {meters(now.apart_max)} from dead reckoning, on a path of "
+        f"{meters(road)}; correction per update {_correction(now)}",
         causes(study, lambda s: s.outcome.apart_rmse, meters),
-        f"{meters(study.repaired.apart_rmse)}, up to {meters(study.repaired.apart_max)}; {_moved(study.repaired)}",
+        f"{meters(study.repaired.apart_rmse)}, up to {meters(study.repaired.apart_max)}; {_correction(study.repaired)}",
     )
 
 
@@ -222,35 +221,35 @@ def _low_noise(study: Study) -> Claim:
     singular = pixels.lost > study.recorded.lost or pixels.status is Status.FAILED
     without = none.status is Status.FAILED
     verdict = Verdict.HOLDS if singular and without else Verdict.IN_PART if singular or without else Verdict.FALSE
-    zero = f"with W = 0 it stops ({none.reason})" if without else "with W = 0 it goes through"
+    zero = f"with W = 0 the filter fails ({none.reason})" if without else "with W = 0 the filter finishes"
     return claim_on(
         study,
         "low noise",
         "low noise gives a singular covariance",
         verdict,
-        f"with V = {pixels.settings.pixel_variance:g} I the covariance as printed is lost at "
+        f"with V = {pixels.settings.pixel_variance:g} I the printed covariance is not positive definite at "
         f"{plural(pixels.lost, 'frame')} ({study.recorded.lost} with {study.recorded.settings.pixel_variance:g} I); "
-        f"with a millionth of W at {plural(motion.lost, 'frame')}; {zero}",
-        "(I - K H) Sigma loses its small eigenvalues to rounding where V is small beside H Sigma H^T, most near the "
-        "camera plane; with W = 0 Sigma of the first pose, zero, stays zero and has no inverse",
+        f"with 1e-6 W at {plural(motion.lost, 'frame')}; {zero}",
+        "rounding removes small eigenvalues of (I - K H) Sigma where V is small against H Sigma H^T, mostly near the "
+        "camera plane; with W = 0 Sigma of the first pose stays zero and has no inverse",
     )
 
 
 def _every_noise(study: Study) -> Claim:
     runs = [*study.swept, *study.held]
-    broken = sum(run.breaks for run in runs)
-    off = sum(not run.breaks and not run.apart_rmse < ALIKE * path_length(study.predicted) for run in runs)
-    verdict = Verdict.HOLDS if broken == len(runs) else Verdict.IN_PART if broken else Verdict.FALSE
+    failing = sum(run.breaks for run in runs)
+    off = sum(not run.breaks and not run.apart_rmse < MAX_DISTANCE * path_length(study.predicted) for run in runs)
+    verdict = Verdict.HOLDS if failing == len(runs) else Verdict.IN_PART if failing else Verdict.FALSE
     repaired = study.swept_repaired
     return claim_on(
         study,
         "every noise",
         "singularity error for different numbers of features and every noise level",
         verdict,
-        f"the printed equations break in {broken} of {len(runs)} settings, and in {off} more the path is over "
-        f"{per_cent(ALIKE)} of its length from dead reckoning",
-        "landmarks that pass through the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
-        f"they break in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
+        f"the printed equations fail in {failing} of {len(runs)} settings; in {off} more the path is over "
+        f"{per_cent(MAX_DISTANCE)} of its length from dead reckoning",
+        "landmarks cross the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
+        f"they fail in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
     )
 
 
@@ -258,9 +257,13 @@ def _apart(difference: float) -> str:
     return "the paths are equal to the last bit" if difference == 0.0 else f"the paths differ by up to {difference:.2g}"
 
 
-def _moved(outcome: Outcome) -> str:
+def _correction(outcome: Outcome) -> str:
     return f"{meters(outcome.correction_m)} and {outcome.correction_deg:.2g}° (RMS)"
 
 
 def _lost(outcome: Outcome) -> str:
-    return "no covariance lost" if outcome.lost == 0 else f"covariance lost at {plural(outcome.lost, 'frame')}"
+    return (
+        "all covariances positive definite"
+        if outcome.lost == 0
+        else f"covariance not positive definite at {plural(outcome.lost, 'frame')}"
+    )

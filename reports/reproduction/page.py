@@ -1,4 +1,4 @@
-"""The page of a reproduction, one file that opens offline, and the table of its claims."""
+"""The page of a reproduction, which opens offline: sentences, captions, and the tables of claims and repairs."""
 
 from collections.abc import Mapping
 from collections.abc import Sequence as Several
@@ -6,12 +6,13 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure
 
+from fgbaseline.data.plural import plural
+
 from ..formatting import meters, number, per_cent
 from ..html.environment import environment, picture
-from ..phrases.reproduction import CAUSES, SWEEP, sentences
 from ..tables import Cell, Column, Row, Table
 from .claims import Claim, Verdict
-from .study import Study
+from .study import Outcome, Study
 
 BADGES: Mapping[str, str] = {
     Verdict.HOLDS: "trusted",
@@ -19,21 +20,27 @@ BADGES: Mapping[str, str] = {
     Verdict.FALSE: "untrusted",
     Verdict.CANNOT_TELL: "",
 }
-"""the house's colors for good, fair and poor"""
+"""style of each verdict: good, fair and poor"""
 STAGES = (
-    Column("put right", words=True),
+    Column("repaired", words=True),
     Column("from dead reckoning, RMS"),
     Column("largest"),
     Column("reprojection", unit="px"),
-    Column("share behind the camera"),
-    Column("frames lost"),
-    Column("an update moves a frame by"),
+    Column("cheirality violated"),
+    Column("frames, not positive definite"),
+    Column("correction per update, RMS"),
 )
-FROM_TRUTH = Column("from the truth, RMS")
+FROM_TRUTH = Column("from ground truth, RMS")
+SWEEP = (
+    "Landmarks updated in turn with the pose, W as in the source paper. Numbers: RMS distance from dead reckoning "
+    "(darker: larger), and frames where the printed covariance is not positive definite. Below: the filter of figure 9 "
+    "after one repair after another, and the share of observations that violate cheirality."
+)
+CAUSES = "Each panel has the repairs of the one before. Distances: RMS from the dead reckoning of the same panel."
 
 
 def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str, Figure]) -> str:
-    """`report.html`. All text that comes from files is escaped."""
+    """The page `report.html`; text from files is escaped."""
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
     return (
         environment()
@@ -53,7 +60,7 @@ def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str
 
 
 def claims_table(claims: Several[Claim]) -> Table:
-    """The claims by recording, as the terminal shows them."""
+    """Table of the claims by recording, for the terminal."""
     rows = (
         Row(
             f"{claim.recording} (simulated)" if claim.simulated else claim.recording,
@@ -61,12 +68,12 @@ def claims_table(claims: Several[Claim]) -> Table:
         )
         for claim in claims
     )
-    columns = tuple(Column(title, words=True) for title in ("the report says", "verdict", "measured"))
+    columns = tuple(Column(title, words=True) for title in ("claim of the source paper", "verdict", "measured"))
     return Table(columns, tuple(rows), name="recording")
 
 
 def _stages(study: Study) -> Table:
-    """The documented filter after each repair of a recording."""
+    """Table of the documented filter after each repair of a recording."""
     truth = study.subject.studied.truth is not None
     rows = []
     for staged in study.staged:
@@ -77,3 +84,23 @@ def _stages(study: Study) -> Table:
         rows.append(Row(staged.stage.name, tuple(map(Cell, texts))))
     columns = (*STAGES, FROM_TRUTH) if truth else STAGES
     return Table(columns, tuple(rows), name="stage", title=study.subject.label)
+
+
+def sentences(study: Study) -> list[str]:
+    """Two sentences on a recording: the filter on the data as recorded, and on the repaired data."""
+    label, now, then = study.subject.label, study.recorded, study.repaired
+    first = (
+        f"{label}: the documented filter with {now.features} features and V = {now.settings.pixel_variance:g} I is "
+        f"{_state(now)}."
+    )
+    if not study.causes:
+        return [first, f"{label}: no fault detected."]
+    return [first, f"{label}, repaired ({'; '.join(study.causes)}): it is {_state(then)}."]
+
+
+def _state(outcome: Outcome) -> str:
+    lost = f"not positive definite at {plural(outcome.lost, 'frame')}" if outcome.lost else "always positive definite"
+    return (
+        f"{meters(outcome.apart_rmse)} (RMS) from dead reckoning with a median reprojection error of "
+        f"{outcome.reprojection:.3g} px, its printed covariance {lost}"
+    )

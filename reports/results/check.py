@@ -52,7 +52,7 @@ class Line:
     before: float | None
     """in the baseline"""
     reason: str
-    """why there is no value, or why nothing can be told"""
+    """why there is no value, or why the limit cannot be judged"""
     missing: int = 0
     """errors that are NaN, which the value leaves out"""
     shortage: Shortage | None = None
@@ -78,9 +78,9 @@ class Checked:
     lines: tuple[Line, ...]
     """in the order of the limits file, then of run and estimator"""
     references: tuple[str, ...]
-    """what is to be said of references that are not trusted, a sentence for each run"""
+    """sentences on references that are not trusted, one for each run"""
     shortages: tuple[str, ...]
-    """which samples are smaller than the limits ask for, a sentence each: what is said first of all"""
+    """sentences on samples that are smaller than the limits ask for, printed first"""
     undecided: bool
     """a reference is less trusted than the limits ask for"""
     measured: Measured
@@ -90,12 +90,12 @@ class Checked:
 
     @property
     def exit_code(self) -> int:
-        """0 all hold, 1 some fall short, 2 none does but some cannot be told."""
+        """0 all hold, 1 some fall short, 2 none does but some cannot be judged."""
         if self.count[Outcome.FALLS_SHORT]:
             return FALLS_SHORT
         return CANNOT_TELL if self.undecided or self.count[Outcome.CANNOT_TELL] else HOLDS
 
     @property
     def count(self) -> Mapping[Outcome, int]:
-        """How many lines came out how."""
+        """Number of lines by outcome."""
         return {outcome: sum(line.outcome is outcome for line in self.lines) for outcome in Outcome}

@@ -1,4 +1,4 @@
-"""Model of `comparison.json`. `make schema` writes it, with these descriptions, to docs/comparison.schema.json."""
+"""Model of `comparison.json`; `make schema` writes docs/comparison.schema.json."""
 
 import json
 from typing import Annotated, Any, Final, Literal
@@ -33,7 +33,7 @@ class Statistics(Part):
     max: Number
     sse: Annotated[Number, Field(description="sum of squares")]
     n: int
-    missing: Annotated[int, Field(description="errors that are NaN and left out")]
+    missing: Annotated[int, Field(description="NaN errors, which the figures leave out")]
     block: Annotated[int, Field(description="block length of the bootstrap, errors")]
     reliable: Annotated[bool, Field(description="whether at least ten blocks fit into the path")]
 
@@ -188,7 +188,8 @@ class EstimateSummary(Part):
     segments: Segments | None
     drift: dict[str, Rate] | None
     nees: Annotated[
-        Consistency | None, Field(description="of its own covariances, against a reference taken for the truth")
+        Consistency | None,
+        Field(description="of its own covariances, against a reference that is taken for ground truth"),
     ]
     shares: Shares
     common: Annotated[Common | None, Field(description="null where there is no such moment, or it has too few")]

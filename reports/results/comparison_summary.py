@@ -17,7 +17,7 @@ from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
 from .comparison import Summary
-from .tree import INFINITE, finite, nulls
+from .statistics import INFINITE, finite, nulls
 
 LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
 INTERVAL = ["value", "low", "high"]

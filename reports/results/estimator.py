@@ -1,4 +1,4 @@
-"""Summary of an estimator in `summary.json`: its models, how they are filled, and why values are null."""
+"""Estimators in `summary.json`: models, how they are filled, and notes on missing values."""
 
 import math
 from collections import Counter
@@ -27,19 +27,19 @@ from .evidence import (
     evidence_notes,
     summarize_evidence,
 )
-from .statistics import Divergence, Number, Part, Reprojection, Spread
-from .tree import INFINITE, nulls
+from .metrics import MEASURED, measured, with_measured
+from .statistics import INFINITE, Divergence, Number, Part, Reprojection, Spread, nulls
 
 
 class Component(Part):
-    """Measured minus predicted, px, over all observations of the estimated landmarks."""
+    """Measured minus predicted pixel coordinate, px, over all observations of the estimated landmarks."""
 
     bias: Number
     spread: Number
 
 
 class ObservationCount(Part):
-    """How much of what the problem offered was used."""
+    """Use of the observations of the problem."""
 
     offered: Annotated[int, Field(description="observations of the problem, after its mask")]
     used: int
@@ -47,10 +47,10 @@ class ObservationCount(Part):
 
 
 class TruthCount(Part):
-    """How many frames the truth metrics rest on."""
+    """Frames of the metrics against ground truth."""
 
     frames: int
-    missing: Annotated[int, Field(description="frames without truth, or that the estimator did not reach")]
+    missing: Annotated[int, Field(description="frames without ground truth or without a pose")]
 
 
 class CommonRmse(Part):
@@ -60,25 +60,24 @@ class CommonRmse(Part):
     frames: int
 
 
+@with_measured
 class EstimatorSummary(Part):
     """One estimator."""
 
     status: Literal["ok", "recovered", "failed"]
     reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
-    seconds: Annotated[float, Field(description="for the whole answer, s")]
-    frames_per_second: Number
-    reprojection: Annotated[Reprojection, Field(description="over all observations of the landmarks it estimated")]
-    reprojection_used: Annotated[Reprojection, Field(description="over those it used")]
-    reprojection_common: Annotated[Reprojection, Field(description="over those that every estimator used")]
+    seconds: Annotated[float, Field(description="computation time of the estimate, s")]
+    reprojection: Annotated[Reprojection, Field(description="over all observations of its landmarks")]
+    reprojection_used: Annotated[Reprojection, Field(description="over the observations it used")]
+    reprojection_common: Annotated[Reprojection, Field(description="over the observations that every estimator used")]
     components: dict[str, Component]
     divergence: Divergence | None
-    coverage: Annotated[float, Field(description="share of the recording's time in which it has poses")]
     divergence_common: Annotated[
-        CommonRmse | None, Field(description="over the frames that all ranked estimators have: what ranks it")
+        CommonRmse | None, Field(description="over the frames that all ranked estimators have; ranks by it")
     ]
-    ate_common: Annotated[CommonRmse | None, Field(description="the same of the error to truth after alignment")]
-    ate: Annotated[Spread | None, Field(description="position against truth after SE(3) alignment, m")]
-    ate_unaligned: Annotated[Divergence | None, Field(description="pose against truth as it is")]
+    ate_common: Annotated[CommonRmse | None, Field(description="ATE over the frames that all ranked estimators have")]
+    ate: Annotated[Spread | None, Field(description="ATE: position error to ground truth after SE(3) alignment, m")]
+    ate_unaligned: Annotated[Divergence | None, Field(description="pose error to ground truth without alignment")]
     truth: TruthCount | None
     nees: NeesInDetail | None
     covariance: CovarianceCount | None
@@ -93,37 +92,37 @@ class EstimatorSummary(Part):
     observations: ObservationCount
     samples: Annotated[
         dict[str, dict[str, float]],
-        Field(description="by the beginning of a metric's path: n that it is taken over, coverage of the time"),
+        Field(description="by the beginning of a metric's path: sample size n, coverage of the time"),
     ]
-    events: Annotated[dict[str, int], Field(description="kind of event -> how often")]
-    notes: Annotated[dict[str, str], Field(description="why values are null: by key, for all below it; * for all")]
+    events: Annotated[dict[str, int], Field(description="kind of event -> count")]
+    notes: Annotated[
+        dict[str, str], Field(description="reasons of null values by key, valid for all below it; * for all")
+    ]
 
 
-TOO_FEW = "it has too few frames in common with the other estimators to be ranked"
+TOO_FEW = "it has too few common frames with the other estimators to be ranked"
 
 
 def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
     """Summary of an estimator, whose figures may be NaN or infinite."""
-    estimate, table, t = result.estimate, result.reprojection, run.problem.sequence.t
+    estimate, table = result.estimate, result.reprojection
     common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
     offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())
-    seconds = estimate.seconds_total
     values = {
         "status": str(estimate.status),
         "reason": estimate.reason,
-        "seconds": seconds,
-        "frames_per_second": run.problem.n_frames / seconds if seconds > 0 else math.nan,
+        "seconds": estimate.seconds_total,
         "reprojection": compare.reprojection_summary(table),
         "reprojection_used": compare.reprojection_summary(table[table["used"]]),
         "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
         "components": compare.component_summary(table),
         "divergence": None if result.divergence is None else compare.divergence_summary(result.divergence),
-        "coverage": compare.time_coverage(t[np.isfinite(estimate.world_T_imu[:, 0, 0])], t),
         "divergence_common": None if result.divergence_common is None else asdict(result.divergence_common),
         "ate_common": None if result.ate_common is None else asdict(result.ate_common),
         "ate": None if result.truth_aligned is None else compare.summarized(result.truth_aligned["position"]),
         "ate_unaligned": None if result.truth is None else compare.divergence_summary(result.truth),
         "truth": None if result.truth is None else _truth_count(result.truth),
+        **measured(run, result),
         **summarize_evidence(run, result),
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
@@ -134,7 +133,7 @@ def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
 
 
 def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict[str, str]:
-    """Why values are null, by key: for all that lies below it, `*` for all.
+    """Reasons of null values by key, valid for all below it; `*` for all.
 
     `absent` are their paths, and whether a value is infinite.
     """
@@ -142,7 +141,7 @@ def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict
     if not result.answered:
         return {"*": f"the estimator failed: {estimate.reason}"}
     reached = bool(np.isfinite(estimate.world_T_imu[-1]).all())
-    last = "the last frame has no truth" if reached else "it did not reach the last frame"
+    last = "the last frame has no ground truth" if reached else "it did not reach the last frame"
     no_truth = result.truth is None
     reasons = {
         "reprojection": None if len(estimate.landmarks) else "it estimated no landmarks",
@@ -152,15 +151,15 @@ def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict
         "divergence": "there is no reference to diverge from" if result.divergence is None else None,
         "divergence.final": "it or the reference did not reach the last frame",
         "divergence.rotation_final_deg": "it or the reference did not reach the last frame",
-        "ate": "the recording has no truth" if no_truth else "no frame has both a pose and a truth",
-        "ate_common": "the recording has no truth" if no_truth else TOO_FEW,
+        "ate": "the recording has no ground truth" if no_truth else "no frame has both a pose and ground truth",
+        "ate_common": "the recording has no ground truth" if no_truth else TOO_FEW,
         "divergence_common": "there is no reference to diverge from" if result.divergence is None else TOO_FEW,
-        "ate_unaligned": "the recording has no truth" if no_truth else None,
+        "ate_unaligned": "the recording has no ground truth" if no_truth else None,
         "ate_unaligned.final": last,
         "ate_unaligned.rotation_final_deg": last,
-        "truth": "the recording has no truth",
+        "truth": "the recording has no ground truth",
         **evidence_notes(run, result),
-        "frames_per_second": "it took no measurable time",
+        **{metric.key: metric.absent for metric in MEASURED},
         "observations.share": "the problem has no observations",
     }
     noted: dict[str, str] = {}

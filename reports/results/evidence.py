@@ -1,4 +1,4 @@
-"""Consistency, residuals, map and held-out tracks of an estimator in `summary.json`: models and how they are filled."""
+"""Consistency, residuals, map and held-out tracks in `summary.json`: models and how they are filled."""
 
 import math
 from dataclasses import asdict
@@ -18,7 +18,7 @@ from .statistics import Nees, Number, Part
 
 
 class NeesInDetail(Nees):
-    """The same, with position and rotation apart."""
+    """NEES against ground truth, also of position and rotation alone."""
 
     position_mean: Annotated[Number, Field(description="of the position alone; 3 is expected")]
     rotation_mean: Annotated[Number, Field(description="of the rotation alone; 3 is expected")]
@@ -28,16 +28,16 @@ class NeesInDetail(Nees):
 
 
 class CovarianceCount(Part):
-    """What the covariances of the poses are worth."""
+    """Validity of the pose covariances."""
 
-    frames: Annotated[int, Field(description="that have a covariance, be it one or not")]
-    held: Annotated[int, Field(description="with a covariance of zero: the first pose")]
+    frames: Annotated[int, Field(description="with a covariance, valid or not")]
+    held: Annotated[int, Field(description="with a covariance of zero, such as the fixed first pose")]
     not_positive_definite: int
-    where: Annotated[str, Field(description="the frames that are not positive definite, such as '3, 7 to 9'")]
+    where: Annotated[str, Field(description="frames that are not positive definite, such as '3, 7 to 9'")]
 
 
 class ReferenceNees(Part):
-    """NEES of the difference from the reference, with P - P_ref as its covariance; 6 is expected."""
+    """Reference NEES: difference from the reference with the covariance P - P_ref; 6 is expected."""
 
     mean: Number
     median: Number
@@ -47,14 +47,14 @@ class ReferenceNees(Part):
 
 
 class SigmaRatio(Part):
-    """Median over the frames of the estimate's sigma over the reference's; a filter's should be above 1."""
+    """Median over the frames of sigma over the reference's; above 1 is expected of a filter."""
 
     position: Number
     rotation: Number
 
 
 class Nis(Part):
-    """Normalised innovation squared of a filter, of the rows (uL, uR, (vL + vR) / 2), before kernel and gates."""
+    """Normalized innovation squared of a filter, of the rows (uL, uR, (vL + vR) / 2), before kernel and gates."""
 
     per_degree: Annotated[Number, Field(description="over its degrees of freedom; 1 is expected")]
     low: Annotated[Number, Field(description="95 % bound of per_degree, innovations independent from frame to frame")]
@@ -64,7 +64,7 @@ class Nis(Part):
 
 
 class Whitened(Part):
-    """Residuals of the observations it used over the noise assumed, track by track against chi-square."""
+    """Residuals of the used observations over the assumed noise, by track, against chi-square."""
 
     ratio: Annotated[Number, Field(description="squared residuals over their degrees of freedom; 1 is expected")]
     beyond_95: Annotated[Number, Field(description="share of the tracks beyond their 95 % quantile; 0.05 is expected")]
@@ -75,19 +75,21 @@ class Whitened(Part):
 
 
 class MovedPoints(Part):
-    """Tracks whose residuals say that the point moved, or that the track slid over it."""
+    """Dynamic points: tracks whose residuals a constant velocity of the point explains."""
 
-    tracks: Annotated[int, Field(description="long enough to be asked")]
+    tracks: Annotated[int, Field(description="long enough for the test")]
     moved: int
     share: Number
 
 
 class MapDifference(Part):
-    """Landmarks matched by number with those of the reference."""
+    """Differences of landmarks from the reference's of the same number."""
 
     n: int
     median: Annotated[Number, Field(description="distance in the world, drift included, m")]
-    median_seen: Annotated[Number, Field(description="distance as the two cameras see it, without drift, m")]
+    median_seen: Annotated[
+        Number, Field(description="distance in the frame of each one's own camera, without drift, m")
+    ]
     median_sigmas: Annotated[
         Number, Field(description="world distance over the covariance P - P_ref; 1.54 is expected")
     ]
@@ -96,14 +98,16 @@ class MapDifference(Part):
 
 
 class HeldOutError(Part):
-    """Errors on tracks that no estimator saw, predicted from the other half of the track, px."""
+    """Held-out error: tracks that no estimator used, each half predicted from the other, px."""
 
     rank: Annotated[int, Field(description="1 for the smallest median")]
     median: Number
     low: Annotated[Number, Field(description="of a 95 % interval of the median (block bootstrap)")]
     high: Number
     behind: Annotated[Number, Field(description="median minus the best one")]
-    behind_low: Annotated[Number, Field(description="of a 95 % interval; one that holds 0 cannot tell the two apart")]
+    behind_low: Annotated[
+        Number, Field(description="of a 95 % interval; the two are not separated where it contains 0")
+    ]
     behind_high: Number
     p95: Number
     under_3px: Annotated[Number, Field(description="share, 0 to 1")]
@@ -137,11 +141,11 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
     """Why a value of `summarize_evidence` may be null, by key."""
     alone = REFERENCE if result.name == run.reference else "there is no reference"
     no_covariance = "it gives no covariance" if result.estimate.covariance is None else ""
-    no_truth = "" if result.evidence.nees is not None else "the recording has no truth"
+    no_truth = "" if result.evidence.nees is not None else "the recording has no ground truth"
     no_tracks = "none of its landmarks has enough observations"
     is_alone = result.evidence.difference is None
     return {
-        "nees": no_truth or no_covariance or "no frame has both a truth and a positive definite covariance",
+        "nees": no_truth or no_covariance or "no frame has both ground truth and a positive definite covariance",
         "covariance": "it gives no covariance",
         "nees_reference": alone
         if is_alone
@@ -152,7 +156,7 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
         "moved_points.share": no_tracks,
         "map": alone if is_alone else "it has no landmark in common with the reference",
         "map.median_sigmas": "no common landmark has covariances with P - P_ref positive definite",
-        "held_out": "no tracks were held out" if run.held_out is None else "no held-out track is left to judge it by",
+        "held_out": "no tracks were held out" if run.held_out is None else "no held-out track remains",
         "held_out.p95": "more than 5 % of the points lie behind the camera",
     }
 

@@ -17,7 +17,7 @@ from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
-from .tree import INFINITE, leaves
+from .statistics import INFINITE, leaves
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,11 +35,11 @@ ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"})
 """metrics that are measured from the reference"""
 
 
-class _Part(BaseModel):
+class _Record(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class Reference(_Part):
+class ReferenceRecord(_Record):
     """The reference that divergence is measured from, and the trust in it."""
 
     name: str | None = None
@@ -48,31 +48,31 @@ class Reference(_Part):
     reasons: tuple[str, ...] = ()
 
 
-class Sequence(_Part):
+class SequenceRecord(_Record):
     """The recording."""
 
     name: str = ""
 
 
-class Found(_Part):
+class FindingRecord(_Record):
     """A fault of the recording."""
 
     code: str = ""
     certainty: str = ""
 
 
-class Posed(_Part):
-    """How the problem was posed."""
+class ProblemRecord(_Record):
+    """Problem that the estimators solved."""
 
-    findings: tuple[Found, ...] = ()
+    findings: tuple[FindingRecord, ...] = ()
 
 
-class MeasuredRun(_Part):
+class MeasuredRun(_Record):
     """The estimators of one sequence."""
 
-    reference: Reference = Reference()
-    problem: Posed = Posed()
-    sequence: Sequence = Sequence()
+    reference: ReferenceRecord = ReferenceRecord()
+    problem: ProblemRecord = ProblemRecord()
+    sequence: SequenceRecord = SequenceRecord()
     estimators: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     compared: bool = False
     """trajectories alone, all of whose errors are from the reference"""
@@ -97,7 +97,7 @@ class MeasuredRun(_Part):
         return first in ON_REFERENCE or (self.compared and not first.startswith("reprojection"))
 
 
-class _Several(_Part):
+class _SuiteSummary(_Record):
     runs: Annotated[dict[str, MeasuredRun], Field(min_length=1)]
 
 
@@ -138,15 +138,28 @@ class RunFolder:
         return read_landmarks(self.folder / "landmarks" / f"{name}.csv")
 
     def series(self, name: str) -> "pd.DataFrame":
-        """One row per frame of an estimator."""
-        import pandas as pd  # half a second, which a check does without
-
+        """One row per frame of an estimator, with its time `t`."""
         path = self.folder / "series" / f"{name}.csv"
-        with reading(path):
-            try:
-                return pd.read_csv(regular_file(path))
-            except ValueError as error:
-                raise InputError(f"it is not the table that a run writes ({error}); run it again") from error
+        table = _csv(path)
+        if table is None or "t" not in table:
+            raise InputError(f"{path}: the file is missing, or has no column t; run it again")
+        return table
+
+    def table(self, name: str) -> "pd.DataFrame | None":
+        """A long table; None where the run has none of that name."""
+        return _csv(self.folder / "tables" / f"{name}.csv")
+
+
+def _csv(path: Path) -> "pd.DataFrame | None":
+    import pandas as pd  # half a second, which a check does without
+
+    if not path.is_file():
+        return None
+    with reading(path):
+        try:
+            return pd.read_csv(regular_file(path))
+        except ValueError as error:
+            raise InputError(f"it is not the table that a run writes ({error}); run it again") from error
 
 
 def read_folder(folder: Path) -> Measured:
@@ -166,7 +179,7 @@ def read_measured(path: Path) -> Measured:
         document = _document(path)
         try:
             if "runs" in document:
-                runs = dict(_Several.model_validate(document).runs)
+                runs = dict(_SuiteSummary.model_validate(document).runs)
             else:
                 run = MeasuredRun.model_validate(document)
                 runs = {run.sequence.name: run}
@@ -183,7 +196,10 @@ def _document(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"this is not JSON ({error}); give a {SUMMARY} or a baseline") from None
     if not isinstance(document, dict) or not str(document.get("schema", "")).startswith("fgbaseline/"):
-        raise InputError(f'it has no "schema" of fgbaseline\'s; give a {SUMMARY} or a baseline')
+        raise InputError(
+            f"it is not the summary of a run, comparison or bench (no schema of fgbaseline's); give a {SUMMARY} or a "
+            "baseline"
+        )
     return document
 
 

@@ -1,4 +1,4 @@
-"""Model of `summary.json` and how it is filled. `make schema` writes its schema to docs/summary.schema.json."""
+"""Model of `summary.json` and how it is filled; `make schema` writes docs/summary.schema.json."""
 
 import json
 import math
@@ -17,8 +17,7 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
 from .estimator import EstimatorSummary, summarize_estimator
-from .statistics import Number, Part
-from .tree import finite
+from .statistics import Number, Part, finite
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
@@ -26,7 +25,7 @@ LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
 
 
 class SequenceSummary(Part):
-    """What was recorded."""
+    """Recording."""
 
     name: str
     source: str
@@ -35,61 +34,59 @@ class SequenceSummary(Part):
     duration_s: float
     observations: int
     tracks: int
-    path_length_m: Annotated[
-        Number, Field(description="of the truth, else of the reference; null where there is neither")
-    ]
+    path_length_m: Annotated[Number, Field(description="of ground truth, else of the reference; null without both")]
     up: Annotated[list[float], Field(description="unit vector that points up in the world of the trajectories")]
-    ahead: Annotated[list[float], Field(description="unit vector, level: where the camera looks at the start")]
+    ahead: Annotated[list[float], Field(description="horizontal unit vector of the optical axis at the start")]
     remarks: list[str]
 
 
 class FindingSummary(Part):
-    """One thing that is wrong with the recording."""
+    """Fault of the recording."""
 
     code: str
     sentence: str
-    before: Annotated[Number, Field(description="a figure of the recording as it is, in `unit`")]
-    after: Annotated[Number, Field(description="the same once repaired and masked")]
+    before: Annotated[Number, Field(description="figure of the recording before repair, in `unit`")]
+    after: Annotated[Number, Field(description="figure after repair and mask")]
     unit: str
     certainty: str
 
 
 class ProblemSummary(Part):
-    """What was asked."""
+    """Problem that all estimators solve."""
 
     preset: str
     features: int
     diagnosed: bool
-    excluded: Annotated[dict[str, int], Field(description="reason -> observations that take no part")]
+    excluded: Annotated[dict[str, int], Field(description="reason -> masked observations")]
     pixel_sigma: float
     remarks: list[str]
-    findings: Annotated[list[FindingSummary], Field(description="what the diagnosis found to be wrong")]
-    repairs: Annotated[list[str], Field(description="what was repaired, and what was set by hand")]
+    findings: Annotated[list[FindingSummary], Field(description="faults that the diagnosis detected")]
+    repairs: Annotated[list[str], Field(description="repairs, user-specified ones included")]
 
 
 class ReferenceSummary(Part):
-    """What the divergence is measured from."""
+    """Reference of the divergence, and the trust in it."""
 
     name: str | None
     trust: Literal["trusted", "doubtful", "untrusted"]
-    reasons: Annotated[list[str], Field(description="what the trust rests on, worst first")]
+    reasons: Annotated[list[str], Field(description="reasons for the trust, worst first")]
 
 
 class HeldOutSummary(Part):
-    """The tracks that were taken out before diagnosis and estimators."""
+    """Tracks that neither diagnosis nor estimators used."""
 
     share: float
     seed: int
     tracks: int
     observations: int
-    pieces: Annotated[int, Field(description="of tracks that do not jump, where all estimators have poses")]
-    inliers: Annotated[int, Field(description="pieces that at least one path explains: the same for all")]
+    pieces: Annotated[int, Field(description="segments of tracks without outliers, where all estimators have poses")]
+    inliers: Annotated[int, Field(description="pieces that at least one path explains, the same for all")]
     gate_px: Annotated[float, Field(description="error below which a path explains a piece")]
-    judged: Annotated[int, Field(description="observations that the errors are over, the same for all")]
+    judged: Annotated[int, Field(description="observations of the errors, the same for all")]
 
 
 class Summary(Part):
-    """A run."""
+    """Summary of a run."""
 
     schema_: Annotated[Literal["fgbaseline/summary/1"], Field(alias="schema")] = SCHEMA
     sequence: SequenceSummary
@@ -103,7 +100,7 @@ class Summary(Part):
 
 
 def summarize(run: Run) -> Summary:
-    """Summary of a run; what is not a number is None, and its reason stands in `notes`."""
+    """Summary of a run; a figure that is not finite is None, with its reason in `notes`."""
     sequence, problem = run.problem.sequence, run.problem
     return Summary.model_validate(
         finite(

@@ -1,4 +1,4 @@
-"""Diagnosis of a recording on the terminal, as JSON, as a folder of evidence and as a file of repairs."""
+"""`fgbaseline diagnose`: findings on the terminal, as JSON, as a folder with figures and as a file of repairs."""
 
 import json
 from pathlib import Path
@@ -28,8 +28,9 @@ from fgbaseline.diagnosis import (
 from fgbaseline.geometry import InputError
 
 MARK = "diagnosis.json"
-"""the file by which a diagnosis's folder is known"""
-CLEAN, FINDINGS, CANNOT_TELL = 0, 1, 2
+"""the file that marks a diagnosis's folder"""
+CLEAN, FINDINGS, UNDECIDED = 0, 1, 2
+"""exit codes"""
 UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
@@ -42,7 +43,7 @@ def print_diagnosis(
     repairs: Path | None,
     force: bool,
 ) -> int:
-    """Diagnoses a recording, writes and prints the findings; gives the exit code."""
+    """Diagnoses a recording, writes and prints the findings, and returns the exit code."""
     if force and out is None and repairs is None:
         raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
     if out is not None:
@@ -70,11 +71,11 @@ def print_diagnosis(
     else:
         _print(diagnosis, findings)
         if out is not None:
-            click.echo(f"\nThe evidence is in {out}")
+            click.echo(f"\nThe diagnosis is in {out}")
         if repairs is not None:
             click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
     if diagnosis.cannot_tell:
-        return CANNOT_TELL
+        return UNDECIDED
     return FINDINGS if findings else CLEAN
 
 
@@ -117,13 +118,13 @@ def _require_writable(file: Path, *, force: bool) -> None:
     if file.exists() and not force:
         raise InputError(f"{file}: the file exists; choose another, or replace it with --force")
     if file.exists() and not file.is_file():
-        raise InputError(f"{file}: this is no file; give the name of one")
+        raise InputError(f"{file}: this is not a file; give the name of one")
     if not file.parent.is_dir():
-        raise InputError(f"{file}: there is no folder {file.parent}; make it, or choose another place")
+        raise InputError(f"{file}: there is no folder {file.parent}; create it, or choose another folder")
 
 
 def _text(report: dict[str, Any]) -> str:
-    """Text of the file, to the byte the same for the same diagnosis."""
+    """Text of diagnosis.json, byte for byte the same for the same diagnosis."""
     return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -134,11 +135,11 @@ def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
         f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
     )
     if diagnosis.cannot_tell:
-        click.echo(f"Nothing can be found out about its velocities: {diagnosis.cannot_tell}.")
+        click.echo(f"The velocities cannot be diagnosed: {diagnosis.cannot_tell}.")
     if findings:
         _print_findings(findings)
     elif not diagnosis.cannot_tell:
-        click.echo("Nothing wrong was found.")
+        click.echo("No fault detected.")
     unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
     if unknown:
         click.echo("\nNot identifiable in this recording:")
@@ -149,44 +150,32 @@ def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
 
 
 def _noise(diagnosis: Diagnosis) -> str:
-    """Sentence on the noise."""
+    """Sentences on the estimated noise and its inflation."""
     fit = diagnosis.fit
     assert fit is not None
-    sigma = fit.sigmas
-    sentence = (
-        f"Noise (one sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity held "
-        f"over an interval, {sigma.pixel:.2f} px of a pixel row ({fit.white.pixel:.2f} px from frame to frame"
+    sigma, white = fit.sigmas, fit.white
+    text = (
+        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity over "
+        f"its interval, {sigma.pixel:.2f} px of a pixel row."
     )
     if fit.inflation.pixel > 1.0:
-        sentence += f", {fit.inflation.pixel:.1f} times that because the errors of tracks last"
-    if fit.inflation.velocity > 1.0:
-        sentence += (
-            f"; velocities {fit.inflation.velocity:.1f} times what single intervals show, because their errors last"
+        text += (
+            f" Pixel sigma: {white.pixel:.2f} px from frame to frame, inflated by {fit.inflation.pixel:.1f} for "
+            "time-correlated errors."
         )
-    return sentence + ")."
+    if fit.inflation.velocity > 1.0:
+        text += f" Velocity sigma: inflated by {fit.inflation.velocity:.1f} for time-correlated errors."
+    return text
 
 
 def _print_findings(findings: tuple[Finding, ...]) -> None:
-    from fgbaseline.reports.tables import Cell, Column, Row, Table, print_table
+    from ..formatting import NO_BREAK, quantity
+    from ..tables import Cell, Column, Row, Table, print_table
 
-    rows = tuple(
-        Row(
-            f.code,
-            (
-                Cell(f.sentence if f.certainty == "counted" else f"{f.sentence} ({f.certainty})"),
-                Cell(_number(f.before, f.unit)),
-                Cell(_number(f.after, f.unit)),
-            ),
-        )
-        for f in findings
-    )
-    columns = (Column("what was found", words=True), Column("before"), Column("after"))
-    print_table(Table(columns, rows, name="finding"), width=UNWRAPPED, spaced=True)
+    def row(finding: Finding) -> Row:
+        certainty = "" if finding.certainty == "counted" else f" ({finding.certainty})"
+        figures = (quantity(x, finding.unit).replace(NO_BREAK, " ") for x in (finding.before, finding.after))
+        return Row(finding.code, tuple(map(Cell, (f"{finding.sentence}{certainty}", *figures))))
 
-
-def _number(value: float, unit: str) -> str:
-    if unit.startswith("share"):
-        return f"{value:.1%}"
-    if unit in ("m/s", "rad/s"):
-        return f"{value:.3g} {unit}"
-    return f"{value:,.4g}" if abs(value) < 1e4 else f"{value:,.0f}"
+    columns = (Column("description", words=True), Column("before"), Column("after"))
+    print_table(Table(columns, tuple(map(row, findings)), name="finding"), width=UNWRAPPED, spaced=True)

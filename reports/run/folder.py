@@ -1,4 +1,4 @@
-"""Folder of a run: summary, tables, trajectories, series, figures and the page."""
+"""Folder of a run: summary, tables, trajectories, landmarks, series, figures and page."""
 
 import csv
 import json
@@ -23,11 +23,11 @@ TRUTH_FILE = "truth.tum"
 
 
 def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
-    """Writes all files of a run into an existing, empty folder; gives the summary.
+    """Writes all files of a run into an existing, empty folder; returns the summary.
 
-    `processes` share the drawing of the figures. A caller that is one of several processes at work leaves it at one.
+    `processes` draw the figures in parallel; a caller that is itself one of several processes leaves it at one.
     """
-    with figures.being_drawn(run, processes) as finished:
+    with figures.drawn_in_background(run, processes) as finished:
         summary = write_numbers(run, folder)
         drawn = finished()
     (folder / "figures").mkdir()
@@ -37,7 +37,7 @@ def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
 
 
 def write_numbers(run: Run, folder: Path) -> Summary:
-    """Writes all files but figures and page; gives the summary."""
+    """Writes all files except figures and page; returns the summary."""
     summary = summarize(run)
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
@@ -57,7 +57,7 @@ def write_numbers(run: Run, folder: Path) -> Summary:
 
 
 def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with its floats as text, empty for NaN: faster than the formatting of pandas."""
+    """The table with floats as text of nine digits, empty for NaN; faster than the formatting of pandas."""
     text = {
         str(name): [f"{value:.9g}" if value == value else "" for value in column.tolist()]
         for name, column in table.items()
@@ -66,18 +66,18 @@ def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**text)
 
 
-def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.Written]) -> None:
-    """`report.html`, with the figures that were drawn."""
+def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.EncodedFigure]) -> None:
+    """Writes `report.html` with the given figures."""
     (folder / "report.html").write_text(render(run, as_dict(summary), drawn), encoding="utf-8")
 
 
 def as_dict(summary: Summary) -> dict[str, Any]:
-    """The summary as `summary.json` has it."""
+    """The content of `summary.json`."""
     return summary.model_dump(mode="json", by_alias=True)
 
 
 def _write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
-    """id,x,y,z,n_used of every landmark of an estimate, m, in the world frame."""
+    """Writes id,x,y,z,n_used of every landmark of an estimate, m, in the world frame."""
     landmarks = estimate.landmarks
     used = run.problem.sequence.observations.landmark[estimate.used]
     n_used = np.bincount(used, minlength=run.problem.sequence.n_landmarks)[landmarks.index]
@@ -119,9 +119,9 @@ def _consistency(result: Result) -> pd.DataFrame:
 
 
 def _write_tables(run: Run, folder: Path) -> None:
-    """reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv, into an existing folder.
+    """Writes reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv.
 
-    The first column names the estimator; empty tables are not written.
+    The first column has the estimator; empty tables are not written.
     """
     of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
         "reprojection_classes": lambda r: r.evidence.patterns,

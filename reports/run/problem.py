@@ -1,4 +1,4 @@
-"""From the settings of a user to the posed problem of a recording, its solution and the compared run."""
+"""Settings of a run, the problem they make of a recording, and its solution by all estimators."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.solving import Watch, solve_all, no_progress
+from fgbaseline.data.solving import Watch, no_progress, solve_all
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
 
 
-FEW_TRUE = 0.5
-"""share of frames with truth, below which a run prints that first"""
+MIN_TRUTH_SHARE = 0.5
+"""smallest share of frames with ground truth that is not remarked on"""
 MARK = "summary.json"
-"""the file by which a run's folder is known"""
+"""the file that marks a run's folder"""
 
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """Wishes of the user."""
+    """Settings of the user."""
 
     sequence: Path | None = None
     """None for the simulated drive"""
@@ -49,9 +49,9 @@ class RunSettings:
     truth_frame: BodyFrame | None = None
     seed: int = 0
     as_recorded: bool = False
-    """take the recording as it is: no diagnosis, no repairs, assumed noise"""
+    """no diagnosis, no repairs, assumed noise"""
     time_unit: TimeUnit | None = None
-    """of the recording's stamps; None to find it out"""
+    """of the recording's stamps; None to detect it"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
     imu: Path | None = None
@@ -59,7 +59,7 @@ class RunSettings:
     imu_calibration: Path | None = None
     """YAML of their noise"""
     repairs: Path | None = None
-    """TOML file of what is set by hand in place of what the diagnosis finds"""
+    """TOML file of user-specified repairs"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
@@ -95,23 +95,21 @@ def check_estimators(names: tuple[str, ...]) -> None:
         if names.count(name) > 1:
             raise InputError(f"estimators: '{name}' is named twice; name it once")
         if "/" in name or "\\" in name or name.startswith("."):
-            raise InputError(f"estimators: '{name}' can be no file's name; register it under another")
+            raise InputError(f"estimators: '{name}' cannot be a file name; register the estimator under another")
 
 
-def load_estimators(names: tuple[str, ...]) -> None:
-    """Imports them beforehand; one that cannot be imported says so when its turn comes."""
+def import_estimators(names: tuple[str, ...]) -> None:
+    """Imports the estimators; one that cannot be imported fails later, with its reason."""
     for name in names:
         with suppress(Exception):
             find_estimator(name)
 
 
 def read_sequence(settings: RunSettings) -> Sequence:
-    """The recording, with its truth; raises InputError."""
+    """Reads or simulates the recording with its ground truth. Raises InputError."""
     if settings.sequence is None:
         if settings.time_unit is not None:
-            raise InputError(
-                "time-unit: the simulated drive has its stamps in seconds; give a SEQUENCE with --time-unit"
-            )
+            raise InputError("time-unit: the simulated drive has stamps in seconds; give a SEQUENCE with --time-unit")
         if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
         if settings.imu is not None or settings.imu_calibration is not None:
@@ -121,7 +119,7 @@ def read_sequence(settings: RunSettings) -> Sequence:
         return simulate(Simulation(seed=settings.seed))
     if settings.truth is not None and settings.truth_frame is None:
         raise InputError(
-            f"truth: {settings.truth} may have the poses of either body; add --truth-frame camera or --truth-frame imu"
+            f"truth: the body of the poses in {settings.truth} is unknown; add --truth-frame camera or imu"
         )
     if settings.truth is None and settings.truth_frame is not None:
         raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
@@ -135,16 +133,16 @@ def read_sequence(settings: RunSettings) -> Sequence:
     )
 
 
-def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
-    """The recording that diagnosis and estimators see, and the tracks held out; raises InputError."""
+def hold_out_tracks(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
+    """Splits a recording into what diagnosis and estimators use, and the held-out tracks. Raises InputError."""
     return hold_out(sequence, settings.held_out, settings.seed) if settings.held_out != 0.0 else (sequence, None)
 
 
-def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) -> Problem:
-    """The problem that the preset makes of a recording, `processes` sharing its diagnosis; raises InputError."""
+def build_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) -> Problem:
+    """Builds the problem of a preset, with `processes` for its diagnosis. Raises InputError."""
     if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
         why = "--as-recorded" if settings.as_recorded else "the documented preset"
-        raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
+        raise InputError(f"repairs: {why} uses no repairs; leave out one of the two")
     if len(sequence.observations) and (reason := unusable(sequence)):
         raise InputError(f"{sequence.source}: features: {reason}")
     if sequence.imu is None and (settings.as_recorded or settings.preset == "documented"):
@@ -155,29 +153,29 @@ def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) 
         if settings.features is None:
             features = DEFAULT_FEATURES
         return documented(sequence, features, settings.landmarks)
-    taken = Calibration() if settings.as_recorded else None
-    return calibrated(sequence, features, settings=taken, repairs=repairs, processes=processes)
+    assumed = Calibration() if settings.as_recorded else None
+    return calibrated(sequence, features, settings=assumed, repairs=repairs, processes=processes)
 
 
-def to_print_first(problem: Problem) -> list[str]:
-    """Sentences that a run prints first: faults of the file itself, and a truth of few frames."""
+def preliminary_remarks(problem: Problem) -> list[str]:
+    """Sentences that a run prints first: faults of the file, and ground truth for few frames."""
     sentences = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
     truth = problem.sequence.truth
-    if truth is not None and truth.known.mean() < FEW_TRUE:
+    if truth is not None and truth.known.mean() < MIN_TRUTH_SHARE:
         sentences += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]
     return sentences
 
 
 def _require_units(sequence: Sequence) -> None:
-    """Raises InputError for a recording in other units than SI where nothing is to be repaired."""
+    """Raises InputError for a recording in units other than SI, for a preset without repairs."""
     units = known_units(sequence)
     if units.doubt:
         raise InputError(f"{sequence.source}: {units.doubt}")
     wrong = [finding.sentence.rstrip(".").split("; multiplied")[0] for finding in unit_findings(units, sequence)]
     if wrong:
         raise InputError(
-            f"{sequence.source}: {'. '.join(wrong)} ({evidence(units)}). Taken as recorded, this is another motion; "
-            "convert the file, or run it with --preset calibrated and without --as-recorded, which repairs it"
+            f"{sequence.source}: {'. '.join(wrong)} ({evidence(units)}). Without repairs this is a different motion; "
+            "convert the file, or repair it with --preset calibrated and without --as-recorded"
         )
 
 
@@ -188,7 +186,7 @@ def solve(
     held: HeldOut | None = None,
     processes: int = 1,
 ) -> "Run":
-    """All estimators on the problem, one after another, and their comparison, which `processes` share."""
+    """Solves the problem with each estimator in turn, and compares the estimates with `processes`."""
     from fgbaseline.compare.estimate_comparison import compare_all
 
     answers = solve_all(problem, settings.estimators, watch)

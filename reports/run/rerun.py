@@ -1,4 +1,4 @@
-"""A run as a recording for the viewer Rerun: for people who live in it. Needs the extra `rerun`."""
+"""Recording of a run for the viewer Rerun; needs the extra `rerun`."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -14,30 +14,30 @@ from fgbaseline.reports.figures.style import TRUTH, colors, on_dark
 
 
 def require_rerun(file: Path) -> None:
-    """Raises InputError where the viewer's package is not installed, or the file cannot be written."""
+    """Raises InputError where the package rerun is not installed, or the file cannot be written."""
     if find_spec("rerun") is None:
-        raise InputError(f"rerun: {file} needs the viewer's package; install it with pip install 'fgbaseline[rerun]'")
+        raise InputError(f"rerun: {file} needs the package rerun; install it with pip install 'fgbaseline[rerun]'")
     if file.is_dir() or not file.absolute().parent.is_dir():
-        raise InputError(f"rerun: {file} is no file in an existing folder; choose another place")
+        raise InputError(f"rerun: {file} is not a file in an existing folder; choose another")
 
 
 def write_rerun(run: Run, file: Path) -> None:
-    """Writes `file`, all or nothing: paths, cameras, landmarks, errors by frame and the left image's matches."""
+    """Writes `file` atomically: paths, cameras, landmarks, errors by frame, and observations in the left image."""
     require_rerun(file)
     rr: Any = import_module("rerun")
     recording = rr.RecordingStream("fgbaseline", recording_id=run.problem.sequence.name, send_properties=False)
-    beside = file.with_name(f".{file.name}.partial")
+    partial = file.with_name(f".{file.name}.partial")
     try:
-        recording.save(beside)
+        recording.save(partial)
         _world(rr, recording, run)
         for result in run.answered:
             _estimator(rr, recording, run, result)
-        _matches(rr, recording, run)
+        _observations(rr, recording, run)
         recording.flush()
         recording.disconnect()
-        beside.replace(file)
+        partial.replace(file)
     finally:
-        beside.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
 
 
 def _world(rr: Any, recording: Any, run: Run) -> None:
@@ -52,14 +52,14 @@ def _world(rr: Any, recording: Any, run: Run) -> None:
 
 
 def _estimator(rr: Any, recording: Any, run: Run, result: Result) -> None:
-    """The whole path and map at once; camera, errors and reprojection frame by frame."""
+    """Logs path and map once; camera, errors, NEES and NIS per frame."""
     estimate, name = result.estimate, _safe(result.name)
-    colour = rgb(on_dark(colors(run.results, run.reference)[result.name]))
+    color = rgb(on_dark(colors(run.results, run.reference)[result.name]))
     poses = estimate.world_T_imu
     known = np.flatnonzero(np.isfinite(poses).all(axis=(1, 2)))
-    recording.log(f"world/{name}/path", _strip(rr, poses[known, :3, 3], colour), static=True)
+    recording.log(f"world/{name}/path", _strip(rr, poses[known, :3, 3], color), static=True)
     if len(estimate.landmarks):
-        points = rr.Points3D(estimate.landmarks.position, radii=0.1, colors=colour)
+        points = rr.Points3D(estimate.landmarks.position, radii=0.1, colors=color)
         recording.log(f"world/{name}/landmarks", points, static=True)
     camera, image = run.problem.sequence.camera, run.problem.sequence.observations.pixel
     reach = image.max(axis=0) if len(image) else np.array([2 * camera.cu, 2 * camera.cv, 0.0, 0.0])
@@ -78,7 +78,7 @@ def _estimator(rr: Any, recording: Any, run: Run, result: Result) -> None:
         there = np.flatnonzero(np.isfinite(values))
         if len(there):
             path = f"series/{what}/{name}"
-            recording.log(path, rr.SeriesLines(colors=colour, names=result.name), static=True)
+            recording.log(path, rr.SeriesLines(colors=color, names=result.name), static=True)
             recording.send_columns(path, _times(rr, run, there), rr.Scalars.columns(scalars=values[there]))
 
 
@@ -93,10 +93,10 @@ def _series(result: Result) -> dict[str, FloatArray]:
     return series
 
 
-def _matches(rr: Any, recording: Any, run: Run) -> None:
-    """What was measured in the left image, in two groups: in the problem, and excluded from it."""
+def _observations(rr: Any, recording: Any, run: Run) -> None:
+    """Logs the observations in the left image: those in the problem, and those that the mask excluded."""
     observations, T = run.problem.sequence.observations, run.problem.n_frames
-    for name, chosen, colour in (
+    for name, chosen, color in (
         ("in_the_problem", run.problem.mask, "#56B4E9"),
         ("excluded", ~run.problem.mask, "#D55E00"),
     ):
@@ -104,13 +104,13 @@ def _matches(rr: Any, recording: Any, run: Run) -> None:
         if counts.any():
             columns = rr.Points2D.columns(positions=observations.pixel[chosen][:, :2]).partition(counts)
             path = f"left_image/{name}"
-            recording.log(path, rr.Points2D.from_fields(colors=rgb(colour), radii=2.0), static=True)
+            recording.log(path, rr.Points2D.from_fields(colors=rgb(color), radii=2.0), static=True)
             recording.send_columns(path, _times(rr, run, np.arange(T)), columns)
 
 
-def rgb(colour: str) -> tuple[int, ...]:
+def rgb(color: str) -> tuple[int, ...]:
     """Red, green and blue, 0 to 255, of `#RRGGBB`."""
-    return tuple(bytes.fromhex(colour[1:]))
+    return tuple(bytes.fromhex(color[1:]))
 
 
 def _times(rr: Any, run: Run, frames: Any) -> list[Any]:
@@ -118,8 +118,8 @@ def _times(rr: Any, run: Run, frames: Any) -> list[Any]:
     return [rr.TimeColumn("frame", sequence=frames), rr.TimeColumn("time", duration=t[frames] - t[0])]
 
 
-def _strip(rr: Any, points: FloatArray, colour: tuple[int, ...]) -> Any:
-    return rr.LineStrips3D([points], radii=0.15, colors=colour)
+def _strip(rr: Any, points: FloatArray, color: tuple[int, ...]) -> Any:
+    return rr.LineStrips3D([points], radii=0.15, colors=color)
 
 
 def _known(truth: Truth) -> FloatArray:
@@ -127,5 +127,5 @@ def _known(truth: Truth) -> FloatArray:
 
 
 def _safe(name: str) -> str:
-    """A name as one part of an entity's path."""
+    """The name as one part of an entity path."""
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)

@@ -9,20 +9,18 @@ import pandas as pd
 from fgbaseline.compare.limits import Better
 
 from ..formatting import counted, interval, number
-from ..results.bench import Results
-from .bench_statistics import METRICS, cases, consistency, costs, overall, rankings, records
-from .table import Cell, Column, Row, Table, Value, compared
+from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
+from ..results.metrics import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value, shown_in
+from .table import Cell, Column, Row, Table, compared
 
 Key: TypeAlias = tuple[str, str]
 """case and estimator"""
 Rows: TypeAlias = Mapping[Key, Mapping[str, Any]]
-WITH_INTERVAL = ("ate", "held_out", "divergence")
-IN_FILES_ALONE = ("nees", "nees_reference")
-"""metrics that only the files have: the page has the ANEES"""
-ANEES = {"too sure": " ↑", "too cautious": " ↓"}
+WITH_INTERVAL = (ATE, HELD_OUT, DIVERGENCE)
+ANEES = {"overconfident": " ↑", "conservative": " ↓"}
 COSTS = {
-    "seconds": Column("time", unit="s", better=Better.LOWER),
-    "memory_mb": Column("peak memory", unit="MB"),
+    "seconds": (Column("time", unit="s"), Better.LOWER),
+    "memory_mb": (Column("peak memory", unit="MB"), Better.NEITHER),
 }
 
 
@@ -45,41 +43,40 @@ def main_table(results: Results, *, with_costs: bool, caption: str = "") -> Tabl
 
 def _metrics(table: Rows) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     known = next(iter(table.values()))
-    for metric in METRICS:
-        if metric.name not in known or metric.name in IN_FILES_ALONE:
+    for metric in shown_in(BENCH):
+        if metric.name not in known:
             continue
-        sides = [f"{metric.name}{side}" for side in ("_low", "_high")] if metric.name in WITH_INTERVAL else []
-        values = {
-            key: Value(row[metric.name], *(row.get(side, np.nan) for side in sides)) for key, row in table.items()
-        }
-        yield metric, _cells(metric, values, above_zero=metric.name == "divergence")
+        sides = [f"{metric.name}{side}" for side in ("_low", "_high")] if metric.group in WITH_INTERVAL else []
+        names = [metric.name, *sides]
+        values = {key: Value(*(metric.scale * row.get(name, np.nan) for name in names)) for key, row in table.items()}
+        yield Column.flat(metric), _cells(metric.better, values, above_zero=metric.group == DIVERGENCE)
 
 
 def _anees(results: Results) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     judged = _by_key(consistency(results))
     if judged:
         yield (
-            Column("ANEES"),
+            Column("ANEES", term=NEES),
             {key: Cell(number(row["anees"]) + ANEES.get(row["verdict"], "")) for key, row in judged.items()},
         )
 
 
 def _costs(results: Results) -> Iterator[tuple[Column, dict[Key, Cell]]]:
     spent = _by_key(costs(results))
-    for name, column in COSTS.items():
+    for name, (column, better) in COSTS.items():
         values = {key: Value(float(row[name])) for key, row in spent.items()}
         if any(values.values()):
-            yield column, _cells(column, values)
+            yield column, _cells(better, values)
 
 
-def _cells(column: Column, values: Mapping[Key, Value], *, above_zero: bool = False) -> dict[Key, Cell]:
+def _cells(better: Better, values: Mapping[Key, Value], *, above_zero: bool = False) -> dict[Key, Cell]:
     """The cells, the best of each case marked unless all are alike; with `above_zero` the reference is no rival."""
     cells: dict[Key, Cell] = {}
     for case in dict.fromkeys(case for case, _ in values):
         own = {name: value for (other, name), value in values.items() if other == case}
         rivals = [name for name, value in own.items() if value and (value.value > 0.0 or not above_zero)]
         alike = len({own[name].value for name in rivals}) < 2
-        cells |= {(case, name): cell for name, cell in compared(column, own, () if alike else rivals).items()}
+        cells |= {(case, name): cell for name, cell in compared(better, own, () if alike else rivals).items()}
     return cells
 
 
@@ -91,8 +88,8 @@ def ranking_tables(results: Results) -> Iterator[Table]:
             Column("rank"),
             Column("estimator", words=True),
             Column("runs"),
-            Column(metric.heading),
-            Column("behind the first"),
+            Column.flat(metric),
+            Column("above the first"),
             Column("", words=True),
         )
         rows = tuple(_ranked(row) for row in ranked if row["metric"] == metric.name)
@@ -123,7 +120,7 @@ def _ranked(row: Mapping[str, Any]) -> Row:
         str(row["runs"]),
         interval(row["mean"], row["low"], row["high"]),
         "" if first else interval(row["behind"], row["behind_low"], row["behind_high"]),
-        "cannot be told from it" if row["tied"] and not first else "",
+        "not separated from it" if row["tied"] and not first else "",
     )
 
 
@@ -138,12 +135,12 @@ def runs_table(results: Results, pages: str) -> Table:
             rows.append(_row(one.name, "", "", failure))
             continue
         failed = records(frame[frame["status"] == "failed"])
-        size = f"{counted(int(first['frames']), 'frame')}, {counted(int(first['observations']), 'match', 'matches')}"
+        size = f"{counted(int(first['frames']), 'frame')}, {counted(int(first['observations']), 'observation')}"
         reasons = "; ".join(f"{row['estimator']} failed: {row['reason']}" for row in failed)
         link = "" if one.job.page == "none" else f"{pages}/{one.job.key}/report.html"
         rows.append(_row(one.name, size, f"{first['reference']} {first['trust']}", reasons, link=link))
-    columns = (Column("size"), Column("reference", words=True), Column("what went wrong", words=True))
-    return Table(columns, tuple(rows), name="run", title=f"{len(rows)} {'run' if len(rows) == 1 else 'runs'}")
+    columns = (Column("size"), Column("reference", words=True), Column("failures", words=True))
+    return Table(columns, tuple(rows), name="run", title=counted(len(rows), "run"))
 
 
 def _row(name: str, *texts: str, link: str = "") -> Row:

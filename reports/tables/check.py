@@ -6,6 +6,7 @@ from fgbaseline.compare.limits import Outcome
 
 from ..phrases.check import bound, change, number
 from ..results.check import Checked, Line
+from ..results.metrics import METRICS
 from .table import Cell, Column, Row, Table
 
 COLUMNS = (
@@ -17,6 +18,7 @@ COLUMNS = (
     Column("baseline"),
     Column("change"),
 )
+UNITS = {metric.key: metric.unit for metric in METRICS if metric.scale == 1.0 and "°" not in metric.unit}
 _METERS = ("ate", "ate_unaligned", "divergence")
 _PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
 _NO_UNIT = ("behind_camera", "n", "under_3px", "rank", "block", "sse")
@@ -52,6 +54,8 @@ def cells(line: Line) -> dict[str, str]:
 
 def unit_of(metric: str) -> str:
     """The unit of a metric of summary.json or comparison.json; empty for counts, shares and what is not known."""
+    if metric in UNITS:
+        return UNITS[metric]
     parts = metric.split(".")
     if parts[-1] in _NO_UNIT:
         return ""
@@ -59,6 +63,6 @@ def unit_of(metric: str) -> str:
         return "deg"
     if parts[0] in _PIXELS:
         return "px"
-    if parts[0] in _METERS or "translation" in parts or metric in ("map.median", "map.median_seen", "final_m"):
+    if parts[0] in _METERS or "translation" in parts or metric == "final_m":
         return "m"
-    return {"seconds": "s", "frames_per_second": "frames/s"}.get(metric, "")
+    return ""

@@ -11,39 +11,38 @@ from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..results.comparison import Summary
-from .table import Column, Row, Table, Value, compared
-
-LOWER = Better.LOWER
+from ..results.metrics import COMPARISON, SEGMENTS, Metric, Value, over_deltas, shown_in, value_at
+from .table import Column, Row, Table, compared
 
 
 def comparison_table(comparison: Comparison, summary: Summary, *, mark_reference: bool = False) -> Table:
     """A row for each figure, a column for each trajectory: the reference is one of them where it has a figure."""
     results, reference = summary.by_name, comparison.reference.name
-    columns = _columns(comparison, results)
+    metrics = _metrics(comparison, results)
     rivals = [name for name, result in comparison.results.items() if not result.entry.by_product]
     names = list(comparison.results)
-    if any(column.value(results[reference]) for column in columns):
+    if any(m.value(results[reference]) for m in metrics):
         names.insert(0, reference)
     cells = []
-    for column in columns:
-        ranked = column if column.same_data or comparison.ranking.same else replace(column, better=Better.NEITHER)
-        cells.append(compared(ranked, {name: column.value(results[name]) for name in names}, rivals))
+    for m in metrics:
+        better = m.better if m.same_data or comparison.ranking.same else Better.NEITHER
+        cells.append(compared(better, {name: m.value(results[name]) for name in names}, rivals))
     rows = tuple(
         Row(name, tuple(of[name] for of in cells), reference=mark_reference and name == reference) for name in names
     )
-    return Table(columns, rows, caption=summary.caption).transposed()
+    return Table(tuple(map(Column.of, metrics)), rows, caption=summary.caption).transposed()
 
 
 def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
     """One row per estimate: the figures, and behind each that has an interval its `low` and `high`."""
     results = summary.by_name
     table: dict[str, list[float]] = {}
-    for column in _columns(comparison, results):
-        values = [column.value(results[name]) for name in comparison.results]
-        table[column.full_title] = [value.value for value in values]
+    for m in _metrics(comparison, results):
+        values = [m.value(results[name]) for name in comparison.results]
+        table[m.full_title] = [value.value for value in values]
         if any(np.isfinite(value.low) for value in values):
-            table[f"{column.full_title}, low"] = [value.low for value in values]
-            table[f"{column.full_title}, high"] = [value.high for value in values]
+            table[f"{m.full_title}, low"] = [value.low for value in values]
+            table[f"{m.full_title}, high"] = [value.high for value in values]
     return pd.DataFrame(table, index=pd.Index(comparison.results, name="estimate"))
 
 
@@ -54,41 +53,15 @@ def metrics_table(summary: Summary) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["estimate", "metric", *Value._fields])
 
 
-def _columns(comparison: Comparison, results: Mapping[str, Any]) -> tuple[Column, ...]:
-    """Columns for which some trajectory has a figure."""
+def _metrics(comparison: Comparison, results: Mapping[str, Any]) -> list[Metric]:
+    """Metrics of which some trajectory has a figure."""
     found = [result.segments for result in comparison.results.values() if result.segments is not None]
-    segments = "KITTI segments" if all(s.official for s in found) else "segments (KITTI's way, lengths fitted)"
-    absolute, reprojection, landmarks = "absolute error", "reprojection, median px", "map, median distance of landmarks"
-    every = (
-        Column("share of the reference's time", "coverage", path=("coverage",)),
-        Column("RMSE", absolute, "m", ("translation", "rmse"), LOWER),
-        Column("RMSE over common moments", absolute, "m", ("common", "rmse"), LOWER, same_data=True),
-        Column("RMSE above the nearest's", absolute, "m", ("behind",)),
-        Column("largest", absolute, "m", ("translation", "max"), LOWER),
-        Column("rotation RMSE", absolute, "°", ("rotation_deg", "rmse"), LOWER),
-        *(
-            Column(title, f"error of motion over {delta}", unit, ("relative", delta, key, "rmse"), LOWER)
-            for delta in comparison.deltas
-            for title, unit, key in (("RMSE", "m", "translation"), ("rotation RMSE", "°", "rotation_deg"))
-        ),
-        Column("NEES, mean (6 expected)", "consistency", path=("nees", "mean")),
-        Column("%", "drift", path=("drift", "translation"), better=LOWER),
-        Column("°/m", "drift", path=("drift", "rotation"), better=LOWER),
-        Column("%", segments, path=("segments", "intervals", "translation_percent"), better=LOWER),
-        Column("°/m", segments, path=("segments", "intervals", "rotation_deg_per_m"), better=LOWER),
-        Column("its landmarks", reprojection, path=("reprojection", "median"), better=LOWER),
-        Column("of common", reprojection, path=("reprojection_common", "median"), better=LOWER, same_data=True),
-        Column("triangulated", reprojection, path=("reprojection_along", "median"), better=LOWER),
-        Column("in the world", landmarks, "m", ("map", "median"), LOWER),
-        Column("as seen", landmarks, "m", ("map", "median_seen"), LOWER),
-        Column("median", "held-out tracks", "px", ("held_out", "median"), LOWER, same_data=True),
-    )
-    return tuple(
-        column
-        for column in every
-        if any(column.value(of) for of in results.values())
-        and not (column.path[0] == "common" and comparison.ranking.same)
-    )
+    fitted = "" if all(s.official for s in found) else f"{SEGMENTS} (lengths fitted to the path)"
+    return [
+        replace(m, group=fitted, term=SEGMENTS) if fitted and m.group == SEGMENTS else m
+        for m in over_deltas(shown_in(COMPARISON), comparison.deltas)
+        if any(m.value(of) for of in results.values()) and not (m.path[0] == "common" and comparison.ranking.same)
+    ]
 
 
 def _figures(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Value]]:
@@ -98,4 +71,4 @@ def _figures(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Va
         if isinstance(inner, Mapping) and not {*Value._fields} <= inner.keys():
             yield from _figures(inner, path)
         elif isinstance(inner, Mapping | int | float) and not isinstance(inner, bool):
-            yield path, Column(key, path=(key,)).value(tree)
+            yield path, value_at(tree, key)

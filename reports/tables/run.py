@@ -1,6 +1,8 @@
-"""Tables of a run: main figures and evidence of every estimator on the page, on the terminal and in metrics.csv."""
+"""Tables of a run: main figures, evidence, details that the page folds away, the terminal's, and metrics.csv."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -8,85 +10,30 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.compare.estimate_comparison import Run, same_frames
-from fgbaseline.compare.limits import Better
+from fgbaseline.data import Estimate
+from fgbaseline.data.finding import Finding
 
-from ..formatting import DASH, INFINITY, counted, number
+from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
+from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
 from ..results.run import Summary
-from ..results.tree import INFINITE, at, leaves
+from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
 
-LOWER, HIGHER = Better.LOWER, Better.HIGHER
-PERCENT = 100.0
-COVERAGE, TRUTH, REFERENCE, REPROJECTION, COST = (
-    "coverage",
-    "error to truth",
-    "divergence",
-    "reprojection error",
-    "cost",
-)
-NO_TRUTH = "no frame has both a pose and truth"
-NO_LANDMARK = "no observed landmark was estimated"
-NBSP = "\N{NO-BREAK SPACE}"
-COLUMNS = (
-    Column("of the time", COVERAGE, "%", ("coverage",), scale=PERCENT),
-    Column("RMSE", TRUTH, "m", ("ate", "rmse"), LOWER, absent=NO_TRUTH),
-    Column("RMSE over common frames", TRUTH, "m", ("ate_common", "rmse"), LOWER, same_data=True),
-    Column("largest", TRUTH, "m", ("ate", "max"), LOWER, absent=NO_TRUTH),
-    Column("NEES, median", TRUTH, "", ("nees", "median"), absent="no positive definite covariance"),
-    Column("RMSE", REFERENCE, "m", ("divergence", "rmse"), LOWER),
-    Column("RMSE over common frames", REFERENCE, "m", ("divergence_common", "rmse"), LOWER, same_data=True),
-    Column("largest", REFERENCE, "m", ("divergence", "max"), LOWER),
-    Column("final", REFERENCE, "m", ("divergence", "final"), LOWER),
-    Column("rotation RMSE", REFERENCE, "°", ("divergence", "rotation_rmse_deg"), LOWER),
-    Column("median", REPROJECTION, "px", ("reprojection", "median"), LOWER, absent=NO_LANDMARK),
-    Column(f"95{NBSP}%", REPROJECTION, "px", ("reprojection", "p95"), LOWER, absent=NO_LANDMARK),
-    Column(f"under 3{NBSP}px", REPROJECTION, "%", ("reprojection", "under_3px"), HIGHER, PERCENT, absent=NO_LANDMARK),
-    Column(
-        "median of common",
-        REPROJECTION,
-        "px",
-        ("reprojection_common", "median"),
-        LOWER,
-        absent="no observation was used by every estimator",
-        same_data=True,
-    ),
-    Column("matches used", COST, "%", ("observations", "share"), scale=PERCENT, absent="there are no observations"),
-    Column("time", COST, "s", ("seconds",), LOWER, absent="not measured", same_data=True),
-    Column("frames per s", COST, "", ("frames_per_second",), HIGHER, absent="not measured", same_data=True),
-)
-UNEVEN_ONLY = ("coverage", "ate_common", "divergence_common")
-"""figures that stand in the table only where the estimators do not cover the same frames"""
-HELD_OUT, CONSISTENCY, RESIDUALS, MAP = "held-out tracks", "consistency", "tracks", "landmarks"
-NOT_COVARIANCES = Column("not positive definite", CONSISTENCY, "", ("covariance", "not_positive_definite"))
-"""shown only where there are any"""
-EVIDENCE_COLUMNS = (
-    Column("median", HELD_OUT, "px", ("held_out", "median"), LOWER, same_data=True),
-    Column("behind the best", HELD_OUT, "px", ("held_out", "behind")),
-    Column("by at least", HELD_OUT, "px", ("held_out", "behind_low")),
-    Column("NEES, mean", CONSISTENCY, "", ("nees", "mean")),
-    Column("NEES of difference, median", CONSISTENCY, "", ("nees_reference", "median")),
-    Column("frames left out", CONSISTENCY, "", ("nees_reference", "left_out")),
-    Column("NIS per row", CONSISTENCY, "", ("nis", "per_degree")),
-    Column("position sigma over reference's", CONSISTENCY, "", ("sigma_ratio", "position")),
-    NOT_COVARIANCES,
-    Column("squared residuals over expected", RESIDUALS, "", ("whitened", "ratio")),
-    Column("points that moved", RESIDUALS, "%", ("moved_points", "share"), scale=PERCENT),
-    Column("median distance", MAP, "m", ("map", "median")),
-    Column("as seen", MAP, "m", ("map", "median_seen")),
-    Column("sigmas", MAP, "", ("map", "median_sigmas")),
-)
-EXPLAINED: Mapping[str, str] = {
-    HELD_OUT: "Held-out tracks were kept from diagnosis and estimators; each half is predicted from the other half "
-    "along each path. They judge motion over a second or two as these cameras see it, not drift. Where 'by at least' "
-    "is not above 0 the bootstrap does not separate the path from the best.",
-    CONSISTENCY: "Expected of a consistent estimator: 6 for NEES (5.35 in the median), 1 for NIS per row, sigmas above "
-    "the reference's. The NEES of the difference has P − P_ref as covariance, as filter and reference share their "
-    "data; frames where that is not positive definite are left out.",
-    RESIDUALS: "Squared residuals of a track over the noise assumed: 1 is expected. Points moved, or their tracks "
-    "slid, where a straight motion explains the residuals.",
-    MAP: "Landmarks are matched with the reference's by number; 'as seen' is in the frame of each one's own camera, "
-    "without drift; 1.54 sigmas are expected.",
+PIXEL_ROWS = ("uL", "vL", "uR", "vR")
+MAX_DYNAMIC = 100
+MAX_EVENTS = 200
+"""of an estimator that are listed one by one"""
+REASONS: Mapping[str, str] = {
+    "feature not chosen": "not among the features asked for",
+    "disparity": "disparity too small to determine the depth",
+    "rows": "rows in the left and right image disagree",
+    "prediction": "contradicts its own track under the motion",
+    "short": "rest of the track too short for a check",
+    "geometry": "point not determined, or behind a camera",
+    "moving": "point moved",
+    "copied": "copied from the previous frame",
 }
+"""why the mask excludes an observation"""
 Estimators = Mapping[str, Mapping[str, Any]]
 
 
@@ -95,115 +42,92 @@ def main_table(run: Run, estimators: Estimators) -> Table:
 
     What belongs to the reference's own run or graph is near to it by construction and is not called best.
     """
-    table = _table(run, estimators, COLUMNS)
+    table = _table(run, estimators, shown_in(MAIN))
     if not table.columns:
         return table
-    near = "; the reference, its by-products and other minima of its graph are not ranked by the distance from it"
+    near = "; the reference, its by-products and other minima of its graph are not ranked by divergence"
     caption = (
         f"Best of a column in bold{near if run.reference is not None else ''}; figures that read the same are best "
-        "together. Reprojection errors are norms of the four pixel differences over all observations of the landmarks "
-        'that an estimator has; "common" are the observations that every estimator used.'
+        "together. Reprojection errors are over all observations of the landmarks that an estimator has; common "
+        "observations are those that every estimator used."
     )
-    return Table(table.columns, table.rows, caption=caption, notes=table.notes)
+    return replace(table, caption=caption)
 
 
 def evidence_table(run: Run, estimators: Estimators) -> Table:
     """Held-out tracks, consistency, residuals and map of every estimator that gave an answer."""
-    any_bad = any(at(e, "covariance", "not_positive_definite") for e in estimators.values())
-    table = _table(run, estimators, [c for c in EVIDENCE_COLUMNS if c is not NOT_COVARIANCES or any_bad])
-    caption = " ".join(EXPLAINED[group] for group in dict.fromkeys(column.group for column in table.columns))
-    return Table(table.columns, tuple(r for r in table.rows if r.cells), caption=caption, notes=table.notes)
+    table = _table(run, estimators, shown_in(EVIDENCE))
+    return replace(table, rows=tuple(row for row in table.rows if row.cells))
 
 
 def terminal_table(estimators: Estimators, reference: str | None) -> Table:
     """The few figures of every estimator that a terminal has room for."""
-    columns = [
-        Column("seconds", path=("seconds",)),
-        Column("reprojection", unit="px", path=("reprojection", "median")),
-        Column("under 3 px", path=("reprojection", "under_3px")),
-        Column("from the reference", unit="m", path=("divergence", "rmse")),
-    ]
-    if any(at(e, "ate") is not None for e in estimators.values()):
-        columns.append(Column("ATE", unit="m", path=("ate", "rmse")))
-    if len({e["coverage"] for e in estimators.values()}) > 1:
-        columns.append(Column("coverage", path=("coverage",)))
+    metrics = [m for m in shown_in(TERMINAL) if m.path[0] != "ate" or any(at(e, "ate") for e in estimators.values())]
+    if len({e["coverage"] for e in estimators.values()}) == 1:
+        metrics = [metric for metric in metrics if not metric.uneven_only]
     rows = []
     for name, e in estimators.items():
-        texts = [e["status"]]
-        for column in columns:
-            value = column.value(e).value
-            is_reference = column.path[0] == "divergence" and name == reference
-            texts.append("reference" if is_reference else _short(column, value))
-        rows.append(Row(name, tuple(map(Cell, texts))))
-    return Table((Column("status", words=True), *columns), tuple(rows))
+        texts = [
+            "reference" if m.group == DIVERGENCE and name == reference else m.text(m.value(e).value) for m in metrics
+        ]
+        rows.append(Row(name, tuple(map(Cell, [e["status"], *texts]))))
+    return Table((Column("status", words=True), *map(Column.flat, metrics)), tuple(rows))
 
 
-def _short(column: Column, value: float) -> str:
-    if not isfinite(value):
-        return "-"
-    formats = {"seconds": ".1f", "under 3 px": ".0%", "coverage": ".1%"}
-    return format(value, formats.get(column.title, ".3g" if abs(value) < 1000 else ".0f"))
-
-
-def _table(run: Run, estimators: Estimators, chosen: Iterable[Column]) -> Table:
+def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table:
     answered = [name for name in run.results if name in estimators and run.results[name].answered]
     even = same_frames(np.isfinite(run.results[n].estimate.world_T_imu[:, 0, 0]) for n in answered)
-    values = {c: {name: c.value(estimators[name]).value for name in answered} for c in chosen}
-    columns = tuple(
-        c
-        for c, of_all in values.items()
-        if any(map(isfinite, of_all.values()))
-        and not (c.group == REFERENCE and len(answered) < 2)
-        and not (even and c.path[0] in UNEVEN_ONLY)
-    )
-    rivals = {c: _rivals(run, c, answered) if even or c.same_data else set[str]() for c in columns}
-    firsts = {c: best(c, {name: values[c][name] for name in rivals[c]}) for c in columns}
+    values = {m: {name: m.value(estimators[name]).value for name in answered} for m in metrics}
+    shown = [
+        m
+        for m, of_all in values.items()
+        if any(isfinite(value) and (value != 0.0 or not m.nonzero_only) for value in of_all.values())
+        and not (m.group == DIVERGENCE and len(answered) < 2)
+        and not (even and m.uneven_only)
+    ]
+    rivals = {m: _rivals(run, m, answered) if even or m.same_data else set[str]() for m in shown}
+    firsts = {m: best(m.better, {name: values[m][name] for name in rivals[m]}) for m in shown}
     notes: dict[str, str] = {}
 
-    def cell(name: str, c: Column, i: int) -> Cell:
-        if c.group == REFERENCE and name == run.reference:
-            return Cell("reference" if i == 0 or columns[i - 1].group != REFERENCE else "")
-        value, first = values[c][name], firsts[c]
-        why = _left_out(estimators[name], c) if isfinite(value) else _why_absent(estimators[name], c)
+    def cell(name: str, m: Metric, i: int) -> Cell:
+        if m.group == DIVERGENCE and name == run.reference:
+            return Cell("reference" if i == 0 or shown[i - 1].group != DIVERGENCE else "")
+        value, first = values[m][name], firsts[m]
+        why = _left_out(estimators[name], m) if isfinite(value) else _why_absent(estimators[name], m)
         if why == INFINITE:
             return Cell(INFINITY)
         mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
         if not isfinite(value):
             return Cell(DASH, note=mark)
-        return Cell(number(value), first is not None and number(value) == number(first), mark)
+        return Cell(m.text(value), first is not None and m.text(value) == m.text(first), mark)
 
     rows = tuple(
         Row(
             name,
-            tuple(cell(name, c, i) for i, c in enumerate(columns)) if name in answered else (),
+            tuple(cell(name, m, i) for i, m in enumerate(shown)) if name in answered else (),
             reason=result.estimate.reason,
             status=result.estimate.status.value,
             reference=name == run.reference,
         )
         for name, result in run.results.items()
     )
-    return Table(_named(columns, run.reference), rows, notes=tuple((mark, text) for text, mark in notes.items()))
+    columns = tuple(Column.of(m, f"divergence from {run.reference}" if m.group == DIVERGENCE else "") for m in shown)
+    return Table(columns, rows, notes=tuple((mark, text) for text, mark in notes.items()))
 
 
-def _named(columns: tuple[Column, ...], reference: str | None) -> tuple[Column, ...]:
-    """The columns with the reference's name in the title of their group."""
-    title = f"divergence from {reference}"
-    return tuple(Column(c.title, title if c.group == REFERENCE else c.group, c.unit, c.path) for c in columns)
+def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
+    return set(answered) - ({run.reference, *run.unranked} if metric.group in (DIVERGENCE, MAP) else set())
 
 
-def _rivals(run: Run, column: Column, answered: list[str]) -> set[str]:
-    return set(answered) - ({run.reference, *run.unranked} if column.group == REFERENCE else set())
-
-
-def _why_absent(estimator: Mapping[str, Any], column: Column) -> str:
+def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:
     """What the summary's notes say of a missing value, by its own key or that of what it belongs to."""
     notes: Mapping[str, str] = estimator.get("notes") or {}
-    return notes.get(".".join(column.path)) or notes.get(column.path[0]) or column.absent or "no such figure"
+    return notes.get(metric.key) or notes.get(metric.path[0]) or metric.absent or "no such figure"
 
 
-def _left_out(estimator: Mapping[str, Any], column: Column) -> str:
+def _left_out(estimator: Mapping[str, Any], metric: Metric) -> str:
     """How many errors a figure leaves out since they are missing; empty where it leaves out none."""
-    missing = at(estimator, column.path[0], "missing") or 0
+    missing = at(estimator, metric.path[0], "missing") or 0
     return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
 
 
@@ -216,3 +140,130 @@ def metrics_table(summary: Summary) -> pd.DataFrame:
         if value is None or isinstance(value, int | float)
     ]
     return pd.DataFrame(rows, columns=["estimator", "metric", "value"])
+
+
+def findings_table(findings: Iterable[Finding]) -> Table:
+    """Findings of the diagnosis before and after repair; the status is the certainty of what is not counted."""
+    rows = tuple(
+        Row(
+            f.sentence,
+            (Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
+            status="ok" if f.certainty == "counted" else f.certainty,
+        )
+        for f in findings
+    )
+    return Table((Column("before"), Column("after")), rows, name="finding")
+
+
+def _residuals(run: Run) -> Table:
+    """Reprojection errors in classes."""
+    tables = {r.name: r.evidence.patterns for r in run.answered}
+    figures = {"n": "n", "median, px": "median", "mean, px": "mean", "95 %, px": "p95"}
+    title = "Reprojection errors by distance, track age, place in the image and camera"
+    return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"mean u, px": "u", "mean v, px": "v"})
+
+
+def _map(run: Run) -> Table:
+    """Distances of landmarks from the reference's, by depth."""
+    tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
+    figures = {"landmarks": "n", "distance, m": "distance", "as seen, m": "seen", "sigmas": "sigmas"}
+    return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, figures)
+
+
+def _moved(run: Run) -> Table:
+    """Dynamic landmarks by the reference's residuals, the clearest first; empty without a reference."""
+    if run.reference is None:
+        return Table((), ())
+    table = run.results[run.reference].evidence.moved
+    moved = table[table["moved"]].sort_values("gain", ascending=False)
+    more = f", the clearest {MAX_DYNAMIC}" if len(moved) > MAX_DYNAMIC else ""
+    title = f"{counted(len(moved), 'track')} whose points moved or slid, as {run.reference} sees them{more}"
+    rows = tuple(
+        Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
+        for row in moved.head(MAX_DYNAMIC).to_dict("records")
+    )
+    headings = ("observations", "speed, m/s", "squared residuals", "of these explained")
+    return Table(tuple(map(Column, headings)), rows, name="landmark", title=title)
+
+
+def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, of each estimator that has any."""
+    components = {name: e.get("components") or {} for name, e in estimators.items()}
+    rows = tuple(
+        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in PIXEL_ROWS for key in ("bias", "spread"))))
+        for name, of in components.items()
+        if any(row.get("bias") is not None for row in of.values())
+    )
+    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("bias", "spread"))
+    caption = (
+        "Measured minus predicted: mean and standard deviation over all observations of the landmarks that an "
+        "estimator has."
+    )
+    return Table(columns, rows, caption=caption)
+
+
+def exclusions_table(summary: Mapping[str, Any]) -> Table:
+    """How many observations are excluded for each reason by `summary.json`, the most frequent first."""
+    counts: Mapping[str, int] = at(summary, "problem", "excluded") or {}
+    n = max(1, int(at(summary, "sequence", "observations") or 0))
+    rows = tuple(
+        Row(REASONS.get(reason, reason), (Cell(number(count)), Cell(per_cent(count / n))))
+        for reason, count in sorted(counts.items(), key=lambda item: -item[1])
+        if count
+    )
+    columns = (Column("observations"), Column("of all"))
+    caption = "Decided once for all estimators, before any of them runs."
+    return Table(columns, rows, name="reason for exclusion", caption=caption)
+
+
+def events_tables(run: Run) -> list[Table]:
+    """Events of each estimator, the first so many; estimators that one run answers for share a table."""
+    names: dict[int, list[str]] = {}
+    estimates: dict[int, Estimate] = {}
+    for name, result in run.results.items():
+        if result.estimate.events:
+            names.setdefault(id(result.estimate.events), []).append(name)
+            estimates.setdefault(id(result.estimate.events), result.estimate)
+    return [_events(names[key], estimate) for key, estimate in estimates.items()]
+
+
+def _events(names: list[str], estimate: Estimate) -> Table:
+    events = estimate.events
+    kinds = Counter(event.kind for event in events).most_common()
+    title = f"{', '.join(names)}: " + ", ".join(f"{number(count)} × {kind}" for kind, count in kinds)
+    rows = tuple(
+        Row(str(e.frame), (Cell("" if e.landmark is None else str(e.landmark)), Cell(e.kind), Cell(e.reason)))
+        for e in events[:MAX_EVENTS]
+    )
+    more = len(events) - MAX_EVENTS
+    caption = f"and {number(more)} more, which are not listed here." if more > 0 else ""
+    columns = (Column("landmark"), Column("what", words=True), Column("why", words=True))
+    return Table(columns, rows, name="frame", title=title, caption=caption)
+
+
+def _frames(
+    title: str, tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], figures: Mapping[str, str]
+) -> Table:
+    """A row for each row of each estimator's table; headings -> its columns of words and of figures."""
+    rows = tuple(
+        Row(
+            name,
+            (
+                *(Cell(str(row[key])) for key in words.values()),
+                *_numbers(*(int(row[key]) if key == "n" else row[key] for key in figures.values())),
+            ),
+        )
+        for name, table in tables.items()
+        for row in table.to_dict("records")
+    )
+    columns = (*(Column(heading, words=True) for heading in words), *map(Column, figures))
+    return Table(columns, rows, title=title)
+
+
+def _numbers(*values: object) -> tuple[Cell, ...]:
+    return tuple(Cell(number(value)) for value in values)
+
+
+def long_tables(run: Run) -> list[Table]:
+    """Reprojection in classes, the map by depth and the dynamic landmarks, where a run has them."""
+    return [table for table in (_residuals(run), _map(run), _moved(run)) if table.rows]

@@ -1,67 +1,46 @@
-"""The table of every report: columns with group, unit and direction, rows with cells, notes and a caption."""
+"""The table of every report and its writers for terminal, Markdown and LaTeX, which escape what comes from files."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from math import isfinite, nan
-from typing import Any, NamedTuple
+from typing import NamedTuple, Self
 
 from fgbaseline.compare.limits import Better
 
-from ..formatting import interval
-from ..results.tree import at
+from ..formatting import interval, md, tex
+from ..results.metrics import Metric, Value
 
-
-class Value(NamedTuple):
-    """A figure, and its 95 % interval where it has one; NaN for what is missing."""
-
-    value: float
-    low: float = nan
-    high: float = nan
-
-    @property
-    def text(self) -> str:
-        """`0.52 [0.41, 0.66]`, the value alone, or a dash."""
-        return interval(self.value, self.low, self.high)
-
-    def __bool__(self) -> bool:
-        """Whether there is a finite figure."""
-        return isfinite(self.value)
+UNWRAPPED = 160
+"""columns of a table where no terminal says how many there are"""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column, or a figure of nested results and how it stands in a table."""
+    """Heading of a column."""
 
     title: str
     group: str = ""
     unit: str = ""
-    path: tuple[str, ...] = ()
-    """of keys below an estimator's or estimate's results"""
-    better: Better = Better.NEITHER
-    scale: float = 1.0
     words: bool = False
     """whether its cells are words, which are aligned to the left"""
-    absent: str = ""
-    """why its figure may be missing, where the results do not say"""
-    same_data: bool = False
-    """whether it is taken over the same data for all, so that it says which is best whatever each one covers"""
+    term: str = ""
+    """of the glossary"""
+
+    @classmethod
+    def of(cls, metric: Metric, group: str = "") -> Self:
+        """Column of a metric below its group, or `group`."""
+        return cls(metric.title, group or metric.group, metric.unit, term=metric.glossary_term)
+
+    @classmethod
+    def flat(cls, metric: Metric) -> Self:
+        """Column of a metric under its short title, without a group."""
+        return cls(metric.short, "", metric.unit, term=metric.glossary_term)
 
     @property
     def heading(self) -> str:
         """Title and unit."""
         return f"{self.title}, {self.unit}" if self.unit else self.title
-
-    @property
-    def full_title(self) -> str:
-        """Group, title and unit."""
-        return f"{self.group}: {self.heading}" if self.group else self.heading
-
-    def value(self, results: Mapping[str, Any]) -> Value:
-        """Its figure in the results of one estimator: a number, or a mapping with `value`, `low` and `high`."""
-        found = at(results, *self.path)
-        parts = [found.get(key) for key in Value._fields] if isinstance(found, Mapping) else [found]
-        return Value(*(self.scale * _float(part) for part in parts))
 
 
 class Cell(NamedTuple):
@@ -84,6 +63,8 @@ class Row:
     status: str = "ok"
     reference: bool = False
     link: str = ""
+    term: str = ""
+    """of the glossary"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +81,16 @@ class Table:
     title: str = ""
 
     @property
-    def groups(self) -> list[tuple[str, int]]:
-        """The title of each group of columns, and how many it spans; empty where no column has one."""
-        spans = [(group, len(list(same))) for group, same in groupby(column.group for column in self.columns)]
-        return spans if any(group for group, _ in spans) else []
+    def groups(self) -> list[tuple[str, int, str]]:
+        """Title of each group of columns, how many it spans, and their common term; empty where none has a title."""
+        spans = [(group, list(columns)) for group, columns in groupby(self.columns, key=lambda column: column.group)]
+        if not any(group for group, _ in spans):
+            return []
+        return [(g, len(of), of[0].term if len({c.term for c in of}) == 1 else "") for g, of in spans]
+
+    def own_term(self, column: Column) -> str:
+        """Term that the heading of a column links to; empty where that of its group does."""
+        return "" if column.group and any(g == column.group and term for g, _, term in self.groups) else column.term
 
     @property
     def opens(self) -> list[bool]:
@@ -119,15 +106,15 @@ class Table:
         """A row for each column, under the titles of their groups, and a column for each row."""
         columns = tuple(Column(f"{row.name} (reference)" if row.reference else row.name) for row in self.rows)
         rows = tuple(
-            Row(column.heading, tuple(row.cells[i] for row in self.rows), group=column.group)
+            Row(column.heading, tuple(row.cells[i] for row in self.rows), group=column.group, term=column.term)
             for i, column in enumerate(self.columns)
         )
         return replace(self, columns=columns, rows=rows, name=name)
 
 
-def compared(column: Column, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
+def compared(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
     """The cells of a column by name; the best among the rivals are marked, figures that read the same together."""
-    first = best(column, {name: value.value for name, value in values.items() if name in rivals})
+    first = best(better, {name: value.value for name, value in values.items() if name in rivals})
     text = None if first is None else interval(first, nan, nan)
     return {
         name: Cell(value.text, best=name in rivals and interval(value.value, nan, nan) == text)
@@ -135,13 +122,89 @@ def compared(column: Column, values: Mapping[str, Value], rivals: Collection[str
     }
 
 
-def best(column: Column, values: Mapping[str, float]) -> float | None:
+def best(better: Better, values: Mapping[str, float]) -> float | None:
     """The best of the finite values; None without a direction, and where fewer than two are known."""
     known = [value for value in values.values() if isfinite(value)]
-    if column.better is Better.NEITHER or len(known) < 2:
+    if better is Better.NEITHER or len(known) < 2:
         return None
-    return min(known) if column.better is Better.LOWER else max(known)
+    return min(known) if better is Better.LOWER else max(known)
 
 
-def _float(value: object) -> float:
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
+def print_table(
+    table: Table,
+    *,
+    width: int = UNWRAPPED,
+    styles: Mapping[str, str] | None = None,
+    spaced: bool = False,
+    wrap_names: bool = True,
+) -> None:
+    """Prints the table; `styles` has rich's style for the rows of a status, `spaced` leaves a line between rows."""
+    from rich.console import Console
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    shown = RichTable(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0) if spaced else (0, 1))
+    shown.add_column(table.name, overflow="fold", no_wrap=not wrap_names)
+    for column in table.columns:
+        shown.add_column(Text(column.heading), justify="left" if column.words else "right", overflow="fold")
+    for row in table.rows:
+        name = f"{row.group}: {row.name}" if row.group else row.name
+        style = (styles or {}).get(row.status, "")
+        shown.add_row(*map(Text, (name, *_texts(table, row))), style=style)
+    console = Console()
+    Console(width=None if console.is_terminal else max(console.width, width), highlight=False).print(shown)
+
+
+def markdown(table: Table) -> str:
+    """The table in Markdown, its caption below; rows of a group begin with its title."""
+    grouped = any(row.group for row in table.rows)
+    first = ["", ""] if grouped else [table.name]
+    align = [*(":--" for _ in first), *(":--" if column.words else "--:" for column in table.columns)]
+    lines: list[Sequence[str]] = [[*first, *(md(column.heading) for column in table.columns)], align]
+    for row in table.rows:
+        cells = [f"**{md(cell.text)}**" if cell.best else md(cell.text) for cell in row.cells]
+        if row.reason and not row.cells:
+            cells = [md(row.reason), *[""] * (len(table.columns) - 1)]
+        lines.append([*([md(row.group)] if grouped else []), md(_name(row)), *cells])
+    caption = ["", md(table.caption)] if table.caption else []
+    return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), *caption, ""])
+
+
+def latex(table: Table) -> str:
+    """The table in LaTeX (booktabs), a group of lines for each group of rows; the best of a column in bold."""
+    n = len(table.columns)
+    body: list[str] = []
+    for group, rows in table.by_group:
+        if group:
+            body += [r"\midrule", rf"\multicolumn{{{n + 1}}}{{l}}{{\emph{{{tex(group)}}}}} \\"]
+        for row in rows:
+            cells = [rf"\textbf{{{tex(cell.text)}}}" if cell.best else tex(cell.text) for cell in row.cells]
+            if row.reason and not row.cells:
+                cells = [rf"\multicolumn{{{n}}}{{l}}{{{tex(row.reason)}}}"]
+            body.append(" & ".join([rf"\quad {tex(_name(row))}", *cells]) + r" \\")
+    return "\n".join(
+        [
+            r"% needs \usepackage{booktabs}",
+            r"\begin{table}",
+            r"\centering",
+            rf"\caption{{{tex(table.caption)}}}",
+            rf"\begin{{tabular}}{{l{'r' * n}}}",
+            r"\toprule",
+            " & ".join(["", *(tex(column.heading) for column in table.columns)]) + r" \\",
+            *body,
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+def _name(row: Row) -> str:
+    return f"{row.name} (reference)" if row.reference else row.name
+
+
+def _texts(table: Table, row: Row) -> list[str]:
+    if row.reason and not row.cells:
+        return [row.reason, *[""] * (len(table.columns) - 1)]
+    return [cell.text for cell in row.cells]

@@ -27,16 +27,17 @@ from .levenberg_marquardt import LocalMinimum, optimize_from_estimate, optimize_
 
 DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's answer"
 SAME_COST = 1e-4
-"""relative; two starts that end nearer than that have found the same minimum"""
+"""relative difference of two costs up to which both starts found the same minimum"""
 
 
 def batch(problem: Problem, progress: Progress | None = None, given: Mapping[str, Estimate] | None = None) -> Estimate:
-    """The minimum of the graph that iSAM2 ended with, found from dead reckoning and from iSAM2's answer.
+    """Minimum of the graph of iSAM2, by Levenberg-Marquardt from dead reckoning and from the answer of iSAM2.
 
-    The observations are those that iSAM2 used, so that costs compare; where it failed, those of the landmarks that
-    are determined along dead reckoning, and there is one start only. An event says both costs. `given` may hold the
-    answer of `isam2` to this problem; else it is found here, and `by_products` has it with `isam2-online`. The time
-    is that of the batch solution alone.
+    The observations are those that iSAM2 used, so that costs are comparable. If iSAM2 failed, they are those of the
+    landmarks determined along dead reckoning, which is then the only start. An event reports both costs.
+
+    `given` may hold the answer of `isam2` to this problem; otherwise it is computed, and `by_products` has it with
+    `isam2-online`. The time excludes iSAM2.
     """
     answer = (given or {}).get("isam2")
     by_products: dict[str, Estimate] = {}
@@ -80,7 +81,7 @@ def _solve(problem: Problem, answer: Estimate) -> Estimate:
                 events=(*events, _costs(minima, T - 1)),
             )
             return states.answer(estimate)
-        # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
+        # A cheirality violation has no gradient and a meaningless residual: costs with it are not comparable.
         events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in gone]
         used = used & ~np.isin(problem.sequence.observations.landmark, gone)
     return Estimate.failed("batch", "no landmark is determined, or no descent ended", T, len(used))
@@ -106,7 +107,7 @@ def _dead_reckoned(problem: Problem, *, windows: bool = True) -> FrameStates:
 def _minima(
     graph: gtsam.NonlinearFactorGraph, kept: Problem, answer: Estimate | None, events: list[Event]
 ) -> list[LocalMinimum]:
-    """Where the descents end; one that GTSAM breaks off is an event."""
+    """Minima of the descents; one that GTSAM aborts is an event."""
     starts: list[Callable[[], LocalMinimum]] = [
         lambda: optimize_from_path(graph, kept, DEAD_RECKONING, _dead_reckoned(kept))
     ]
@@ -124,18 +125,18 @@ def _minima(
 
 
 def _costs(minima: list[LocalMinimum], last: int) -> Event:
-    """What the starts came to."""
-    told = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
+    """Event with the costs from all starts."""
+    costs = " and ".join(f"{minimum.cost:.8g} from {minimum.start}" for minimum in minima)
     if len(minima) == 1:
-        return Event(last, EventKind.ONE_START, f"the cost is {told}: nothing says that it is the lowest")
+        return Event(last, EventKind.ONE_START, f"the cost is {costs}: nothing says that it is the lowest")
     low, high = sorted(minimum.cost for minimum in minima)
     share = high / low - 1.0 if low > 0 else float("inf")
     one, other = (poses_from_values(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
     rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
     apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
     if share <= SAME_COST:
-        return Event(last, EventKind.SAME_COST, f"the cost is {told}: {apart}")
-    return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
+        return Event(last, EventKind.SAME_COST, f"the cost is {costs}: {apart}")
+    return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {costs}: {apart}; the lower one counts")
 
 
 def _marginals(

@@ -12,11 +12,11 @@ from ..graph.gauss_newton import gauss_newton
 from ..initialization.initial_values import initial_landmarks
 
 LM_STEPS, LM_DECREASE = 100, 1e-6
-"""Levenberg-Marquardt goes on until a step lowers the cost by no more than this share: it is near then"""
+"""most steps, and the relative decrease of the cost that ends Levenberg-Marquardt near the minimum"""
 LAST_STEPS, LAST_DECREASE = 50, 1e-10
-"""and undamped steps end it"""
+"""most undamped Gauss-Newton steps that follow, and their final relative decrease"""
 NEAR, FAR = 1e-9, 1e-5
-"""first damping: from an answer a Gauss-Newton step is the right one, from dead reckoning not"""
+"""initial damping: nearly undamped from an estimate, damped from dead reckoning"""
 
 
 class LocalMinimum(NamedTuple):

@@ -15,16 +15,16 @@ from ..graph.marginal_covariances import marginal_covariances
 from ..isam2.settings import ISAM2Settings
 
 LOOSE_SIGMA = 2e3
-"""baselines; keeps a landmark determined that marginals still speak of, but no observation"""
+"""baselines; loose prior that keeps a landmark determined which is in marginals but in no observation"""
 QR_UPDATES = 30
-"""by QR after a failure, before Cholesky is tried again: it is three times faster"""
+"""updates with QR after a failure, before the three times faster Cholesky is tried again"""
 
 
 class Checkpoint(NamedTuple):
-    """State from which an equal smoother, to rounding, can be rebuilt."""
+    """State from which an equivalent smoother, up to rounding, is rebuilt."""
 
     factors: gtsam.NonlinearFactorGraph
-    """marginals among them: linear, at the linearization point, which GTSAM keeps fixed for them; with empty slots"""
+    """factors including marginals, which are linear at linearization points that GTSAM keeps fixed; with empty slots"""
     linearization_point: gtsam.Values
     times: dict[int, float]
 
@@ -46,17 +46,17 @@ class Checkpoint(NamedTuple):
 class CheckpointedFixedLag:
     """`gtsam.IncrementalFixedLagSmoother` with atomic updates.
 
-    GTSAM's Cholesky takes pivots of very unequal size for a failure, as they come about where pixels are sharp and the
-    path is long. QR does not; after an update by QR it is kept for some frames.
+    GTSAM's Cholesky fails on pivots of very unequal size, which occur with precise pixels on a long path. QR does not
+    fail; after an update with QR it is kept for some frames.
     """
 
     def __init__(self, lag: float, settings: ISAM2Settings, baseline: float) -> None:
         self._lag, self._settings, self._baseline = lag, settings, baseline
         self._qr_updates = 0
-        """still to be made by QR"""
+        """remaining updates with QR"""
         self.smoother = self._new(qr=False)
         self.checkpoint = self._current()
-        """as the last update left it"""
+        """state after the last update"""
 
     def update(
         self,
@@ -67,11 +67,10 @@ class CheckpointedFixedLag:
         *,
         qr: bool = False,
     ) -> None:
-        """Update the window, first removing the factors of the landmarks `forgotten` (keys).
+        """Update the window after removing the factors of the landmarks `forgotten` (keys).
 
-        What has left the window since with such a landmark stays in the marginals. An update with `qr` is by QR, which
-        does not notice a landmark that nothing determines. Raises IndeterminateSystemError, nothing being changed,
-        where GTSAM fails.
+        Observations of such landmarks that were marginalized stay in the marginals. With `qr`, undetermined landmarks
+        are not detected. Raises IndeterminateSystemError, with the window unchanged, where GTSAM fails.
         """
         try:
             if qr:
@@ -87,7 +86,8 @@ class CheckpointedFixedLag:
         self._return_to_cholesky()
 
     def _restore(self) -> None:
-        """Back to the snapshot, the more carefully the less it can be done."""
+        """Rebuild the smoother from the checkpoint: as it was, else with QR, else with loose priors on its
+        landmarks."""
         held = self._with_loose_priors(
             self.checkpoint, {key for key in self.checkpoint.times if landmark_of(key) is not None}
         )
@@ -109,7 +109,7 @@ class CheckpointedFixedLag:
             self._qr_updates -= 1
 
     def _current(self) -> Checkpoint:
-        # GTSAM gives references, which the next update changes.
+        # GTSAM returns references, which the next update changes.
         s = self.smoother
         return Checkpoint(
             gtsam.NonlinearFactorGraph(s.getFactors()), gtsam.Values(s.getLinearizationPoint()), s.timestamps()

@@ -29,11 +29,11 @@ class FixedLagSettings:
 
 
 def fixed_lag(problem: Problem, progress: Progress | None = None, settings: FixedLagSettings | None = None) -> Estimate:
-    """Fixed-lag smoothing: what leaves the window are marginalized into a linear prior.
+    """Fixed-lag smoothing: variables that leave the window are marginalized into a linear prior.
 
     Pose k, its covariance and each landmark are estimated from the data of up to `lag` seconds after them. Landmarks
-    are initialized as in `isam2`, with their observations in the window. A marginalized one that is observed again is
-    new to the graph. Indeterminate systems are handled as in `isam2`.
+    are initialized as in `isam2`, with their observations in the window. A marginalized landmark that is observed again
+    is initialized as a new one. Indeterminate systems are handled as in `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         posed, world_T_solver = in_solver_frame(problem)

@@ -34,7 +34,7 @@ class FixedLagWindow:
         self._observed: dict[int, list[int]] = {}
         self._times_initialized: Counter[int] = Counter()
         self.key: dict[int, int] = {}
-        """of each landmark in the window; one that comes back has a new one"""
+        """key of each landmark in the window; a new key where it is observed again after it was marginalized"""
         self.oldest = 0
         """frame in the window"""
         self.newest = -1
@@ -72,7 +72,7 @@ class FixedLagWindow:
         except IndeterminateSystemError:
             if set(self.cheirality_violations(self.key)) - set(dropped):
                 raise
-            # No landmark is to blame: it may be the pivots alone.
+            # No landmark is suspect: unequal pivots alone may be the cause.
             self._lag.update(graph, values, times, forgotten, qr=True)
         self._record(update, new, now, dropped)
 

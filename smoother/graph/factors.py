@@ -15,7 +15,7 @@ from .inertial_factors import InertialFactors
 from .keys import pose_key
 
 FIXED_POSE_SIGMA = 1e-6
-"""baselines and rad: what stands for zero in the covariance of a pose that is held, so that Cholesky can be used"""
+"""baselines and rad: sigma of a fixed pose in place of zero, so that Cholesky can be used"""
 
 
 class FactorBuilder:

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import gtsam
 
 MAX_STEPS = 100
-"""three suffice after a sound run of iSAM2, and twenty where its increments ended at five times the minimum's cost"""
+"""largest number of steps: three suffice after a sound run of iSAM2, twenty from five times the minimum cost"""
 RELATIVE_DECREASE = 1e-7
-"""of the cost, at which it stops"""
+"""relative decrease of the cost at convergence"""
 MAX_STEP_SCALE, MIN_STEP_SCALE = 64.0, 1.0 / 64.0
-"""times the step"""
+"""largest and smallest scale of a step"""
 
 
 def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
@@ -39,10 +39,12 @@ def gauss_newton(
 ) -> GaussNewtonResult:
     """Apply Gauss-Newton steps as long as each lowers the cost.
 
-    Every linearization point of an incremental run is off by up to its threshold; this takes that away. Under a kernel
-    the steps are too short along weak directions, so each is doubled as long as that lowers the cost further; one that
-    is too long, as through a camera's plane, is halved. Where the system is indeterminate the values at which it is
-    are given, with GTSAM's words, and where the steps do not suffice the last values, which is a failure too.
+    They remove the error of linearization points that an incremental run keeps within its thresholds. Under a kernel
+    the steps are too short along weakly determined directions, so each is doubled as long as the cost falls. A step
+    that is too long, such as one through a camera plane, is halved.
+
+    If the system is indeterminate, the result has the last values and GTSAM's message. Too few steps for convergence
+    are a failure too.
     """
     cost = graph.error(values)
     ordering = gtsam.Ordering.ColamdNonlinearFactorGraph(graph)
@@ -61,7 +63,7 @@ def gauss_newton(
 def _line_search(
     graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, step: gtsam.VectorValues, cost: float
 ) -> tuple[gtsam.Values, float]:
-    """The values and their cost after the step, doubled as long as that pays, else halved until it lowers the cost."""
+    """Values and their cost after the step, doubled as long as the cost falls, else halved until it falls."""
     best, times, factor = values, 1.0, 2.0
     while MIN_STEP_SCALE <= times <= MAX_STEP_SCALE:
         trial = values.retract(step.scale(times))

@@ -1,9 +1,8 @@
-"""Keys in GTSAM; those of landmarks are sorted by distance so that each class has its own relinearization threshold.
+"""GTSAM keys; landmark keys encode a distance class, so that each class has its own relinearization threshold.
 
-What matters to the linearization of a landmark is by how much it moved as a share of its distance: one at 100 m that
-moves by 10 cm looks the same as one at 5 m that moves by 5 mm. GTSAM knows thresholds by the letter of a key only, so
-the letter tells the distance. With one threshold for all, far landmarks are relinearized at every step, with all that
-hangs on them.
+The linearization error of a landmark depends on its motion relative to its distance: 10 cm at 100 m are equivalent to
+5 mm at 5 m. GTSAM sets thresholds by the letter of a key, so the letter encodes the distance class. With one threshold
+for all, far landmarks and their cliques would be relinearized at every step.
 """
 
 import math
@@ -16,14 +15,14 @@ from fgbaseline.geometry import FloatArray
 POSE, VELOCITY, BIAS = "x", "v", "w"
 """the letters of a frame's variables; b is that of a class of landmarks"""
 LANDMARK = "l"
-"""the letter where no thresholds are at work"""
+"""letter of landmark keys without thresholds"""
 LETTERS = "abcdefghijk"
 NEAREST, RATIO = 10.0, 1.6
-"""baselines of the rig; a class reaches RATIO times as far as the one before it"""
+"""nearest class in baselines; each class reaches RATIO times as far as the one before"""
 
 
 _LETTER_AT = 56
-"""the bit of a key from which on it holds its letter, as in `gtsam.symbol`, which costs ten times as much"""
+"""first bit of the letter in a key, as in `gtsam.symbol`, which takes ten times as long"""
 _POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
 _VELOCITIES, _BIASES = ord(VELOCITY) << _LETTER_AT, ord(BIAS) << _LETTER_AT
 
@@ -38,7 +37,7 @@ _FRAME_LETTERS = frozenset([*map(ord, (POSE, VELOCITY, BIAS)), AUXILIARY_POSE >>
 
 
 def pose_key(frame: int) -> int:
-    """The key of the pose of a frame."""
+    """Key of the pose of a frame."""
     return _POSES | frame
 
 
@@ -58,12 +57,12 @@ def width(key: int) -> int:
 
 
 def landmark_key(landmark: int) -> int:
-    """The key of a landmark, by its index in the sequence, in a graph that is solved as a whole."""
+    """Key of a landmark, by its index in the sequence, in a batch graph."""
     return _LANDMARKS | landmark
 
 
 def distance_key(landmark: int, distance: float) -> int:
-    """The key of a landmark that enters an incremental graph when it is `distance` (baselines) away."""
+    """Key of a landmark added to an incremental graph at a distance of `distance` baselines."""
     steps = math.log(max(distance, NEAREST) / NEAREST) / math.log(RATIO)
     return (ord(LETTERS[min(int(steps), len(LETTERS) - 1)]) << _LETTER_AT) | landmark
 

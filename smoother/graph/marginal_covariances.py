@@ -1,12 +1,11 @@
-"""The covariances of all variables of a graph in one sweep.
+"""Marginal covariances of all variables of a graph in one sweep.
 
-Elimination writes the system as p(x_i | x_S) with R_i x_i + S_i x_S = d_i for one variable after another, S standing
-for neighbours that are eliminated later. From the last one back, with G = R_i^-1 S_i,
+Elimination writes the system as p(x_i | x_S) with R_i x_i + S_i x_S = d_i for one variable after another, where S are
+the neighbors eliminated later. Backward, with G = R_i^-1 S_i, cov(x_i, x_S) = -G cov(x_S) and
+cov(x_i) = R_i^-1 R_i^-T + G cov(x_S) G^T. cov(x_S) is part of the joint covariance of the first of S and its own
+neighbors: the sparse inverse subset of Takahashi (1973).
 
-    cov(x_i, x_S) = -G cov(x_S),    cov(x_i) = R_i^-1 R_i^-T + G cov(x_S) G^T,
-
-and cov(x_S) is part of the joint covariance of the first of S and its own neighbours: the sparse inverse subset of
-Takahashi (1973). It is exact, and has the landmarks as well, where `gtsam.Marginals` starts anew for each variable.
+It is exact and includes the landmarks. `gtsam.Marginals` starts anew for each variable.
 """
 
 from collections import defaultdict
@@ -48,7 +47,7 @@ class _Conditional(NamedTuple):
 
     @property
     def gain(self) -> FloatArray:
-        """(d, n) G; large, so it is made when it is needed."""
+        """(d, n) G; computed on demand because it is large."""
         return self.inverse @ self.density.S()
 
 
@@ -103,7 +102,7 @@ def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
 
 
 def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
-    """The joint covariance of a variable and its later neighbours, which are among the variables of `parent`."""
+    """Joint covariance of a variable and its later neighbors, which are among the variables of `parent`."""
     d = len(conditional.inverse)
     columns, end = {conditional.key: range(d)}, d
     for key in conditional.later:
@@ -120,7 +119,7 @@ def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
 
 
 def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
-    """The covariances of variables whose later neighbours are all among those of `parent`, by their keys."""
+    """Covariances by key of variables whose later neighbors are all among those of `parent`."""
     result: dict[int, FloatArray] = {}
     for d in {len(leaf.inverse) for leaf in leaves}:
         chosen = [leaf for leaf in leaves if len(leaf.inverse) == d]

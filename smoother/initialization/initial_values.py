@@ -16,7 +16,7 @@ from .landmark_initialization import InitializationCriterion
 
 
 def restricted_problem(problem: Problem, used: BoolArray) -> Problem:
-    """Problem with only the observations `used` (n,) of its sequence's."""
+    """Problem restricted to the observations `used` (n,) of its sequence."""
     excluded = np.where(used, Excluded.NO, np.maximum(problem.excluded, Excluded.GEOMETRY)).astype(np.uint8)
     return replace(problem, excluded=excluded)
 
@@ -49,9 +49,10 @@ def select_landmarks(landmarks: Landmarks, index: IntArray) -> Landmarks:
 
 
 def determined_observations(problem: Problem, world_T_imu: FloatArray, criterion: InitializationCriterion) -> BoolArray:
-    """(n,) the observations of the sequence whose landmark is determined along a path by `rule`, and seen by all.
+    """Mask (n,) of the sequence's observations whose landmark is determined along a path by `criterion`, in front of
+    all cameras.
 
-    The choice where no incremental run has made it.
+    Replaces the selection of an incremental run where there is none.
     """
     if problem.landmark_prior is not None:
         return problem.mask

@@ -12,7 +12,7 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from ..graph.cheirality import in_front
 
 START_TOLERANCE = 1e-3
-"""of the distance: the last step of a start, which the graph moves further than that; the next would be its square"""
+"""relative step at which triangulation stops: the graph moves the landmark further than that"""
 
 
 @dataclass(frozen=True, slots=True)

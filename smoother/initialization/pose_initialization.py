@@ -18,11 +18,10 @@ SMALL_STEP = 0.1
 def refine_predicted_pose(
     problem: Problem, information: FloatArray, pose: FloatArray, points: FloatArray, pixel: FloatArray
 ) -> FloatArray:
-    """The pose (4, 4) of a frame that its prediction and n observations (n, 4) of points (n, 3) agree on.
+    """Predicted pose (4, 4) of a frame, refined on n observations (n, 4) of known points (n, 3).
 
-    Gauss-Newton on the problem's cost, kernel included, with the frame before and the points held: what is uncertain
-    of the two together does not move one against the other. `information` (6, 6) is the increment's, order [v, w].
-    Only a start.
+    Gauss-Newton on the cost of the problem, kernel included, with previous pose and points fixed. `information` (6, 6)
+    is that of the increment, order [v, w]. The result is an initial value only.
     """
     observed = _KnownLandmarks(problem, points, pixel)
     guess, correction = pose, np.zeros(6)
@@ -41,7 +40,7 @@ def refine_predicted_pose(
 
 
 class _KnownLandmarks:
-    """What one frame sees of known points."""
+    """Observations of known landmarks in one frame."""
 
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
         self._points, self._model = points, problem.measurement

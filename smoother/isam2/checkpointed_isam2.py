@@ -20,7 +20,7 @@ class Update(NamedTuple):
     values: gtsam.Values
     removed: tuple[int, ...] = ()
     groups: Mapping[int, int] | None = None
-    """of elimination, by key: the larger, the later; a key that is not named is in group 0"""
+    """elimination group by key: larger groups are eliminated later; unlisted keys are in group 0"""
     relinearize: bool = False
     """force relinearization at this update"""
 

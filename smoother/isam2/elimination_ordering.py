@@ -10,14 +10,12 @@ from collections.abc import Collection
 from ..graph.keys import AUXILIARY_POSE, frame_of, landmark_of, pose_key, state_keys
 
 GROUP_FRAMES, N_GROUPS = 20, 6
-"""of a group, and how many there are beside the last one; what is older is in the first of them.
-
-Longer groups leave the choice to COLAMD, more of them cost a call for each key. What an update touches seldom reaches
-back further than the life of a track, which is a few dozen frames.
-"""
+"""Frames of a group, and number of groups beside the last one; older variables are in the first group. Longer groups
+leave the order to COLAMD, more groups cost a call per key. An update seldom reaches back further than the length of a
+track, a few dozen frames."""
 MANY_LANDMARKS = 200
-"""landmarks of a frame, above which they are eliminated before its pose. As a rule all that a frame sees is kept for
-the end, which costs the next frame least, as long as so many dense columns do not cost more themselves"""
+"""Landmarks of a frame above which they are eliminated before its pose. Otherwise all that a frame observes is
+eliminated last, which makes the next update cheapest as long as there are few dense columns."""
 
 
 class EliminationOrdering:
@@ -37,12 +35,12 @@ class EliminationOrdering:
     def groups(
         self, frame: int, landmarks: Collection[int], *, first: int = 0, all_new: bool = False
     ) -> dict[int, int]:
-        """Key -> group of elimination, for the update that brings a frame and sees some landmarks (keys), in a tree
-        that has no pose before `first`.
+        """Elimination group by key, for the update by a frame that observes landmarks (keys), in a tree without poses
+        before `first`.
 
-        Every key that is not among them is in group 0, which comes first. Where all landmarks are `fresh`, the frame
-        before is kept for the end as well: they may leave the system close to indeterminate, and GTSAM then names a
-        landmark where it would name a pose.
+        Keys that are not listed are in group 0, which is eliminated first. If the landmarks are `all_new`, the frame
+        before is eliminated last as well: the system may be close to indeterminate, and GTSAM then names a landmark
+        instead of a pose.
         """
         seen = self._seen
         for key in landmarks:
@@ -85,8 +83,11 @@ class EliminationOrdering:
         return groups | states | {AUXILIARY_POSE: end + 1}
 
     def batch_groups(self, first: int, frame: int) -> dict[int, int]:
-        """Key -> group of elimination, for a tree that is built at once over the frames `first` to `frame`, the last
-        one that `groups` has heard of; without the landmarks that were seen before only."""
+        """Elimination group by key, for a tree built at once over the frames `first` to `frame`, the latest frame of
+        `groups`.
+
+        Landmarks observed only before `first` are left out.
+        """
         last = 1 + (frame - first) // GROUP_FRAMES
         groups = {pose_key(k): (k - first) // GROUP_FRAMES for k in range(first, frame)} | {pose_key(frame): last}
         for key in reversed(self._seen):

@@ -83,7 +83,7 @@ class IncrementalSmoother:
             try:
                 if self.solver.relinearize() == 0:
                     return
-            except IndeterminateSystemError:  # the tree is as it was, and so good enough
+            except IndeterminateSystemError:  # the tree is unchanged, which is good enough
                 return
 
     def _process_frame(self, k: int, observed: range) -> None:
@@ -207,7 +207,7 @@ class IncrementalSmoother:
         graph, values = self.solver.release()
         there = set(self.key.values())
         for key in values.keys():  # noqa: SIM118
-            if landmark_of(key) is not None and key not in there:  # given up, and still in the prior
+            if landmark_of(key) is not None and key not in there:  # dropped, and still in the linear prior
                 values.erase(key)
         return graph, values
 

@@ -19,11 +19,11 @@ from ..graph.keys import AUXILIARY_POSE, width
 from .checkpointed_isam2 import CheckpointedISAM2
 
 AUXILIARY_NOISE = gtsam.noiseModel.Unit.Create(6)
-"""between the newest pose and `keys.AUXILIARY_POSE`; as nothing else holds that one, it does not matter how strong"""
+"""noise between the newest pose and `keys.AUXILIARY_POSE`; any value gives the same solution"""
 IN_PRIOR = -1
-"""stands for a factor's slot in the tree, where it is no longer one, or was removed"""
+"""tree slot of a factor that is in the linear prior or was removed"""
 NO_POSE = -1
-"""stands for the frame of a factor that names no pose"""
+"""frame of a factor without a pose"""
 UNSEEN_FRAMES = 2
 """Frames without an observation after which a track may continue: the mask interrupts tracks for that long."""
 
@@ -38,13 +38,13 @@ class MarginalizedISAM2:
         self._marginalized = gtsam.Values()
         """of the variables that are not in the tree any more"""
         self._tree_slot: list[int] = []
-        """the slot in the tree of the factor in each slot of the graph"""
+        """tree slot of the factor in each slot of the graph"""
         self._frame: list[int] = []
-        """the first frame whose pose each of these factors names"""
+        """first frame among the poses of each of these factors"""
         self._prior: list[int] = []
-        """the slots in the tree of what stands for factors behind it"""
+        """tree slots of the linear prior"""
         self._auxiliary_slot: int | None = None
-        """the slot in the tree of the tie to it"""
+        """tree slot of the factor to the auxiliary pose"""
 
     @property
     def tree(self) -> gtsam.ISAM2:
@@ -61,7 +61,7 @@ class MarginalizedISAM2:
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
     ) -> Listing[int]:
-        """An update of the tree, see `RestorableISAM2`; the slots of the new factors, in their order.
+        """Update the tree, see `CheckpointedISAM2`; returns the slots of the new factors, in their order.
 
         `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` are the keys of the
         state, among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior
@@ -93,8 +93,8 @@ class MarginalizedISAM2:
     def marginalize_before(self, first: int, groups: Mapping[int, int]) -> bool:
         """Marginalize the frames before `first` into a linear prior; False, with the tree unchanged, if GTSAM fails.
 
-        Nothing new may name what leaves: poses before `first`, and landmarks that were not seen since. `groups` are of
-        elimination, as in `update`.
+        Later factors must not refer to the marginalized variables: poses before `first`, and landmarks without
+        observations since. `groups` are elimination groups, as in `update`.
         """
         point, factors = self.tree.getLinearizationPoint(), self.tree.getFactorsUnsafe()
         behind, ahead, place = self._split(factors, first)
@@ -123,7 +123,7 @@ class MarginalizedISAM2:
     def restore_all(self, groups: Mapping[int, int]) -> bool:
         """Rebuild the tree over all frames; False, with the tree unchanged, if GTSAM fails.
 
-        `groups` are of elimination, as in `update`.
+        `groups` are elimination groups, as in `update`.
         """
         assert self._auxiliary_slot is not None
         factors, place = gtsam.NonlinearFactorGraph(), list[int]()
@@ -155,8 +155,10 @@ class MarginalizedISAM2:
     def _split(
         self, factors: gtsam.NonlinearFactorGraph, first: int
     ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.NonlinearFactorGraph, dict[int, int]]:
-        """What is on poses before `first`, with the landmarks that only they saw; the rest; the slots of the rest in
-        the tree, with those that they have in it."""
+        """Factors to marginalize, the others, and the new slot of each of the others by its slot in the tree.
+
+        Marginalized are factors on poses before `first`, and those on landmarks observed only there.
+        """
         behind, ahead, place = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph(), dict[int, int]()
 
         def goes_ahead(there: int) -> None:

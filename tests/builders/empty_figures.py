@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from fgbaseline.reports.figures import comparison, layout, run, saving
-from fgbaseline.reports.figures.run import drawings
+from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import RunData
 
 
@@ -28,12 +28,12 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
             written(figure, target, **options)  # type: ignore[arg-type]
 
     def blank(data: RunData) -> dict[str, Callable[[], Figure]]:
-        return dict.fromkeys(drawings(data), Figure)
+        return dict.fromkeys(figure_functions(data), Figure)
 
     patch.setattr(Figure, "savefig", savefig)
     patch.setattr(saving, "_png", lambda *_: empty["png"])
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
-    patch.setattr(run, "drawings", blank)
+    patch.setattr(run, "figure_functions", blank)
     for module in (run, comparison):
         patch.setattr(module, "lay_out", lambda _: None)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from fgbaseline import data, diagnosis
-from fgbaseline.data.problem_export import read_problem, write_problem
 from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read_trajectory
 from fgbaseline.data.formats.trajectory_reader import read_pose_covariances
+from fgbaseline.data.problem_export import read_problem, write_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.limits_file import read_limits
-from fgbaseline.reports.comparing.run_folder import read_run_folder
+from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.comparison.reference_run import read_reference_run
 from fgbaseline.reports.results.reader import read_folder, read_measured
 
 from .course_file import course_arrays
@@ -201,7 +201,7 @@ def _run_folder(content: bytes, scratch: Path) -> object:
     (scratch / "summary.json").write_bytes(content)
     (scratch / "trajectories").mkdir(exist_ok=True)
     (scratch / "trajectories" / "isam2.tum").write_bytes(TUM)
-    run = read_run_folder(scratch)
+    run = read_reference_run(scratch)
     return run.trajectory(run.reference)
 
 

@@ -14,8 +14,8 @@ from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.run_accuracy import claimed, nearest_sentences, truth_sentences
-from fgbaseline.reports.tables.bench_statistics import METRICS
+from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences, is_claimed
+from fgbaseline.reports.results.bench import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import FRAMES, answer, as_dict, run_of, scene
@@ -76,8 +76,8 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     common = {name: e[everywhere] for name, e in errors.items()}
     run = run_with(errors, errors)
 
-    worse = next((s for s in truth_sentences(run) if s.startswith("The reference is worse than")), "")
-    said = names_after(worse, "worse than", "here")
+    worse = next((s for s in ate_sentences(run) if s.startswith("The reference isam2 has a larger ATE")), "")
+    said = names_after(worse, "than", ", by paired")
     for name in errors.keys() - {"isam2"}:
         larger, smaller = rmse(common["isam2"]), rmse(common[name])
         d = compare.rmse_difference(common["isam2"], common[name])
@@ -86,32 +86,33 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     rivals = {name: e for name, e in errors.items() if name != "isam2"}
     both = ~np.any([np.isnan(e) for e in rivals.values()], axis=0)
     first = min(rivals, key=lambda name: rmse(rivals[name][both]))
-    (sentence,) = [s for s in nearest_sentences(run) if "minimum" not in s]
-    farther = names_after(sentence, "farther than", "$")
+    first_sentence, *others = [s for s in divergence_sentences(run) if "minimum" not in s]
+    farther = names_after(next((s for s in others if s.startswith("Larger divergence than")), ""), ":", "$")
     for name in rivals.keys() - {first}:
         d = compare.rmse_difference(rivals[name][both], rivals[first][both])
-        figures = [number(rmse(rivals[who][both])) for who in (name, first)]
+        figures = [number(rmse(rivals[rival][both])) for rival in (name, first)]
         assert (name in farther) == (d.low > 0.0 and figures[0] != figures[1])
     alone = set(farther) - {first} == rivals.keys() - {first} and len(rivals) > 1
-    assert sentence.startswith(f"Nearest to isam2 is {first}") == alone
+    assert f": {first} " in first_sentence
+    assert first_sentence.startswith("Smallest divergence from isam2") == alone
 
 
 def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None:
     d = compare.rmse_difference(np.full(100, 0.003984), np.full(100, 0.003976))
     assert d.settled
-    assert not claimed(d, 0.003984, 0.003976)
+    assert not is_claimed(d, 0.003984, 0.003976)
     errors = {"isam2": np.full(FRAMES, 0.003984), "ekf": np.full(FRAMES, 0.003976)}
-    said = truth_sentences(run_with(errors, errors))
-    assert said[1:] == ["The errors of ekf and isam2 agree to the digits printed: not ranked."]
+    said = ate_sentences(run_with(errors, errors))
+    assert said[1:] == ["The ATE of ekf and isam2 is the same to the printed digits: not ranked."]
 
 
 def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> None:
     errors = {"isam2": np.full(FRAMES, 2.0), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 1.0)}
     run = run_with(errors, {"isam2": np.zeros(FRAMES), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 0.01)})
-    assert not [s for s in truth_sentences(run) if "worse" in s or "settle" in s]
-    sentences = nearest_sentences(run)
-    assert sentences[0].startswith("ekf is 3.00 m")
-    assert "batch, another minimum of the same graph, is 0.0100 m from isam2 (RMSE)." in sentences
+    assert not [s for s in ate_sentences(run) if "larger ATE" in s or "significant" in s]
+    sentences = divergence_sentences(run)
+    assert ": ekf 3.00 m " in sentences[0]
+    assert "batch, another minimum of the graph of isam2: divergence 0.0100 m (RMSE)." in sentences
 
 
 def test_figures_that_read_the_same_are_best_together_and_the_same_graph_is_not_nearest() -> None:
@@ -146,7 +147,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
     whole = [name for name in table if table[name].notna().all()]
     means = table[whole].mean()
     first = str(means.idxmin())
-    claims = "the least" in sentence
+    claims = "smallest" in sentence
     separated = []
     for name in whole:
         interval = compare.mean_interval((table[name] - table[first]).to_numpy())
@@ -154,7 +155,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
             separated.append(name)
     assert claims == (len(whole) > 1 and len(separated) == len(whole) - 1 and runs > 1)
     if claims:
-        assert f"{first} has the least" in sentence
+        assert f"smallest error to truth {first} " in sentence
     larger = sentence.partition("larger, by the paired interval: ")[2].partition(";")[0]
     assert [name for name in whole if f"{name} " in larger] == (separated if runs > 1 else [])
 
@@ -162,8 +163,8 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
 def test_one_run_ranks_nobody_and_missing_answers_are_named() -> None:
     assert "one run does not rank them" in winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
     said = winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
-    assert "a has the least" in said
-    assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a there)" in said
+    assert "smallest error to truth a " in said
+    assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a in these)" in said
     same = winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
     assert "batch" not in same
 

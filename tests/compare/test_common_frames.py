@@ -1,4 +1,4 @@
-"""Who is nearer is asked of the moments that all have; words and sign agree; coverage stands beside the ranks."""
+"""Rankings use the moments that all estimates have; words and sign agree; coverage stands beside the ranks."""
 
 import csv
 import json
@@ -15,12 +15,12 @@ from fgbaseline import data
 from fgbaseline.compare.trajectory_comparison.ranking import ranking_of
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.comparison import order_in_words
+from fgbaseline.reports.phrases.comparison import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.bench import METRICS
 from fgbaseline.reports.tables import latex, markdown
-from fgbaseline.reports.tables.bench_statistics import METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import answer, as_dict, run_of, scene
@@ -63,12 +63,12 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
     for name in taking_part:
         assert ranking.rmse(name) == pytest.approx(over_common[name], rel=1e-9)
     assert [over_common[name] for name in ranking.rivals] == pytest.approx(sorted(over_common.values()))
-    words = order_in_words(ranking.rivals[0], ranking.behind)
+    words = significance_sentences(ranking.rivals[0], ranking.behind)
     assert "\N{MINUS SIGN}" not in "".join(words).split("[")[0]
     for name, d in ranking.behind.items():
         assert d.value == pytest.approx(over_common[name] - over_common[ranking.rivals[0]], abs=1e-12)
         assert d.value >= 0.0
-        farther = any(s.startswith("Farther") and f"{name} (" in s for s in words)
+        farther = any(s.startswith("Larger position RMSE than") and f"{name} (" in s for s in words)
         assert farther == d.settled
         assert not farther or (d.value > 0.0 and d.low > 0.0)
 
@@ -108,9 +108,9 @@ def test_an_estimate_that_lost_track_half_way_is_ranked_over_what_both_have(lost
     assert list(result.ranking.rivals) == ["whole", "lost"]
     assert result.results["whole"].rmse > result.results["lost"].rmse
     said = " ".join(result.verdict)
-    assert "Over the 100 moments that all have, whole with" in said
-    assert "Farther than whole, by paired bootstrap of their RMSE: lost (" in said
-    assert "100 moments (49.7 % of gt's time)" in said
+    assert "Position RMSE against gt over the 100 poses that all have: whole " in said
+    assert "Larger position RMSE than whole, by paired bootstrap: lost (" in said
+    assert "100 poses (49.7 % of gt's time)" in said
     estimates = result.summary.estimates
     assert (estimates["whole"].rank, estimates["lost"].rank) == (1, 2)
     assert (estimates["whole"].coverage, estimates["lost"].coverage) == pytest.approx((1.0, 99 / 199))
@@ -120,15 +120,15 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", align="none")
     result.write(lost / "out")
     for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
-        assert "share of the reference's time" in text.replace("&#39;", "'")
-        assert "0.497" in text
+        assert "of the time, %" in text.replace("\\%", "%")
+        assert "49.7" in text
         assert "RMSE over common moments, m" in text
     bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
-    assert len(bold) == 1  # what each has alone says nothing of who is best
+    assert len(bold) == 1  # frames that one estimate alone has do not decide the ranking
     assert "common moments" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
         rows = {row["estimate"]: row for row in csv.DictReader(file)}
-    assert float(rows["lost"]["coverage: share of the reference's time"]) == pytest.approx(99 / 199)
+    assert float(rows["lost"]["coverage: of the time, %"]) == pytest.approx(100 * 99 / 199)
     assert json.loads((lost / "out" / "comparison.json").read_text())["estimates"]["lost"]["rank"] == 2
 
 
@@ -136,8 +136,8 @@ def test_estimates_without_a_moment_in_common_are_not_ranked(lost: Path) -> None
     t, poses = 0.1 * np.arange(T), path()
     late = Trajectory(t[T // 2 :], off(poses, 0.1, 4)[T // 2 :], "late")
     result = compare(lost / "gt.tum", lost / "lost.tum", late, align="none")
-    assert any("Not ranked, since they do not have enough moments in common" in s for s in result.verdict)
-    assert not any(s.startswith(("Nearest", "Farther", "This recording does not settle")) for s in result.verdict)
+    assert any("Not ranked, too few poses in common: " in s for s in result.verdict)
+    assert not any(s.startswith(("Position RMSE against", "Larger", "No significant")) for s in result.verdict)
     assert {e.rank for e in result.summary.estimates.values()} == {None}
 
 
@@ -146,8 +146,8 @@ def test_one_with_next_to_no_moments_takes_none_from_the_others(lost: Path) -> N
     few = Trajectory(t[:3], poses[:3], "few")
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", few, align="none")
     assert result.ranking.moments == T // 2
-    assert any(s == "Not ranked, since it has too few moments of gt: few." for s in result.verdict)
-    assert result.verdict[0].startswith("Too little to judge few by: 3 of its 3 poses have a partner in gt")
+    assert any(s == "Not ranked, too few poses in common with gt: few." for s in result.verdict)
+    assert result.verdict[0].startswith("Too little data to evaluate few: 3 of its 3 poses are paired with gt")
 
 
 def test_a_run_ranks_over_the_frames_that_all_estimators_have() -> None:
@@ -165,8 +165,9 @@ def test_a_run_ranks_over_the_frames_that_all_estimators_have() -> None:
     assert estimators["ekf"]["divergence_common"]["rmse"] > estimators["dead-reckoning"]["divergence_common"]["rmse"]
     assert {e["divergence_common"]["frames"] for e in estimators.values()} == {problem.n_frames // 2}
     said = verdict(run)
-    assert any(s.startswith("Nearest to isam2 is dead-reckoning") for s in said)
-    assert any(f"over the {problem.n_frames // 2} frames that all have" in s and "ekf 49.2 %" in s for s in said)
+    assert any(s.startswith("Divergence from isam2") and ": dead-reckoning " in s for s in said)
+    assert any("ekf 49.2 %" in s for s in said)
+    assert f"They are ranked over the {problem.n_frames // 2} frames that all have." in said
     table = main_table(run, estimators)
     assert {"of the time, %", "RMSE over common frames, m"} <= {c.heading for c in table.columns}
     whole = main_table(run_of(problem, answer(problem, "ekf"), answer(problem, "isam2")), estimators)
@@ -185,9 +186,14 @@ def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_
 
 def test_a_bench_says_of_the_best_that_others_with_fewer_answers_are_below_it() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2]})
-    said = winner("town", figures.monte_carlo_ranking(errors).reset_index(), METRICS[0], frozenset())
-    assert said.startswith("town: the error to truth of sound is")
-    assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound there)" in said
+    said = winner(
+        "town",
+        figures.monte_carlo_ranking(errors).reset_index(),
+        next(m for m in METRICS if m.name == "ate"),
+        frozenset(),
+    )
+    assert said.startswith("town: ATE sound ")
+    assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound in these)" in said
 
 
 def test_case_25_one_estimate_lost_track_half_way() -> None:
@@ -199,4 +205,4 @@ def test_case_25_one_estimate_lost_track_half_way() -> None:
         "whole": 0.0891, "lost": 0.1323
     }  # fmt: skip
     assert result.ranking.rivals == ("whole", "lost")
-    assert any("Farther than whole" in s and "lost (0.0432 m" in s for s in result.verdict)
+    assert any("Larger position RMSE than whole" in s and "lost (0.0432 m" in s for s in result.verdict)

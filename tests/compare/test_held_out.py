@@ -1,4 +1,4 @@
-"""Held-out tracks rank a path below the true one where it is wrong, and say so only where the data can tell."""
+"""Held-out tracks rank a wrong path below the true one, and report a tie where the data do not decide."""
 
 from dataclasses import replace
 from functools import cache

@@ -28,7 +28,7 @@ def test_a_small_difference_that_is_always_there_is_told_and_one_that_varies_is_
     assert table.index[0] == "best"
     assert table["tied"].to_dict() == {"best": True, "like": True, "worse": False}
     assert table.loc["worse", "behind"] == pytest.approx(0.02 * hard.mean())
-    # Means alone, run by run unpaired, could not tell: their intervals overlap by far.
+    # Unpaired means do not decide: their intervals overlap by far.
     assert table.loc["worse", "low"] < table.loc["best", "mean"]
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fgbaseline import compare as figures
 from fgbaseline import data
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..conftest import RECORDINGS
 
@@ -118,4 +118,4 @@ def test_case_30_covariances_under_an_alignment(kind: str | None) -> None:
     found = result.summary.estimates["right_order"].nees
     assert found is not None
     assert found.mean == pytest.approx(5.44, abs=0.01)
-    assert any("mean NEES 5.44 over 399 poses" in sentence for sentence in result.verdict)
+    assert any("(NEES 5.44 over 399 poses" in sentence for sentence in result.verdict)

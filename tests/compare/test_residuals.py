@@ -86,9 +86,9 @@ def test_a_jump_is_not_explained_by_a_motion() -> None:
 
 
 def test_residuals_of_the_true_path_follow_chi_square_and_others_do_not() -> None:
-    told = {sigma: plain_problem(recording(), pixel_sigma=sigma) for sigma in (0.5, 0.25)}
+    assumed = {sigma: plain_problem(recording(), pixel_sigma=sigma) for sigma in (0.5, 0.25)}
     summary = {}
-    for sigma, problem in told.items():
+    for sigma, problem in assumed.items():
         estimate = true_answer(problem)
         summary[sigma] = compare.whitened_summary(problem, compare.reprojection(problem.sequence, estimate))
     assert summary[0.5]["ratio"] == pytest.approx(1.0, abs=0.06)

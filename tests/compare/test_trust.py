@@ -32,7 +32,7 @@ def reference() -> Estimate:
     return smoother.isam2(clean())
 
 
-def told(pixel: float = 0.5, linear: float = 0.1, angular: float = 0.01) -> Problem:
+def assumed_noise(pixel: float = 0.5, linear: float = 0.1, angular: float = 0.01) -> Problem:
     """The same drive with another noise model, without a mask that would hide its consequences."""
     noise = diagnosis.NoiseSettings(pixel=pixel, linear_velocity=linear, angular_velocity=angular)
     problem = diagnosis.calibrated(clean().sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
@@ -85,7 +85,7 @@ def test_an_infinite_residual_has_an_infinite_scale_and_a_missing_one_none() -> 
 
 @pytest.mark.parametrize("kernel", [None, data.HuberKernel()])
 def test_pixel_noise_told_four_times_too_small_is_not_trusted(kernel: data.HuberKernel | None) -> None:
-    problem = replace(told(pixel=0.5 / 4), kernel=kernel)
+    problem = replace(assumed_noise(pixel=0.5 / 4), kernel=kernel)
     verdict = compare.trust(problem, smoother.isam2(problem))
     assert verdict.verdict is Verdict.UNTRUSTED
     assert "pixel residual RMS" in verdict.reasons[0]
@@ -257,7 +257,7 @@ def true_answer(problem: Problem) -> Estimate:
 
 
 def test_six_observations_are_enough_for_a_frame_and_five_are_not() -> None:
-    for n, weak in ((6, "0.0%"), (5, "100.0%")):
+    for n, weak in ((6, "0.0 %"), (5, "100.0 %")):
         problem = plain_problem(Scene(n_points=n).sequence())
         reasons = compare.trust(problem, true_answer(problem)).reasons
         assert f"{weak} of the frames have fewer than 6 observations" in reasons
@@ -268,7 +268,7 @@ def test_intervals_that_nothing_ties_are_told() -> None:
     answer = true_answer(problem)
     frame = problem.sequence.observations.frame
     said = (
-        "no landmark ties what lies on both sides: only the velocities tell the motion there, and a jump would not show"
+        "no landmark ties what lies on both sides: only the velocities give the motion there, and a jump would not show"
     )
     for seen, untied in ((3, 7), (8, 2), (10, 0)):
         reasons = compare.trust(problem, replace(answer, used=answer.used & (frame < seen))).reasons
@@ -289,9 +289,9 @@ def test_what_was_found_is_said_in_figures() -> None:
     assert set(compare.trust(problem, reference()).reasons) == {
         f"normalized pixel residual RMS {pixel:.2g} (expected 1, robust)",
         f"normalized motion residual RMS {motion:.2g} (expected at most 1)",
-        f"it used {share:.0%} of the observations, far points aside",
-        "0.0% of the frames have fewer than 6 observations",
-        "the observations of 0.0% of the frames were given up",
+        f"it used {100.0 * share:.0f} % of the observations, far points aside",
+        "0.0 % of the frames have fewer than 6 observations",
+        "the observations of 0.0 % of the frames were given up",
         "the recording was not diagnosed: its noise is assumed",
         "not compared with a batch solution",
     }

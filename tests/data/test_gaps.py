@@ -7,7 +7,7 @@ import pytest
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data.motion import Shift
-from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance, gaps, random_walk_density
+from fgbaseline.data.problem.velocity_gaps import gaps, inflate_gap_covariance, random_walk_density
 from fgbaseline.geometry import se3
 
 from ..builders.hostile import gap

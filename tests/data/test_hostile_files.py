@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from fgbaseline import data, diagnosis
 from fgbaseline.data.problem_export import read_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.comparing.run_folder import read_run_folder
+from fgbaseline.reports.comparison.reference_run import read_reference_run
 from fgbaseline.reports.results.reader import read_measured, value_of
 
 from ..builders.readers import Reader, archive, course_arrays, npy, npz, problem_words, readers
@@ -124,7 +124,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
 NESTED = b"[" * 100_000
 DEEP = {
     "summary of a check": (read_measured, "summary.json"),
-    "summary of a run": (lambda path: read_run_folder(path.parent), "summary.json"),
+    "summary of a run": (lambda path: read_reference_run(path.parent), "summary.json"),
     "words of a problem": (lambda path: read_problem(path.parent), "problem.json"),
 }
 
@@ -150,7 +150,7 @@ def test_a_run_whose_reference_has_no_name_is_refused(tmp_path: Path) -> None:
     del words["reference"]["name"]
     (tmp_path / "summary.json").write_text(json.dumps(words))
     with pytest.raises(InputError, match="it is not the summary of a run"):
-        read_run_folder(tmp_path)
+        read_reference_run(tmp_path)
 
 
 def test_an_integer_too_large_for_a_double_is_no_number(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The course files and our own npz: what is written comes back, and what is recorded is told apart by its keys."""
+"""The course files and our own npz: written recordings are read back, and the form is detected from the keys."""
 
 import contextlib
 import io
@@ -266,7 +266,7 @@ BAD = {
     "K not finite": (lambda a: a.update(K=changed(a["K"], (0, 2), np.nan)), "K: .*not finite"),
     "K of 3x4": (lambda a: a.update(K=np.ones((3, 4))), r"K: expected shape \(3, 3\), got \(3, 4\)"),
     "negative focal length": (lambda a: a.update(K=changed(a["K"], (1, 1), -3.0)), r"K\[1, 1\]: expected a positive"),
-    "two baselines": (lambda a: a.update(b=np.ones(2)), r"b: expected one number, the baseline in metres, got shape"),
+    "two baselines": (lambda a: a.update(b=np.ones(2)), r"b: expected one number, the baseline in meters, got shape"),
     "no baseline": (lambda a: a.update(b=np.array(0.0)), r"b: expected a positive number, .* got 0.0"),
     "NaN feature": (
         lambda a: a.update(features=changed(a["features"], (2, 4, 3), np.nan)),

@@ -34,8 +34,8 @@ def test_there_may_be_nothing_to_share() -> None:
 
 @FORKS
 def test_a_fork_works_while_this_process_does_something_else() -> None:
-    came, told = os.pipe()
-    with background_map(lambda _: os.write(told, b"!"), 1, 2) as join:
+    came, write_end = os.pipe()
+    with background_map(lambda _: os.write(write_end, b"!"), 1, 2) as join:
         assert os.read(came, 1) == b"!"
         assert join() == [1]
 

@@ -1,4 +1,4 @@
-"""Trajectory files of every form: told apart by content, what was written comes back, what is wrong names its line."""
+"""Trajectory files: the form is detected from the content, written files are read back, errors name their line."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Errors that last, disparities that are off, intervals without sight, and delays that no turn tells."""
+"""Time-correlated errors, disparity offsets, visual dropouts, and delays of recordings without turns."""
 
 from dataclasses import replace
 
@@ -33,9 +33,9 @@ def test_an_offset_of_the_disparities_is_found_told_and_taken_off() -> None:
     offset, deviation = diagnosis.disparity_offset
     assert offset == pytest.approx(0.4, abs=4.0 * deviation)
     assert deviation < 0.06
-    told = [finding for finding in findings_of(diagnosis) if finding.code == "disparity_offset"]
-    assert len(told) == 1
-    assert "too small" in told[0].sentence
+    reported = [finding for finding in findings_of(diagnosis) if finding.code == "disparity_offset"]
+    assert len(reported) == 1
+    assert "too small" in reported[0].sentence
     problem = calibrated(diagnosis.sequence, diagnosis=diagnosis)
     row = problem.sequence.observations.pixel[:, 2]
     assert np.mean(row) == pytest.approx(np.mean(sequence.observations.pixel[:, 2]), abs=4.0 * deviation)

@@ -42,8 +42,8 @@ def strict(text: str) -> dict[str, Any]:
 def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], cwd=tmp_path)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert "Nothing wrong was found" in result.stdout
-    assert "Noise (one sigma)" in result.stdout
+    assert "No fault detected" in result.stdout
+    assert "Noise (1-sigma)" in result.stdout
     assert everything_in(tmp_path) == set()
 
 
@@ -77,12 +77,12 @@ def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: 
 
 
 def test_what_cannot_be_told_ends_with_two_and_a_reason(files: dict[str, Path], tmp_path: Path) -> None:
-    told = fgbaseline("diagnose", files["blind"], cwd=tmp_path)
-    assert told.returncode == 2
-    assert "the cameras tell the motion of only" in told.stdout
-    assert "Traceback" not in told.stderr
+    finished = fgbaseline("diagnose", files["blind"], cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "the cameras determine the motion of only" in finished.stdout
+    assert "Traceback" not in finished.stderr
     report = strict(fgbaseline("diagnose", files["blind"], "--json", cwd=tmp_path).stdout)
-    assert "the cameras tell the motion of only" in report["cannot_tell"]
+    assert "the cameras determine the motion of only" in report["cannot_tell"]
     assert report["sigma"]["pixel"] is None
     assert "sigma.pixel" in report["notes"]
     assert report["gyro_bias"] == [None, None, None]

@@ -58,8 +58,8 @@ def test_a_car_shows_only_which_axis_is_forward() -> None:
     d = diagnosed(duration=40.0, seed=3, angular_axes="x,-y,-z", linear_axes="-y,x,z")
     assert d.linear.name.split(",")[0] == "-y"
     assert d.linear.seen == (True, False, False)
-    told = " ".join(not_identifiable(d))
-    assert "its -y is along x of imu_T_cam, not which of its components are along y and z" in told
+    sentences = " ".join(not_identifiable(d))
+    assert "its -y is along x of imu_T_cam, not which of its components are along y and z" in sentences
     assert codes(d) == ["angular_axes", "linear_axes"]
 
 
@@ -68,7 +68,7 @@ def test_a_wrong_speed_is_found_and_left_alone() -> None:
     (finding,) = findings_of(d)
     assert finding.code == "velocity_scale"
     assert finding.before == pytest.approx(1.06, abs=0.01)
-    assert "which of the two is wrong the recording cannot tell" in finding.sentence
+    assert "the recording does not show which of the two is wrong" in finding.sentence
     assert np.array_equal(repair(d, MaskSettings()).sequence.linear_velocity, d.sequence.linear_velocity)
 
 

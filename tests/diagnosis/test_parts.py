@@ -229,8 +229,8 @@ def test_a_track_that_jumps_is_cut_and_both_pieces_take_part() -> None:
     other = (o.landmark == 5) & (o.frame >= 7)
     pixel[late] = pixel[other]
     jumped = replace(scene, observations=Observations(o.frame.copy(), o.landmark.copy(), pixel))
-    nobody = np.zeros(len(o), dtype=np.bool_)
-    split = split_tracks(jumped, scene.truth.world_T_imu, MaskSettings(), nobody)
+    none = np.zeros(len(o), dtype=np.bool_)
+    split = split_tracks(jumped, scene.truth.world_T_imu, MaskSettings(), none)
     assert split.n_landmarks == scene.n_landmarks + 1
     assert (split.excluded == Excluded.NO).all()
     assert (split.landmark[late] == scene.n_landmarks).all()

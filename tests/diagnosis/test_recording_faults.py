@@ -21,7 +21,7 @@ from fgbaseline.data.time_unit import unit_of_stamps
 from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
 from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
-from fgbaseline.reports.run.problem import RunSettings, pose_problem
+from fgbaseline.reports.run.problem import RunSettings, build_problem
 
 from ..builders.commands import fgbaseline
 from ..diagnosis.test_real_recordings import UTIAS
@@ -97,8 +97,8 @@ def test_a_field_in_another_unit_gives_the_same_problem_and_its_factor(path: str
 def test_where_nothing_is_repaired_another_unit_is_refused(preset: str, what: str, factor: float) -> None:
     settings = RunSettings(preset="documented") if preset == "documented" else RunSettings(as_recorded=True)
     with pytest.raises(InputError, match="times too large"):
-        pose_problem(scaled(drive(), what, factor), settings)
-    pose_problem(drive(), settings)
+        build_problem(scaled(drive(), what, factor), settings)
+    build_problem(drive(), settings)
 
 
 @pytest.mark.parametrize("unit", [TimeUnit.MS, TimeUnit.US, TimeUnit.NS])
@@ -193,7 +193,7 @@ def test_swapped_cameras_and_landmarks_seen_once_are_refused_by_their_cause(pres
     ):
         assert cause in diagnose(broken).cannot_tell
         with pytest.raises(InputError, match=cause):
-            pose_problem(broken, settings)
+            build_problem(broken, settings)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ BIAS = (0.02, -0.01, 0.015)
 
 @cache
 def faulty() -> Diagnosis:
-    """Of a hand-held recording with other axes, a bias and a delay, all of which it tells."""
+    """Hand-held recording with other axes, a bias and a delay, all of which are identifiable."""
     return diagnose(
         simulate(
             Simulation(
@@ -59,10 +59,10 @@ def file_with(tmp_path: Path, text: str) -> Path:
     ],
 )
 def test_what_cannot_be_is_told_with_its_key_path(tmp_path: Path, text: str, place: str, said: str) -> None:
-    with pytest.raises(InputError) as told:
+    with pytest.raises(InputError) as raised:
         read_repairs(file_with(tmp_path, text))
-    assert f"repairs.toml: {place}" in str(told.value)
-    assert said in str(told.value)
+    assert f"repairs.toml: {place}" in str(raised.value)
+    assert said in str(raised.value)
 
 
 def test_what_is_set_by_hand_is_what_the_problem_has() -> None:

@@ -178,12 +178,12 @@ def test_the_landmarks_of_dead_reckoning_are_the_average_back_projections() -> N
 
 
 def test_progress_is_told_after_every_frame_and_time_is_kept() -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     problem = matched(drive())
     for estimator in (ekf.ekf, ekf.landmark_mapping):
-        told.clear()
-        estimate = estimator(problem, lambda done, total: told.append((done, total)))
-        assert told == [(k + 1, 50) for k in range(50)]
+        calls.clear()
+        estimate = estimator(problem, lambda done, total: calls.append((done, total)))
+        assert calls == [(k + 1, 50) for k in range(50)]
         assert estimate.seconds.shape == (50,)
         assert np.all(estimate.seconds >= 0.0)
         assert estimate.seconds_total >= estimate.seconds.sum() > 0.0

@@ -27,16 +27,16 @@ def problem() -> Problem:
 
 @pytest.mark.parametrize("name", OURS)
 def test_it_has_its_name_the_time_of_each_frame_and_tells_how_far_it_is(name: str, problem: Problem) -> None:
-    told: list[tuple[int, int]] = []
-    estimate = OURS[name](problem, lambda done, total: told.append((done, total)))
+    calls: list[tuple[int, int]] = []
+    estimate = OURS[name](problem, lambda done, total: calls.append((done, total)))
     frames = problem.n_frames
     assert estimate.name == name
     assert estimate.seconds.shape == (frames,)
     assert (estimate.seconds >= 0.0).all()
     assert estimate.seconds_total >= estimate.seconds.sum()
-    assert told[-1] == (frames, frames)
-    assert all(before[0] < after[0] for before, after in pairwise(told))
-    assert {total for _, total in told} == {frames}
+    assert calls[-1] == (frames, frames)
+    assert all(before[0] < after[0] for before, after in pairwise(calls))
+    assert {total for _, total in calls} == {frames}
     assert estimate.covariance is not None
     assert estimate.covariance.shape == (frames, 6, 6)
     assert estimate.used.shape == problem.excluded.shape

@@ -243,13 +243,13 @@ def test_a_gate_rejects_wrong_matches_and_counts_them() -> None:
     misplaced = np.isin(landmark, landmark[wrong & first])
     assert rejected[wrong & ~first & ~misplaced].mean() > 0.95
     assert rejected[~wrong & ~first & ~misplaced].mean() < 0.02
-    told = Counter[str]()
+    kinds = Counter[str]()
     for event in gated.events:
         if event.landmark is None:
-            told[event.kind] += int(event.reason.split(" of ")[0])
-    assert set(told) == {"outside the gate", "behind the camera"}
-    assert told["outside the gate"] > 0.75 * told.total()
-    assert told.total() == rejected.sum()
+            kinds[event.kind] += int(event.reason.split(" of ")[0])
+    assert set(kinds) == {"outside the gate", "behind the camera"}
+    assert kinds["outside the gate"] > 0.75 * kinds.total()
+    assert kinds.total() == rejected.sum()
     # What is rejected does not pull; the kernel alone lets 60 px pull as hard as 2.5 sigma, frame after frame.
     weighted = ekf.joint_ekf_ungated(problem)
     errors = [np.sqrt(np.mean(position_errors(e, problem.sequence) ** 2)) for e in (gated, weighted)]
@@ -304,10 +304,12 @@ def test_landmarks_at_infinity_take_part_and_are_told(disparity: float) -> None:
     assert estimate.status is Status.OK
     assert np.isfinite(estimate.world_T_imu).all()
     assert estimate.used.mean() > 0.9
-    told = {event.landmark: event.reason for event in estimate.events if event.kind == "landmark never determined"}
-    for j in {0, 1} & set(told):
-        assert "infinity" in told[j]
-    assert {0, 1} <= set(told) | set(estimate.landmarks.index.tolist())
+    undetermined = {
+        event.landmark: event.reason for event in estimate.events if event.kind == "landmark never determined"
+    }
+    for j in {0, 1} & set(undetermined):
+        assert "infinity" in undetermined[j]
+    assert {0, 1} <= set(undetermined) | set(estimate.landmarks.index.tolist())
     assert np.isfinite(estimate.landmarks.position).all()
 
 
@@ -315,8 +317,8 @@ def test_in_world_coordinates_nothing_enters_without_depth() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
     assert not estimate.used[SCENE.observations.landmark < 2].any()
     assert estimate.used[SCENE.observations.landmark >= 2].all()
-    told = [event for event in estimate.events if event.kind == "landmark never determined"]
-    assert [event.landmark for event in told] == [0, 1]
+    undetermined = [event for event in estimate.events if event.kind == "landmark never determined"]
+    assert [event.landmark for event in undetermined] == [0, 1]
     assert estimate.status is Status.OK
 
 
@@ -370,9 +372,9 @@ def test_masked_observations_take_no_part() -> None:
 
 
 def test_progress_is_told_after_every_frame_and_time_is_kept() -> None:
-    told: list[tuple[int, int]] = []
-    estimate = ekf.joint_ekf(matched(drive()), lambda done, total: told.append((done, total)))
-    assert told == [(k + 1, 50) for k in range(50)]
+    calls: list[tuple[int, int]] = []
+    estimate = ekf.joint_ekf(matched(drive()), lambda done, total: calls.append((done, total)))
+    assert calls == [(k + 1, 50) for k in range(50)]
     assert np.all(estimate.seconds > 0.0)
     assert estimate.seconds_total >= estimate.seconds.sum()
 

@@ -1,4 +1,4 @@
-"""Whether the joint filter's covariances tell the truth, on drives whose noise it is told, and what linearization does.
+"""Consistency of the joint filter on drives with known noise, and the effect of its linearization.
 
 `pytest -s tests/ekf/test_joint_ekf_consistency.py` prints the mean NEES (6 if all is right) over 10 seeds.
 """
@@ -73,9 +73,9 @@ def test_every_way_agrees_on_what_is_nearly_linear() -> None:
             sigma_angular=0.0002,
         )
     )
-    told = matched(sequence)  # of 0.1 m/s and 0.01 rad/s
+    assumed = matched(sequence)  # of 0.1 m/s and 0.01 rad/s
     problem = replace(
-        told, kernel=None, pixel_variance=0.02**2, increment_covariance=told.increment_covariance * 0.02**2
+        assumed, kernel=None, pixel_variance=0.02**2, increment_covariance=assumed.increment_covariance * 0.02**2
     )
     answers = [ekf.joint_ekf(problem, settings=how) for how in WAYS.values()]
     for other in answers[1:]:

@@ -51,7 +51,7 @@ def test_a_crowd_ends_and_leaves_a_covariance_that_is_honest(cap: int) -> None:
     estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=cap))
     alone = ekf.joint_ekf(matched(base()))
     assert sigmas(estimate, sequence) < 1.5
-    # The few of the crowd that took part told something.
+    # The few features of the crowd that were used improve the estimate.
     assert estimate.covariance is not None
     assert alone.covariance is not None
     last = HALF + CROWD_FRAMES - 1
@@ -143,9 +143,9 @@ def test_places_go_round_the_image_and_to_the_nearest_of_each_place() -> None:
         return [left, left - disparity, 10.0]
 
     candidates = np.array([row(0, 40.0), row(0, 39.0), row(0, 38.0), row(1, 1.0), row(1, 2.0), row(2, 0.5)])
-    nobody = np.empty((0, 3))
-    np.testing.assert_array_equal(select_features(candidates, nobody, 3), [True, False, False, False, True, True])
-    np.testing.assert_array_equal(select_features(candidates, nobody, 4), [True, True, False, False, True, True])
+    none = np.empty((0, 3))
+    np.testing.assert_array_equal(select_features(candidates, none, 3), [True, False, False, False, True, True])
+    np.testing.assert_array_equal(select_features(candidates, none, 4), [True, True, False, False, True, True])
     # Where some of the first cell are in the state already, others come first.
     inside = np.array([row(0, 5.0), row(0, 6.0)])
     np.testing.assert_array_equal(select_features(candidates, inside, 3), [False, False, False, True, True, True])

@@ -76,11 +76,11 @@ def test_on_noisy_velocities_it_halves_the_error_of_dead_reckoning(recordings: R
 
 @pytest.mark.slow
 def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_textbook(recordings: Recordings) -> None:
-    told = diagnosis.Calibration(noise=diagnosis.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
+    calibration = diagnosis.Calibration(noise=diagnosis.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
     squares = []
     for name in UTIAS:
         sequence = noisy(data.read(recordings(f"utias/{name}.mat")))
-        problem = diagnosis.calibrated(sequence, settings=told)  # the filter is on trial here, not the diagnosis
+        problem = diagnosis.calibrated(sequence, settings=calibration)  # the filter is on trial here, not the diagnosis
         answers = ekf.joint_ekf(problem), ekf.joint_ekf(problem, settings=JointSettings.textbook())
         assert answers[0].status is not Status.FAILED
         squares.append([ate(e, sequence) ** 2 for e in (*answers, ekf.dead_reckoning(problem))])

@@ -1,4 +1,4 @@
-"""What filters record of their innovations is nu^T S^-1 nu, and chi-square where the noise is what they are told."""
+"""The recorded NIS is nu^T S^-1 nu, and chi-square where the assumed noise is the true one."""
 
 from dataclasses import replace
 
@@ -44,19 +44,19 @@ def test_what_is_no_covariance_has_no_norm() -> None:
     assert np.isnan(decoupled_nis(innovation, np.full((6, 6), np.nan)))
 
 
-@pytest.mark.parametrize("told", [1.0, 0.5])
-def test_the_joint_filter_s_innovations_are_chi_square_where_it_knows_its_noise_only(told: float) -> None:
+@pytest.mark.parametrize("assumed", [1.0, 0.5])
+def test_the_joint_filter_s_innovations_are_chi_square_only_with_the_true_noise(assumed: float) -> None:
     total, degrees = 0.0, 0
     for seed in range(8):
         scene = Scene(seed=seed, frames=12)
-        innovations = joint_ekf(plain_problem(scene.sequence(), pixel_sigma=told * scene.sigma_pixel)).innovations
+        innovations = joint_ekf(plain_problem(scene.sequence(), pixel_sigma=assumed * scene.sigma_pixel)).innovations
         assert innovations is not None
         assert np.isnan(innovations.nis[0])  # nothing was known before
         total += np.nansum(innovations.nis)
         degrees += int(innovations.degrees.sum())
     assert degrees == 8 * 11 * 12 * 3
     low, high = chi2.ppf([0.001, 0.999], degrees)
-    assert (low < total < high) == (told == 1.0)
+    assert (low < total < high) == (assumed == 1.0)
 
 
 @pytest.mark.parametrize("estimator", [ekf, joint_ekf])

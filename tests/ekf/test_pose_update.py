@@ -114,7 +114,10 @@ def test_the_printed_covariance_is_the_same_until_rounding_makes_it_indefinite()
     random = np.random.default_rng(5)
     innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
     sigma, weight = covariance_of(random, 0.01), np.ones(8)
-    ours, printed = pose_posterior(sigma, innovation, weight).covariance, standard_form_covariance(sigma, innovation, weight)
+    ours, printed = (
+        pose_posterior(sigma, innovation, weight).covariance,
+        standard_form_covariance(sigma, innovation, weight),
+    )
     np.testing.assert_allclose(printed, ours, rtol=0.0, atol=1e-9 * sigma.max())
     innovation.jacobian[0] *= 1e8
     ours = pose_posterior(sigma, innovation, weight).covariance

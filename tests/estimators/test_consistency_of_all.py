@@ -1,4 +1,4 @@
-"""Every estimator that is told the noise knows its errors; benchmarks/consistency.py asks it of 50 longer drives."""
+"""Every estimator with the true noise is consistent; benchmarks/consistency.py tests it on 50 longer drives."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +17,7 @@ SEEDS = 10
 FRAMES = np.arange(5, 70, 7)
 
 
-def told(seed: int) -> Problem:
+def true_noise_problem(seed: int) -> Problem:
     """A drive of 7 s with its own noise, every observation taking part and none softened: there is no wrong match."""
     sequence = drive("town", seconds=7.0, features_per_frame=15.0, seed=seed)
     problem = matched(sequence)
@@ -28,13 +28,13 @@ def told(seed: int) -> Problem:
 @cache
 def smoothed(seed: int) -> dict[str, Estimate]:
     """The three answers of the smoothers."""
-    batch = smoother.batch(told(seed))
+    batch = smoother.batch(true_noise_problem(seed))
     return {"batch": batch, **batch.by_products}
 
 
 @cache
 def truth(seed: int) -> Truth:
-    known = told(seed).sequence.truth
+    known = true_noise_problem(seed).sequence.truth
     assert known is not None
     return known
 
@@ -43,8 +43,8 @@ ESTIMATORS: dict[str, Callable[[int], Estimate]] = {
     "batch": lambda seed: smoothed(seed)["batch"],
     "isam2": lambda seed: smoothed(seed)["isam2"],
     "isam2-online": lambda seed: smoothed(seed)["isam2-online"],
-    "joint-ekf": lambda seed: ekf.joint_ekf(told(seed)),
-    "joint-ekf-first-estimate": lambda seed: ekf.joint_ekf_first_estimate(told(seed)),
+    "joint-ekf": lambda seed: ekf.joint_ekf(true_noise_problem(seed)),
+    "joint-ekf-first-estimate": lambda seed: ekf.joint_ekf_first_estimate(true_noise_problem(seed)),
 }
 
 
@@ -61,7 +61,7 @@ def test_the_mean_nees_of_the_pose_is_that_of_an_estimator_that_knows_its_errors
 def test_an_estimator_that_is_told_half_the_noise_is_found_out() -> None:
     runs = []
     for seed in range(SEEDS):
-        problem = told(seed)
+        problem = true_noise_problem(seed)
         boastful = replace(
             problem,
             pixel_variance=problem.pixel_variance / 4.0,

@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def without_timings(path: Path) -> bytes:
-    """The bytes of a table but for the columns and rows that tell of time."""
+    """Bytes of a table without the columns and rows on time."""
     if path.suffix != ".csv":
         return path.read_bytes()
     rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
@@ -49,7 +49,7 @@ def without_timings(path: Path) -> bytes:
 
 
 def timeless(words: Any) -> Any:
-    """JSON without what tells of time."""
+    """JSON without times."""
     if isinstance(words, dict):
         return {key: timeless(value) for key, value in words.items() if key not in (*TIMINGS, "machine", "created")}
     return [timeless(value) for value in words] if isinstance(words, list) else words

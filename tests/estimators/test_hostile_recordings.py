@@ -77,9 +77,9 @@ def test_the_report_is_written_by_the_command_and_diagnose_ends_well(tmp_path: P
     assert run.returncode == int(failed), run.stderr
     assert "Traceback" not in run.stderr
     assert (tmp_path / "out" / "report.html").is_file()
-    told = fgbaseline("diagnose", "drive.npz", "--write-repairs", "repairs.toml", cwd=tmp_path)
-    assert told.returncode == (2 if failed else 1), told.stderr
-    assert "Traceback" not in told.stderr
+    finished = fgbaseline("diagnose", "drive.npz", "--write-repairs", "repairs.toml", cwd=tmp_path)
+    assert finished.returncode == (2 if failed else 1), finished.stderr
+    assert "Traceback" not in finished.stderr
     assert read_repairs(tmp_path / "repairs.toml")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fgbaseline import data, ekf
 from fgbaseline.data import read_problem
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import fgbaseline
 from ..builders.synthetic import drive
@@ -126,8 +126,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: Path) -> None:
     data.write_npz(drive(features_per_frame=20.0), tmp_path / "drive.npz")
-    told = fgbaseline("export", "drive.npz", "--out", "problem", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
+    finished = fgbaseline("export", "drive.npz", "--out", "problem", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
     (tmp_path / "filter.py").write_text(STANDALONE)
     command = [sys.executable, "-I", "filter.py", "problem", "mine.tum", "mine.csv"]
     solved = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -143,9 +143,9 @@ def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: P
         landmarks=[tmp_path / "mine.csv"],
     )
     row = result.table.loc["mine"]
-    assert row["absolute error: largest, m"] < 1e-9
-    assert row["absolute error: rotation RMSE, °"] < 1e-6
-    assert row["reprojection, median px: its landmarks"] < 10.0
+    assert row["ATE: max, m"] < 1e-9
+    assert row["ATE: rotation RMSE, °"] < 1e-6
+    assert row["reprojection error: median, px"] < 10.0
     reference = result.reference_pixels
     mine = result.results["mine"].pixels
     assert mine is not None
@@ -162,8 +162,8 @@ def test_a_registered_filter_has_its_column_beside_ours(installed: Path, tmp_pat
     def lent() -> None:
         sys.path.insert(0, str(installed))
 
-    told = fgbaseline("run", "drive.npz", *asked, cwd=tmp_path, drawing=False, first=lent)
-    assert told.returncode == 1, told.stderr  # the broken one failed, and stopped nobody
+    finished = fgbaseline("run", "drive.npz", *asked, cwd=tmp_path, drawing=False, first=lent)
+    assert finished.returncode == 1, finished.stderr  # the broken one failed, and stopped no other
     summary = json.loads((tmp_path / "run/summary.json").read_text())["estimators"]
     assert summary["their-filter"]["status"] == "ok"
     assert summary["their-filter"]["divergence"]["max"] < 1e-9
@@ -177,7 +177,7 @@ def test_a_registered_filter_has_its_column_beside_ours(installed: Path, tmp_pat
 
 def test_without_the_package_its_name_is_unknown(tmp_path: Path) -> None:
     data.write_npz(drive(), tmp_path / "drive.npz")
-    told = fgbaseline("run", "drive.npz", "--estimators", "their-filter", "--out", "run", cwd=tmp_path)
-    assert told.returncode == 2
-    assert "'their-filter'" in told.stderr
+    finished = fgbaseline("run", "drive.npz", "--estimators", "their-filter", "--out", "run", cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "'their-filter'" in finished.stderr
     assert not (tmp_path / "run").exists()

@@ -39,7 +39,7 @@ def test_the_github_workflow_is_complete() -> None:
     ]
     assert all(re.fullmatch(r"actions/[\w-]+@v\d+", name) for name in uses)
     after = STEPS[[step.get("name") for step in STEPS].index("Check") + 1 :]
-    assert all("!cancelled()" in step["if"] for step in after)  # told also where a limit falls short
+    assert all("!cancelled()" in step["if"] for step in after)  # reported also where a limit falls short
     assert after[-1]["with"]["path"] == "out"
 
 

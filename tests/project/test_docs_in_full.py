@@ -196,11 +196,8 @@ def scheduler() -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FullPlace]:
-    folder = tmp_path_factory.mktemp("docs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        yield FullPlace(folder)
+def place(docs_folder: Path) -> FullPlace:
+    return FullPlace(docs_folder)
 
 
 STEPS = [

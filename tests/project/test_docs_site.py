@@ -23,7 +23,7 @@ API = {
     "ekf": ("ekf",),
     "smoother": ("smoother",),
     "compare": ("compare",),
-    "reports": ("reports.comparing", "reports.checking", "reports.figures"),
+    "reports": ("reports.comparison", "reports.accuracy_check", "reports.figures"),
 }
 """page -> the packages on it"""
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
@@ -36,9 +36,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     env = environment(NO_MKDOCS_2_WARNING="1")
     result = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
-    told = result.stdout + result.stderr
-    assert result.returncode == 0, told
-    assert "WARNING" not in told
+    output = result.stdout + result.stderr
+    assert result.returncode == 0, output
+    assert "WARNING" not in output
     return folder
 
 

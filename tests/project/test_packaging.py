@@ -1,4 +1,4 @@
-"""What is built holds all of ours and nothing else, installs into an empty environment, and hides nobody's modules."""
+"""The wheel has all our packages and nothing else, installs into an empty environment, and shadows no other module."""
 
 import shutil
 import subprocess
@@ -140,8 +140,8 @@ def use_beside_the_users_own_modules(env: Environment, folder: Path, *, with_a_r
     first = {"PYTHONPATH": str(folder)}  # the user's folder before everything else
     run(command, "simulate", "drive.npz", *few, cwd=folder, **first)
     if with_a_report:
-        told = run(command, "run", "drive.npz", *dead_reckoning, cwd=folder, **first)
-        assert "The report is in out/report.html" in told
+        printed = run(command, "run", "drive.npz", *dead_reckoning, cwd=folder, **first)
+        assert "The report is in out/report.html" in printed
     for line in run(env.python, "-c", BOTH, cwd=folder).splitlines():
         assert Path(line).is_relative_to(env.packages)
     for name in ("ekf.py", "compare.py", "data/__init__.py"):

@@ -14,19 +14,18 @@ from rich.progress import Progress
 
 from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.reports.bench.executors import Processes, outcomes
+from fgbaseline.reports.bench.executors import outcomes, processes
 from fgbaseline.reports.bench.job import Planned
-from fgbaseline.reports.bench.page import render
 from fgbaseline.reports.bench.plan import plan
-from fgbaseline.reports.bench.progress_events import BarBoard, FileChannel, ProgressEvent, duration
-from fgbaseline.reports.bench.report import collected
-from fgbaseline.reports.bench.run_cache import opened
+from fgbaseline.reports.bench.progress import BarDisplay, FileChannel, ProgressEvent, duration
+from fgbaseline.reports.bench.report import collect_results, render
+from fgbaseline.reports.bench.run_cache import open_cache
 from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
 from fgbaseline.reports.phrases.bench import sentences
+from fgbaseline.reports.results import bench as tables
 from fgbaseline.reports.results.bench import Results
-from fgbaseline.reports.tables import bench_statistics as tables
 from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.bench import main_table
 
@@ -87,7 +86,7 @@ def test_a_process_that_dies_and_an_estimator_that_fails_are_rows_and_stop_nothi
     }
     assert "its process died" in runs.loc[("drive duration=1.2", "dying"), "reason"]
     assert "nothing <to> go_by" in runs.loc[("drive duration=1.4", "dying"), "reason"]
-    assert "1 of 3 runs failed altogether" in result.stdout
+    assert "1 of 3 runs failed; the reasons are below" in result.stdout
     assert "dying gave no answer in 1 of 3 runs" in result.stdout
     page = (tmp_path / "out" / "report.html").read_text()
     assert "nothing &lt;to&gt; go_by" in page
@@ -102,9 +101,9 @@ def test_a_recording_that_changes_under_way_is_no_run(tmp_path: Path) -> None:
     suite = 'name = "x"\nestimators = ["dead-reckoning"]\n[[sequence]]\nfiles = "drive.npz"\n'
     (job,) = plan(read_suite(written(tmp_path, suite)), None)
     write_npz(simulate(Simulation(duration=1.0, features_per_frame=5.0, seed=1)), tmp_path / "drive.npz")
-    assert "the file is another than when the bench was planned" in work(job.job, silent).failure
+    assert "the file has changed since the bench was planned" in work(job.job, silent).failure
     (tmp_path / "drive.npz").unlink()
-    assert "there is no such file where this worker runs" in work(job.job, silent).failure
+    assert "there is no such file on the worker's machine" in work(job.job, silent).failure
 
 
 @pytest.fixture(scope="module")
@@ -122,10 +121,10 @@ simulate = {{ duration = 2, features_per_frame = 10 }}
 seeds = {{ count = 3 }}
 """
     planned = plan(read_suite(written(folder, suite)), None)
-    with opened(folder / "out", force=False) as store:
+    with open_cache(folder / "out", force=False) as cache:
         for one in planned:
-            store.keep(work(one.job, silent))
-        return collected(planned, store)
+            cache.store(work(one.job, silent))
+        return collect_results(planned, cache)
 
 
 def test_the_case_table_is_the_mean_of_its_runs(results: Results) -> None:
@@ -144,7 +143,7 @@ def test_the_case_table_is_the_mean_of_its_runs(results: Results) -> None:
 def test_the_best_is_marked_once_in_every_form(results: Results) -> None:
     grid = main_table(results, with_costs=False)
     headings = [column.heading for column in grid.columns]
-    column = headings.index("error to truth, m")
+    column = headings.index("ATE, m")
     for _, rows in grid.by_group:
         cells = [row.cells[column] for row in rows]
         (best,) = (cell.text for cell in cells if cell.best)
@@ -197,22 +196,22 @@ def test_the_page_is_whole_escaped_and_leads_to_every_run(results: Results) -> N
 
 def test_every_job_is_told_of_and_the_bars_move(results: Results, tmp_path: Path) -> None:
     one: Planned = results.planned[0]
-    with opened(tmp_path / "out", force=False) as store:
+    with open_cache(tmp_path / "out", force=False) as cache:
         seen: list[ProgressEvent] = []
-        (outcome,) = outcomes([one.job], Processes(1, store.folder), seen.extend)
+        (outcome,) = outcomes([one.job], processes(1, cache.folder), seen.extend)
     assert outcome.failure == ""
     assert any(
-        event.key == one.job.key and event.doing in ("reading", "posing the problem", "writing", *results.estimators)
+        event.key == one.job.key and event.doing in ("reading", "building the problem", "writing", *results.estimators)
         for event in seen
     )
     console = Console(file=StringIO(), force_terminal=True, width=120)
     whole, each = Progress(console=console), Progress(console=console)
     said: list[str] = []
-    bars = BarBoard({one.job.key: one}, whole, each, said.append)
-    bars.look([ProgressEvent("1", one.job.key, "isam2", 5, 20), ProgressEvent("2", "", "", 0, 0)])
+    bars = BarDisplay({one.job.key: one}, whole, each, said.append)
+    bars.update([ProgressEvent("1", one.job.key, "isam2", 5, 20), ProgressEvent("2", "", "", 0, 0)])
     assert [task.description for task in each.tasks] == [f"  {one.name}: isam2", "  waiting"]
     assert (each.tasks[0].completed, each.tasks[0].total) == (5, 20)
-    bars.done(Outcome(one.job.key, {}, "no luck", 1.0))
+    bars.finish(Outcome(one.job.key, {}, "no luck", 1.0))
     assert whole.tasks[0].finished
     assert said == [f"{one.name}: failed: no luck"]
 

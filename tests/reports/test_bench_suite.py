@@ -9,7 +9,7 @@ import pytest
 from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.bench import cache_key
+from fgbaseline.reports.bench import job as jobs
 from fgbaseline.reports.bench.job import Planned
 from fgbaseline.reports.bench.plan import plan
 from fgbaseline.reports.bench.suite import read_suite
@@ -41,15 +41,15 @@ def drive(tmp_path: Path) -> Path:
         ('name = "x"\nestimator = ["ekf"]\n' + DRIVE, "there is no key 'estimator'", "did you mean 'estimators'?"),
         ('name = "x"\nestimators = [\n "ekf",\n "kalman",\n]\n' + DRIVE, "estimators[1]", "no 'kalman'; installed are"),
         ('name = "x"\nestimators = ["ekf", "ekf"]\n' + DRIVE, "estimators", "'ekf' is named twice"),
-        (SEQUENCE, "sequence[0]", "give either files or simulate"),
-        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give either files or simulate"),
+        (SEQUENCE, "sequence[0]", "give files or simulate"),
+        ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give files or simulate"),
         (SEQUENCE + 'files = ["drive.npz", "drive_2.npz"]\n', "sequence[0].files[1]", "'drive_2.npz' is no file in"),
         (SEQUENCE + 'files = "kitti/*.mat"\n', "sequence[0].files", "'kitti/*.mat' matches no file in"),
         (SEQUENCE + 'files = "suite.toml"\n', "sequence[0].files", "a text file and no recording"),
-        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "give truth and truth_frame"),
+        ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "truth and truth_frame"),
         ('name = "x"\n' + FILE + 'truth = "poses.txt"\ntruth_frame = "imu"\n', "sequence[0].files[0]", "poses.txt"),
         ('name = "x"\n' + FILE + "seeds = [1, 2]\n", "sequence[0]", "seeds are for simulated drives"),
-        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", "sequence[0]", "seeds names one twice"),
+        ('name = "x"\n' + DRIVE + "seeds = [1, 1]\n", "sequence[0]", "a seed is given twice"),
         ('name = "x"\n' + DRIVE + 'truth = "t.txt"\n', "sequence[0]", "truth is for recordings"),
         (SEQUENCE + 'simulate = { path = "moon" }\n', "sequence[0].simulate.path", 'path = "moon"'),
         (SEQUENCE + "simulate.duration = [1, 0]\n", "sequence[0].simulate.duration", "expected a number above 0"),
@@ -61,14 +61,14 @@ def drive(tmp_path: Path) -> Path:
         (
             'name = "x"\n' + DRIVE + '[sweep]\npreset = "documented"\nnoise = "assumed"\n',
             "sweep.noise",
-            "the calibrated preset alone",
+            "the calibrated preset only",
         ),
-        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', "sweep.landmarks", "the documented preset alone"),
-        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", "sweep.features[1]", "200 is named twice"),
+        ('name = "x"\n' + DRIVE + '[sweep]\nlandmarks = "held"\n', "sweep.landmarks", "the documented preset only"),
+        ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = [200, 200]\n", "sweep.features[1]", "200 is given twice"),
         ('name = "x"\n' + DRIVE + "[sweep]\nfeatures = 0\n", "sweep.features = 0", "change it"),
         ('name = "x"\n' + DRIVE + "[sweep]\nheld_out = 1.0\n", "sweep.held_out = 1.0", "change it"),
         ('name = "x"\n' + DRIVE + DRIVE, "sequence[1]", "'town' is the name of sequence[0] too"),
-        ('name = "a/b"\n' + DRIVE, "name", "without slashes"),
+        ('name = "a/b"\n' + DRIVE, "name", "no slashes"),
     ],
 )
 def test_what_cannot_be_is_told_with_its_key_path(drive: Path, text: str, place: str, said: str) -> None:
@@ -84,7 +84,7 @@ def test_repairs_that_a_preset_would_not_use_are_refused(drive: Path) -> None:
     text = 'name = "x"\n' + FILE + 'repairs = "repairs.toml"\n'
     assert len(planned(drive.parent, text)) == 1
     for sweep, said in (
-        ('preset = ["calibrated", "documented"]', "the documented preset takes a recording as it is"),
+        ('preset = ["calibrated", "documented"]', "the documented preset uses no repairs"),
         ('noise = "assumed"', 'noise = "assumed" takes'),
         ("noise = { pixel = 1.0 }", "noise is set by [sweep] as well"),
     ):
@@ -155,15 +155,15 @@ def test_a_change_to_our_source_makes_it_another_job_and_one_to_the_reports_page
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = {}
-    for room in (*(f"fgbaseline.{name}" for name in cache_key.ROOMS), "fgbaseline.reports"):
+    for room in (*(f"fgbaseline.{name}" for name in jobs.ROOMS), "fgbaseline.reports"):
         rooms[room] = tmp_path / room
         (rooms[room] / "bench").mkdir(parents=True)
         (rooms[room] / "html").mkdir()
-        for name in ("bench/worker.py", "bench/job.py", "bench/cache_key.py", "html/table.py", "filter.py"):
+        for name in ("bench/worker.py", "bench/job.py", "html/table.py", "filter.py"):
             (rooms[room] / name).write_text("x = 1\n")
         (rooms[room] / "figures").mkdir()
-    monkeypatch.setattr(cache_key, "_folder", rooms.__getitem__)
-    code: Callable[[bool], str] = lambda pages: cache_key.code_of.__wrapped__(("ekf",), pages)  # noqa: E731
+    monkeypatch.setattr(jobs, "_folder", rooms.__getitem__)
+    code: Callable[[bool], str] = lambda pages: jobs.code_hash.__wrapped__(("ekf",), pages)  # noqa: E731
     before = code(False), code(True)
     (rooms["fgbaseline.reports"] / "html" / "table.py").write_text("x = 2\n")
     assert code(False) == before[0]

@@ -11,7 +11,7 @@ import pytest
 from fgbaseline.compare import associate
 from fgbaseline.data.formats import read_trajectory
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.comparing import ComparisonReport, compare
+from fgbaseline.reports.comparison import ComparisonReport, compare
 
 from ..builders.commands import fgbaseline
 from ..conftest import RECORDINGS

@@ -8,7 +8,7 @@ import pytest
 from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.command import Outputs, check
+from fgbaseline.reports.accuracy_check.command import Outputs, check
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.tables.check import unit_of
 
@@ -48,7 +48,7 @@ def test_the_command_exits_with_what_it_found(document: Any, code: int, tmp_path
     titles, *rows = result.stdout.splitlines()[1 if code == 2 else 0 :]
     assert titles.split() == ["limit", "estimator", "metric", "value", "bound", "margin", "baseline", "change"]
     assert len(rows) == 4 + {0: 1, 1: 2, 2: 3}[code]
-    said = {0: "All 4 limits hold.", 1: "3 of 4 limits fall short.", 2: "2 of 4 cannot be told."}[code]
+    said = {0: "All 4 limits hold.", 1: "3 of 4 limits fall short.", 2: "2 of 4 limits are undecided."}[code]
     assert rows[-1] == said
     if code == 2:
         assert result.stdout.startswith("The reference, isam2, is untrusted: it | lost <it>.")
@@ -146,7 +146,7 @@ def test_the_json_file_has_every_number_in_full(tmp_path: Path) -> None:
     ("document", "said"),
     [
         (GOOD, "The limit holds."),
-        (UNTRUSTED, "By the figures the limit holds, but the reference is not trusted enough"),
+        (UNTRUSTED, "The limit holds, but the reference is not trusted enough"),
     ],
 )
 def test_a_reference_that_is_not_trusted_keeps_good_figures_from_counting(
@@ -225,7 +225,7 @@ def test_a_baseline_is_not_updated_where_a_limit_falls_short_unless_told(
     write(tmp_path, worse, LIMITS)
     assert held(tmp_path, update=True) == 1
     assert (tmp_path / "baseline.json").read_text() == TEXT
-    assert "1 of 4 limits falls short; mend that, or accept it with --accept-worse" in capsys.readouterr().err
+    assert "1 of 4 limits falls short; correct that, or use --accept-worse" in capsys.readouterr().err
     assert held(tmp_path, update=True, accept_worse=True) == 0
     assert (tmp_path / "baseline.json").read_text() == TEXT.replace("0.33333", "0.9")
     write(tmp_path, summary(isam2=estimator(), ekf=estimator(0.7), joint_ekf=estimator(0.3)), LIMITS)
@@ -248,14 +248,14 @@ def test_no_baseline_comes_from_an_untrusted_reference(accept_worse: bool, tmp_p
 
 def test_no_baseline_holds_what_is_no_number(tmp_path: Path) -> None:
     write(tmp_path, BAD, LIMITS)
-    with pytest.raises(InputError, match=r"joint-ekf has no ate\.rmse to put into a baseline: the estimator failed"):
+    with pytest.raises(InputError, match=r"joint-ekf has no ate\.rmse for the baseline: the estimator failed"):
         held(tmp_path, update=True, accept_worse=True)
     assert not (tmp_path / "baseline.json").exists()
 
 
 def test_a_summary_is_not_overwritten_by_a_baseline(tmp_path: Path) -> None:
     write(tmp_path, GOOD, LIMITS, GOOD)
-    with pytest.raises(InputError, match=r"baseline\.json: this is no baseline but a fgbaseline/summary/1"):
+    with pytest.raises(InputError, match=r"baseline\.json: this is not a baseline but fgbaseline/summary/1"):
         held(tmp_path, update=True)
 
 

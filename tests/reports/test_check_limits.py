@@ -14,8 +14,8 @@ from fgbaseline.compare.limits import Better, Bounds, Outcome, around, rounded
 from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.checking.evaluation import evaluate
-from fgbaseline.reports.checking.limits_file import Limits, read_limits
+from fgbaseline.reports.accuracy_check.evaluation import evaluate
+from fgbaseline.reports.accuracy_check.limits_file import Limits, read_limits
 from fgbaseline.reports.phrases.check import remarks
 from fgbaseline.reports.results.check import Checked, Line
 from fgbaseline.reports.results.reader import read_folder, read_measured
@@ -117,7 +117,7 @@ def test_errors_that_a_figure_leaves_out_are_counted_beside_it(tmp_path: Path) -
     values["ate"]["missing"] = 60
     result = checked(tmp_path, summary(ekf=values), ATE)
     assert only(result).missing == 60
-    assert remarks(result) == [f"ekf, ate.rmse: 60 errors are missing (NaN) and left out ({result.limits}, limit[0])."]
+    assert remarks(result) == [f"ekf, ate.rmse: 60 NaN errors left out ({result.limits}, limit[0])."]
 
 
 def test_a_bound_and_a_baseline_are_two_lines_with_the_change_on_both(tmp_path: Path) -> None:
@@ -199,7 +199,9 @@ def test_a_baseline_that_cannot_be_compared_with_cannot_tell(tmp_path: Path) -> 
     assert "no isam2" in told(summary(ekf=estimator()))
     assert "untrusted" in told(summary("untrusted", isam2=estimator()))
     assert "no run 'town'; it has 'loop'" in told({**new, "sequence": {"name": "loop"}})
-    assert "from batch, this run from isam2" in told({**new, "reference": {"name": "batch", "trust": "trusted"}})
+    assert "the baseline is batch, that of this run isam2" in told(
+        {**new, "reference": {"name": "batch", "trust": "trusted"}}
+    )
     assert "no divergence.rmse" in told(summary(isam2={"status": "ok", "ate": {"rmse": 1.0}}))
     assert "lost its way" in told(summary(isam2=estimator(status="failed")))
 
@@ -254,7 +256,7 @@ def test_trajectories_from_anywhere_are_held_to_limits(
 WRONG = [
     (ATE.replace("ate.rmse", "ate.rsme"), "limit[0].metric", ("ate.rsme", "ate.rmse")),
     (ATE.replace("ate.rmse", "ate"), "limit[0].metric", ('"ate"', "ate.max, ate.rmse")),
-    (ATE.replace("ate.rmse", "status"), "limit[0].metric", ('"status"', "no number")),
+    (ATE.replace("ate.rmse", "status"), "limit[0].metric", ('"status"', "not a number")),
     (ATE.replace("ate.rmse", "events.landmark dropped"), "limit[0].metric", ("events",)),
     (ATE + 'estimators = "jont-*"\n', "limit[0].estimators", ('"jont-*"', "no estimator", "ekf, isam2, joint-ekf")),
     (ATE + 'estimators = ["isam2", "batch"]\n', "limit[0].estimators", ('"batch"', "no estimator")),

@@ -17,9 +17,9 @@ from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
-from fgbaseline.reports.checking.command import Outputs, check
+from fgbaseline.reports.accuracy_check.command import Outputs, check
 from fgbaseline.reports.results.run import summarize
-from fgbaseline.reports.run.problem import MARK, RunSettings, pose_problem
+from fgbaseline.reports.run.problem import MARK, RunSettings, build_problem
 
 from ..builders.commands import fgbaseline
 
@@ -59,7 +59,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Quick:
     alone = {**baseline, "runs": {sequence.name: baseline["runs"][RUN]}}
     (folder / BASELINE.name).write_text(json.dumps(alone))
     estimators = tuple(suite["estimators"])
-    problem = pose_problem(sequence, RunSettings(estimators=estimators))
+    problem = build_problem(sequence, RunSettings(estimators=estimators))
     return Quick(problem, solve_all(problem, estimators), folder)
 
 

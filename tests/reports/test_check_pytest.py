@@ -15,8 +15,8 @@ from fgbaseline.compare import time_coverage
 from fgbaseline.data import Estimate, Status, Trajectory, Truth, write_tum
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
-from fgbaseline.reports.checking import assert_accuracy
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.accuracy_check import assert_accuracy
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import environment
 
@@ -51,7 +51,7 @@ def test_the_figures_are_those_of_evo() -> None:
     assert (values["ate.rmse"], values["ate.max"]) == (pytest.approx(rmse), pytest.approx(largest))
     assert values["coverage"] == 1.0
     for limit in ({"ate": 0.999 * rmse}, {"ate": 1.0, "ate_max": 0.999 * largest}):
-        with pytest.raises(AssertionError, match="not as accurate as asked"):
+        with pytest.raises(AssertionError, match="does not meet its limits"):
             assert_accuracy((STAMPS, estimated()), (STAMPS, true_path()), **limit)
 
 
@@ -71,7 +71,7 @@ def test_the_message_shows_the_table_and_where_the_figure_is(tmp_path: Path) -> 
     with pytest.raises(AssertionError) as error:
         assert_accuracy((STAMPS, estimated()), (STAMPS, true_path()), ate=0.1, divergence=100.0, figure=figure)
     lines = str(error.value).splitlines()
-    assert lines[0] == "estimate is not as accurate as asked, against reference:"
+    assert lines[0] == "estimate does not meet its limits, against reference:"
     assert lines[1].split() == ["limit", "metric", "value", "bound", "margin"]
     assert re.match(r"falls short  ate\.rmse \(m\) +0\.\d+ +<= 0\.1 +-0\.\d+$", lines[2])
     assert re.match(r"holds        divergence\.rmse \(m\) +\d", lines[3])
@@ -122,7 +122,7 @@ def test_coverage_asks_for_no_more_than_the_reference_has() -> None:
 
 def test_what_cannot_be_asked_is_told() -> None:
     truth = (STAMPS, true_path())
-    with pytest.raises(InputError, match=r"nothing is asked; give ate=0\.5"):
+    with pytest.raises(InputError, match=r"there is no limit; give ate=0\.5"):
         assert_accuracy(truth, truth)
     with pytest.raises(InputError, match=r"limit on ate\.rmse is nan"):
         assert_accuracy(truth, truth, ate=float("nan"))

@@ -12,11 +12,11 @@ from fgbaseline import compare as figures
 from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.checking import assert_accuracy
-from fgbaseline.reports.checking.command import Outputs, check
-from fgbaseline.reports.checking.evaluation import evaluate
-from fgbaseline.reports.checking.limits_file import read_limits
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.accuracy_check import assert_accuracy
+from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.accuracy_check.evaluation import evaluate
+from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of
 
@@ -104,15 +104,15 @@ def test_a_run_with_little_truth_cannot_be_told_and_says_so_first(missing: int, 
     for metric in ("ate.rmse", "ate_unaligned.max", "ate_common.rmse"):
         assert judged(document, tmp_path, LIMIT.format(metric)) == code
     assert judged(document, tmp_path, LIMIT.format("divergence.rmse")) == 0
-    assert verdict(run)[0].startswith("Too little truth to judge by") == (code == 2)
-    assert any(sentence.startswith("Against the truth") for sentence in verdict(run)) == (code == 0)
+    assert verdict(run)[0].startswith("Too little ground truth for an ATE") == (code == 2)
+    assert any(sentence.startswith("ATE (") for sentence in verdict(run)) == (code == 0)
 
 
 def test_what_is_too_little_is_said_first_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert judged(compared(3), tmp_path, LIMIT.format("translation.rmse.value")) == 2
     files = Outputs(tmp_path / "c.xml", tmp_path / "c.md", tmp_path / "c.json")
     assert check(tmp_path, tmp_path / "limits.toml", None, files) == 2
-    first = "Too little data to judge translation.rmse.value of mine: it has a sample of 3 over "
+    first = "Too little data for translation.rmse.value of mine: it has a sample of 3 over "
     assert capsys.readouterr().out.startswith(first)
     assert (tmp_path / "c.md").read_text().splitlines()[2].startswith(f"> {first}")
     document = json.loads((tmp_path / "c.json").read_text())
@@ -150,7 +150,7 @@ def test_a_truth_at_one_frame_is_no_truth_for_the_command(tmp_path: Path) -> Non
     (tmp_path / "limits.toml").write_text('reference = "none"\n' + LIMIT.format("ate.rmse"))
     result = fgbaseline("check", "out", "--limits", "limits.toml", cwd=tmp_path)
     assert result.returncode == 2
-    assert result.stdout.startswith("Too little data to judge ate.rmse of dead-reckoning, ekf")
+    assert result.stdout.startswith("Too little data for ate.rmse of dead-reckoning, ekf")
 
 
 def test_case_49_truth_at_one_frame(tmp_path: Path) -> None:

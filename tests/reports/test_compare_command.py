@@ -11,7 +11,7 @@ import pytest
 from fgbaseline import data
 from fgbaseline.geometry import se3
 from fgbaseline.reports.cli import main
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 
 from ..builders.commands import everything_in, fgbaseline
 from ..builders.synthetic import drive
@@ -88,13 +88,13 @@ def test_against_a_file_the_table_and_its_caption_are_told(made: Path) -> None:
     assert told.returncode == 0, told.stderr
     assert told.stdout.startswith("The reference, truth, is taken as given")
     assert "SE(3)-aligned over all 50 poses" in told.stdout
-    assert "absolute error: RMSE, m" in told.stdout
+    assert "ATE: RMSE, m" in told.stdout
     assert not (made / "report.html").exists()
 
 
 def test_the_recording_itself_is_a_reference(made: Path) -> None:
     result = compare(made / "drive.npz", made / "truth.tum", align="none")
-    assert result.table["absolute error: largest, m"]["truth"] < 1e-9
+    assert result.table["ATE: max, m"]["truth"] < 1e-9
 
 
 def in_process(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:

@@ -17,7 +17,7 @@ from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
-from fgbaseline.reports.comparing import compare
+from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.results.comparison import json_schema
 from fgbaseline.reports.tables import latex, markdown
 
@@ -61,14 +61,14 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_three_lines_give_tables_and_figures(files: Path) -> None:
     result = compare(files / "truth.tum", files / "near.csv", files / "far.npz")
     assert list(result.table.index) == ["near", "far"]
-    rmse = result.table["absolute error: RMSE, m"]
+    rmse = result.table["ATE: RMSE, m"]
     assert rmse["near"] < rmse["far"]
-    assert result.table["absolute error: RMSE, m, low"]["near"] <= rmse["near"]
+    assert result.table["ATE: RMSE, m, low"]["near"] <= rmse["near"]
     assert "SE(3)-aligned over all" in result.caption
     assert set(result.figures()) == {"paths", "errors", "growth", "relative", "segments"}
     assert set(result.metrics.columns) == {"estimate", "metric", "value", "low", "high"}
     assert result.verdict[0].startswith("The reference, truth, is taken as given")
-    assert any(sentence.startswith("Nearest: near is ") for sentence in result.verdict)
+    assert any(sentence.startswith("Position RMSE against truth: near ") for sentence in result.verdict)
 
 
 def test_the_figures_of_the_table_are_evos(files: Path) -> None:
@@ -84,8 +84,8 @@ def test_the_figures_of_the_table_are_evos(files: Path) -> None:
     ape.process_data((reference, theirs))
     rpe.process_data((reference, theirs))
     row = result.table.loc["far"]
-    assert row["absolute error: RMSE, m"] == pytest.approx(ape.get_statistic(metrics.StatisticsType.rmse), rel=1e-9)
-    assert row["error of motion over 5 frames: RMSE, m"] == pytest.approx(
+    assert row["ATE: RMSE, m"] == pytest.approx(ape.get_statistic(metrics.StatisticsType.rmse), rel=1e-9)
+    assert row["relative error (RPE) over 5 frames: RMSE, m"] == pytest.approx(
         rpe.get_statistic(metrics.StatisticsType.rmse), rel=1e-9
     )
 
@@ -102,7 +102,7 @@ def test_two_paths_without_stamps_are_compared_by_frame(files: Path) -> None:
     _, poses = truth()
     data.write_kitti(files / "truth.txt", poses)
     result = compare(files / "truth.txt", files / "frames.txt")
-    assert "error of motion over 1 frames: RMSE, m" in result.table.columns
+    assert "relative error (RPE) over 1 frames: RMSE, m" in result.table.columns
     assert "translation per second" not in result.results["frames"].drift.index  # type: ignore[union-attr]
     with pytest.raises(InputError, match=r"frames\.txt: it has no time stamps, .*--times"):
         compare(files / "truth.tum", files / "frames.txt")
@@ -133,7 +133,7 @@ def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:
     result = compare(
         files / "truth.tum", files / "camera.tum", extrinsic=files / "extrinsic.txt", estimate_body="camera"
     )
-    assert result.table["absolute error: largest, m"]["camera"] < 1e-9
+    assert result.table["ATE: max, m"]["camera"] < 1e-9
     with pytest.raises(InputError, match=r"camera\.tum: its poses are the camera's; add --sequence or --extrinsic"):
         compare(files / "truth.tum", files / "camera.tum", estimate_body="camera")
 
@@ -162,7 +162,7 @@ def test_yaw_is_refused_between_worlds_that_are_not_both_level(files: Path) -> N
     with pytest.raises(InputError, match=r"truth\.tum: up in its world is 9\d degrees off .*--align se3"):
         compare(files / "camera_world.tum", files / "truth.tum", align="yaw", sequence=files / "problem")
     level = compare(files / "truth.tum", f"it={files / 'truth.tum'}", align="yaw", sequence=files / "problem")
-    assert level.table["absolute error: largest, m"]["it"] < 1e-9
+    assert level.table["ATE: max, m"]["it"] < 1e-9
 
 
 def test_held_out_tracks_rank_the_paths(files: Path) -> None:
@@ -177,8 +177,8 @@ def test_held_out_tracks_rank_the_paths(files: Path) -> None:
     assert figures is not None
     assert figures.behind.low is not None
     assert figures.behind.low > 0.0
-    assert "held-out tracks: median, px" in result.table.columns
-    assert any(sentence.startswith("On tracks that were held out") for sentence in result.verdict)
+    assert "held-out error: median, px" in result.table.columns
+    assert any(sentence.startswith("Held-out error (median over the held-out tracks)") for sentence in result.verdict)
     assert compare(files / "truth.tum", files / "near.csv", sequence=files / "drive.npz").held_out is None
 
 
@@ -210,9 +210,12 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     )
     row, far = result.table.loc["same"], result.table.loc["far"]
     # Norm of four numbers of 0.5 px each: 0.5 sqrt(chi-square with 4 degrees of freedom), median 0.916.
-    assert row["reprojection, median px: its landmarks"] == pytest.approx(0.916, abs=0.03)
-    assert row["reprojection, median px: triangulated"] < row["reprojection, median px: its landmarks"]
-    assert far["reprojection, median px: triangulated"] > 2.0 * row["reprojection, median px: triangulated"]
+    assert row["reprojection error: median, px"] == pytest.approx(0.916, abs=0.03)
+    assert row["reprojection error: median, triangulated along the path, px"] < row["reprojection error: median, px"]
+    assert (
+        far["reprojection error: median, triangulated along the path, px"]
+        > 2.0 * row["reprojection error: median, triangulated along the path, px"]
+    )
     assert result.summary.estimates["far"].notes["reprojection"] == "no landmarks came with it"
     assert "reprojection" in result.figures()
 
@@ -229,8 +232,8 @@ def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
     assert result.behind["two"].low > 0.0
     assert result.behind["three"].value == 0.0
     said = " ".join(result.verdict)
-    assert "Farther than one, by paired bootstrap of their RMSE: two (" in said
-    assert "does not settle whether one is nearer than three" in said
+    assert "Larger position RMSE than one, by paired bootstrap: two (" in said
+    assert "No significant difference from one, by paired bootstrap: three (" in said
     summary = result.summary.estimates
     assert summary["one"].behind is None
     assert summary["two"].behind is not None
@@ -269,7 +272,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     assert aligned.nees is not None
     assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
     between = compare(files / "truth.tum", files / "mine.npz", association="interpolated")
-    assert any(s.startswith("The covariances of mine are not judged: poses were inter") for s in between.verdict)
+    assert any(s.startswith("The covariances of mine are not evaluated: poses were inter") for s in between.verdict)
 
 
 def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
@@ -314,7 +317,7 @@ def test_short_and_standing_paths_say_what_they_lack(tmp_path: Path) -> None:
     off[:, 0, 3] = 0.1
     data.write_tum(tmp_path / "off.tum", np.arange(5.0), off)
     result = compare(tmp_path / "standing.tum", tmp_path / "off.tum", align="none")
-    assert result.table["absolute error: RMSE, m"]["off"] == pytest.approx(0.1)
+    assert result.table["ATE: RMSE, m"]["off"] == pytest.approx(0.1)
     notes = result.summary.estimates["off"].notes
     assert set(notes) >= {"segments", "drift", "relative.10 m"}
     assert all(notes.values())

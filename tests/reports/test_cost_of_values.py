@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fgbaseline import diagnosis
-from fgbaseline.compare.departure import worst_second
+from fgbaseline.compare.divergence_onset import worst_second
 from fgbaseline.data import Problem, read_problem
-from fgbaseline.data.problem_export import write_problem
 from fgbaseline.data.problem import WRONG_MATCH
+from fgbaseline.data.problem_export import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.figures.panels import moving_sum

@@ -8,7 +8,7 @@ import pytest
 from fgbaseline import compare, data
 from fgbaseline.data.plural import noun, plural
 from fgbaseline.geometry import se3
-from fgbaseline.reports.comparing import compare as compared
+from fgbaseline.reports.comparison import compare as compared
 from fgbaseline.reports.formatting import counted, number
 
 

@@ -18,9 +18,9 @@ from fgbaseline.data import Observations
 from fgbaseline.data.top_view import TopView
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.run import drawings
+from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import of_run
-from fgbaseline.reports.figures.style import OWN, SCREEN, in_style, plain
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, SCREEN, in_style, safe_text
 
 from ..builders.runs import answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
@@ -34,7 +34,7 @@ def drawn_standard() -> dict[str, Figure]:
 
 def drawn(run: Run, *names: str) -> dict[str, Figure]:
     """Some of the figures of a run, as `figures.draw` draws them."""
-    draw_one = drawings(of_run(run))
+    draw_one = figure_functions(of_run(run))
     with in_style():
         some = {name: figure for name in names if (figure := draw_one[name]()) is not None}
         for figure in some.values():
@@ -125,7 +125,11 @@ def test_the_distribution_ends_where_the_table_says_under_3_px() -> None:
 def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black() -> None:
     run = standard_run()
     colors = figures.colors(run.results, run.reference)
-    assert colors == {"dead-reckoning": OWN["dead-reckoning"], "ekf": OWN["ekf"], "isam2": "#000000"}
+    assert colors == {
+        "dead-reckoning": ESTIMATOR_COLORS["dead-reckoning"],
+        "ekf": ESTIMATOR_COLORS["ekf"],
+        "isam2": "#000000",
+    }
     for name, figure in drawn_standard().items():
         drawn = {
             to_hex(line.get_color())
@@ -133,7 +137,7 @@ def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black()
             for line in axes.get_lines()
             if line.get_label() in ("ekf", "ekf and dead-reckoning")
         }
-        assert drawn <= {OWN["ekf"].lower()}, name
+        assert drawn <= {ESTIMATOR_COLORS["ekf"].lower()}, name
 
 
 def test_a_known_name_keeps_its_colour_whoever_else_runs_and_strangers_take_what_is_left() -> None:
@@ -141,7 +145,7 @@ def test_a_known_name_keeps_its_colour_whoever_else_runs_and_strangers_take_what
     strangers = [answer(problem, f"mine-{i}") for i in range(9)]
     run = run_of(problem, *strangers, answer(problem, "ekf"), answer(problem, "isam2"))
     colors = figures.colors(run.results, run.reference)
-    assert colors["ekf"] == OWN["ekf"]
+    assert colors["ekf"] == ESTIMATOR_COLORS["ekf"]
     assert len(set(colors.values())) == len(colors)
 
 
@@ -226,7 +230,7 @@ def test_names_are_drawn_as_they_are(tmp_path: Path) -> None:
     problem = plain_problem(scene())
     run = run_of(problem, *(answer(problem, name, (1.0, 0.0, 0.0)) for name in names), answer(problem, "isam2"))
     chosen = drawn(run, "divergence", *(f"path_{name}" for name in names))
-    assert set(legend_texts(chosen["divergence"])) == {plain(name) for name in names}
+    assert set(legend_texts(chosen["divergence"])) == {safe_text(name) for name in names}
     figures.save(chosen, tmp_path)
     assert len(list(tmp_path.iterdir())) == 2 * len(chosen)
 

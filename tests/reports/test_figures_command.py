@@ -38,7 +38,7 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[in
 def test_every_figure_is_there_in_every_format_with_a_caption(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = folder / "all"
     code, said = call(capsys, "figures", folder, "--format", "pdf,svg,png", "--out", out)
-    assert (code, said) == (0, f"8 figures as pdf, svg, png are in {out}\n")
+    assert (code, said) == (0, f"8 figures as pdf, svg, png in {out}\n")
     captions = json.loads((out / "captions.json").read_text())
     names = "paths landmarks divergence error_to_truth reprojection consistency map_difference time_per_frame"
     assert list(captions) == names.split()
@@ -95,7 +95,7 @@ def test_what_a_run_lacks_is_not_drawn(tmp_path: Path, monkeypatch: pytest.Monke
     read = figures.of_folder(tmp_path)
     assert read.names == ("dead-reckoning",)
     assert read.truth is None
-    assert set(figures.draw_printed(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
+    assert set(figures.draw_for_paper(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
 
 
 def test_bad_input_is_told_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

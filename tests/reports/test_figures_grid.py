@@ -10,20 +10,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.style import head, in_style, sheet
+from fgbaseline.reports.figures.style import in_style, stacked_panels, title_and_legend
 
 AWAY = 0.02
 """of the figure's width or height, from where constrained layout has an edge of a panel"""
 
 
 def rows_of_panels() -> Figure:
-    figure, panels = sheet(6.0, rows=3, height_ratios=[1.7, 1.0, 1.0])
+    figure, panels = stacked_panels(6.0, rows=3, height_ratios=[1.7, 1.0, 1.0])
     for panel, scale in zip(panels, (1e-3, 1.0, 1e3), strict=True):
         panel.plot([0.0, 50.0, 105.0], [scale, 40.0 * scale, 90.0 * scale], label=f"{scale:g}")
         panel.set_ylabel("error, m")
     panels[0].set_yscale("log")
     panels[-1].set_xlabel("time, s")
-    head(figure, "Rows", [line for panel in panels for line in panel.get_lines()])
+    title_and_legend(figure, "Rows", [line for panel in panels for line in panel.get_lines()])
     return figure
 
 
@@ -35,7 +35,7 @@ def square_of_panels() -> Figure:
         panel.set_title(f"panel {i}")
         panel.set_ylabel("px")
         panel.set_yscale("log")
-    head(figure, "Square", figure.axes[0].get_lines())
+    title_and_legend(figure, "Square", figure.axes[0].get_lines())
     return figure
 
 
@@ -73,11 +73,11 @@ def test_ticks_that_change_with_the_size_of_a_panel_are_inside_too() -> None:
     # At its final height a panel may have ticks at halves where it had them at wholes, and needs room for them.
     with in_style():
         for low in np.linspace(2.0, 9.0, 25):
-            figure, (panel,) = sheet(3.4)
+            figure, (panel,) = stacked_panels(3.4)
             panel.set_ylim(-low, 0.6)
             panel.set_ylabel("height, m")
             panel.set_xlabel("time, s")
-            head(figure, "Height", panel.plot([0.0, 60.0], [0.0, -low], label="path"))
+            title_and_legend(figure, "Height", panel.plot([0.0, 60.0], [0.0, -low], label="path"))
             lay_out(figure)
             assert everything_of(panel).x0 >= 0.0, f"from {-low:.2f} m on"
 

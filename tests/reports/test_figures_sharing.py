@@ -16,7 +16,7 @@ def small_run() -> Run:
 
 
 @cache
-def drawn_by_one() -> dict[str, figures.Written]:
+def drawn_by_one() -> dict[str, figures.EncodedFigure]:
     return figures.draw_and_write(small_run())
 
 

@@ -114,7 +114,7 @@ def test_it_loads_without_a_word_and_without_asking_anybody(opened: Opened, run:
     assert opened.count("#path-view .line") == 4
     assert opened.count(".chart svg") == opened.count(".chart") >= 10
     assert opened.count(".chart .cursor") == opened.count(".chart")
-    assert SCRIPT in opened.text("#who")
+    assert SCRIPT in opened.text("#estimators-shown")
 
 
 def test_nothing_that_comes_from_files_can_run(opened: Opened) -> None:
@@ -129,27 +129,27 @@ def test_nothing_that_comes_from_files_can_run(opened: Opened) -> None:
 
 
 def test_switching_an_estimator_off_takes_its_lines_away_and_frees_the_axis(opened: Opened) -> None:
-    before = opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg')
-    assert opened.count("#over-time .line.who-0") > 3
-    opened.page.uncheck('#who input[value="0"]')
-    assert opened.count("#over-time .line.who-0") == 0
-    assert opened.count("#path-view .who-0") == 0
-    assert opened.count("#path-view .line.who-1") == 1
-    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') != before
-    opened.page.check('#who input[value="0"]')
-    assert opened.page.inner_html('.chart:has(svg[aria-label^="Distance"]) svg') == before
+    before = opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg')
+    assert opened.count("#over-time .line.estimator-0") > 3
+    opened.page.uncheck('#estimators-shown input[value="0"]')
+    assert opened.count("#over-time .line.estimator-0") == 0
+    assert opened.count("#path-view .estimator-0") == 0
+    assert opened.count("#path-view .line.estimator-1") == 1
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg') != before
+    opened.page.check('#estimators-shown input[value="0"]')
+    assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) svg') == before
 
 
 def test_the_slider_moves_one_cursor_through_every_plot(opened: Opened) -> None:
     opened.set_frame(0)
     cursors = opened.page.eval_on_selector_all(".chart .cursor", "all => all.map(e => e.getAttribute('x1'))")
-    here = opened.attribute("#path-view .here.who-1", "cx")
-    said = opened.text(".said")
+    here = opened.attribute("#path-view .here.estimator-1", "cx")
+    said = opened.text(".frame-summary")
     opened.set_frame(40)
     moved = opened.page.eval_on_selector_all(".chart .cursor", "all => all.map(e => e.getAttribute('x1'))")
     assert all(float(b) > float(a) for a, b in zip(cursors, moved, strict=True))
-    assert opened.attribute("#path-view .here.who-1", "cx") != here
-    assert opened.text(".said") != said
+    assert opened.attribute("#path-view .here.estimator-1", "cx") != here
+    assert opened.text(".frame-summary") != said
     assert opened.text("#clock") == "frame 40 · 4.0\u00a0s"
     assert opened.attribute("#frame", "aria-valuetext") == "frame 40, 4.0\u00a0s"
 
@@ -166,9 +166,9 @@ def test_a_frame_shows_what_became_of_each_observation_and_its_true_reprojection
         assert opened.count(f"{image} .predicted") == 12
     table = run.results[SCRIPT].reprojection
     table = table[(table["frame"] == 7) & table["used"]]
-    shown = float(opened.text(".said").partition("median error ")[2].partition("\u00a0")[0])
+    shown = float(opened.text(".frame-summary").partition("median error ")[2].partition("\u00a0")[0])
     assert math.isclose(shown, float(table["error"].median()), rel_tol=0.01)
-    assert "3 × contradicts its own track" in opened.text(".said")
+    assert "3 × contradicts its own track" in opened.text(".frame-summary")
     used = opened.page.inner_html('[data-side="left"]')
     opened.page.select_option("#frame-view select", "2")
     assert opened.page.inner_html('[data-side="left"]') != used
@@ -177,26 +177,26 @@ def test_a_frame_shows_what_became_of_each_observation_and_its_true_reprojection
 def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> None:
     opened.page.click("summary:has-text('in numbers')")
     opened.set_frame(59)
-    row = opened.text("#values tr:has-text('Distance from isam2')")
+    row = opened.text("#values tr:has-text('Divergence from isam2')")
     assert row.split("\t")[1:3] == [
         f"{run.results[n].divergence['position'].iloc[59]:#.3g}" for n in list(run.results)[:2]
     ]
 
 
 def test_the_paths_turn_into_space_with_landmarks_and_ellipses(opened: Opened) -> None:
-    flat = opened.attribute("#path-view .line.who-1", "d")
+    flat = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.click('[data-do="solid"]')
     assert opened.attribute('[data-do="solid"]', "aria-pressed") == "true"
-    assert opened.attribute("#path-view .line.who-1", "d") != flat
+    assert opened.attribute("#path-view .line.estimator-1", "d") != flat
     opened.page.click('[data-do="landmarks"]')
     assert opened.count("#path-view .dots") == 3
     opened.page.click('[data-do="ellipses"]')
-    assert opened.count("#path-view .ellipse.who-2") >= 1
+    assert opened.count("#path-view .ellipse.estimator-2") >= 1
 
 
 def test_a_path_tells_frame_time_and_error_where_it_is_pointed_at_and_a_click_goes_there(opened: Opened) -> None:
     opened.set_frame(30)
-    box = opened.page.locator("#path-view .here.who-2").bounding_box()
+    box = opened.page.locator("#path-view .here.estimator-2").bounding_box()
     opened.set_frame(5)
     at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     opened.page.mouse.move(*at)
@@ -213,16 +213,16 @@ def test_the_keyboard_is_enough(opened: Opened) -> None:
     opened.page.focus("#frame")
     opened.page.keyboard.press("ArrowRight")
     assert opened.text("#clock").startswith("frame 11 ")
-    opened.page.focus('#who input[value="0"]')
+    opened.page.focus('#estimators-shown input[value="0"]')
     opened.page.keyboard.press("Space")
-    assert opened.count("#path-view .who-0") == 0
+    assert opened.count("#path-view .estimator-0") == 0
     opened.page.focus("#path-view svg")
-    before = opened.attribute("#path-view .line.who-1", "d")
+    before = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.keyboard.press("+")
-    closer = opened.attribute("#path-view .line.who-1", "d")
+    closer = opened.attribute("#path-view .line.estimator-1", "d")
     assert closer != before
     opened.page.keyboard.press("0")
-    assert opened.attribute("#path-view .line.who-1", "d") == before
+    assert opened.attribute("#path-view .line.estimator-1", "d") == before
     reached = {""}
     opened.page.focus(".skip")
     for _ in range(60):
@@ -243,7 +243,7 @@ def test_nothing_runs_over_the_edge_of_a_phone(chromium: Any, address: str, widt
 
 
 def test_dark_ground_changes_every_colour_that_it_would_swallow(chromium: Any, address: str) -> None:
-    stroke = "getComputedStyle(document.querySelector('#path-view .line.who-2')).stroke"
+    stroke = "getComputedStyle(document.querySelector('#path-view .line.estimator-2')).stroke"
     colours = {}
     for scheme in ("light", "dark"):
         opened = Opened(chromium, address, scheme=scheme)
@@ -298,7 +298,7 @@ def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: An
     assert opened.said == []
     assert opened.count("#path-view .line") == 1
     assert opened.count("#path-view .here") == 0
-    assert "12 in the problem" in opened.text(".said")
+    assert "12 in the problem" in opened.text(".frame-summary")
     assert opened.count('[data-side="left"] .measured') == 12
     opened.page.context.close()
 

@@ -27,10 +27,10 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     )
     problem = replace(run.problem, diagnosed=True, findings=found, repairs=("set by hand: velocity_scale = 1.5",))
     html = rendered(replace(run, problem=problem))
-    assert "The recording: 3 things were found to be wrong" in html
+    assert "The recording: 3 faults detected" in html
     assert "It &lt;drifts&gt;." in html
     assert "<td>0.0271\N{NO-BREAK SPACE}rad/s</td><td>0.0201\N{NO-BREAK SPACE}rad/s</td>" in html
-    assert "<td>6\N{NARROW NO-BREAK SPACE}562</td><td>0</td>" in html
+    assert "<td>6,562</td><td>0</td>" in html
     assert "<td>41.2 %</td><td>0.2 %</td>" in html
     assert "standard error 0.001 rad/s" in html
     assert "counted" not in html
@@ -41,7 +41,7 @@ def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -
     run = standard_run()
     assert "The recording:" not in rendered(run)
     clean = rendered(replace(run, problem=replace(run.problem, diagnosed=True)))
-    assert "The recording: nothing was found to be wrong" in clean
+    assert "The recording: no fault detected" in clean
 
 
 def test_three_sentences_stand_above_the_table_and_the_rest_is_folded_below() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare.departure import departure
+from fgbaseline.compare.divergence_onset import divergence_onset
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.reports.formatting import number
@@ -32,17 +32,21 @@ def test_every_sentence_has_a_number_or_a_reason() -> None:
 
 def test_the_nearest_estimator_comes_first_with_metres_and_share_of_the_path() -> None:
     run = standard_run()
-    sentence = told(run, "Nearest to isam2 is ekf")
+    sentences = verdict(run)
+    (sentence,) = (s for s in sentences if s.startswith("Smallest divergence from isam2 ("))
+    larger = told(run, "Larger divergence than ekf")
     table = run.results["ekf"].divergence
     assert table is not None
     rmse, length = float(np.sqrt(np.mean(table["position"] ** 2))), float(table["travelled"].max())
     assert f"{rmse:.3g} m ({100 * rmse / length:.3g} % of the path)" in sentence
-    assert sentence.index("ekf") < sentence.index("dead-reckoning")
+    assert ": ekf " in sentence
+    assert "dead-reckoning" in larger
+    assert sentences.index(sentence) < sentences.index(larger)
 
 
 def test_a_departure_is_dated_to_the_first_frame_beyond_the_limit() -> None:
     run = standard_run()
-    left = departure(run, run.results["ekf"])
+    left = divergence_onset(run, run.results["ekf"])
     table = run.results["ekf"].divergence
     assert left is not None
     assert table is not None
@@ -50,28 +54,32 @@ def test_a_departure_is_dated_to_the_first_frame_beyond_the_limit() -> None:
     assert limit < 5.0
     assert table["position"][left.frame] > limit
     assert (table["position"][: left.frame] <= limit).all()
-    assert f"at {left.seconds:.1f} s (frame {left.frame}), for good" in told(run, "ekf is first more than")
+    said = told(run, "ekf: maximum divergence")
+    assert f"threshold 1 % of the path, {limit:.3g} m. The threshold is first exceeded at {left.seconds:.1f} s " in said
+    assert f"(frame {left.frame}), and in all frames from then on." in said
 
 
 def test_whoever_stays_near_is_said_to_stay() -> None:
     problem = plain_problem(scene())
     run = run_of(problem, answer(problem, "ekf", (0.0, 0.1, 0.0)), answer(problem, "isam2"))
-    assert "throughout: 0.100 m at most" in told(run, "ekf stays within")
+    said = told(run, "ekf: maximum divergence 0.100 m; threshold 1 % of the path, ")
+    assert "exceeded" not in said
 
 
 def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> None:
     problem = plain_problem(scene())
     frame = problem.sequence.observations.frame
     run = run_of(problem, answer(problem, "ekf", (0.0, 3.0, 0.0)), answer(problem, "isam2"))
-    assert "mask" not in told(run, "ekf is first more than")
-    left = departure(run, run.results["ekf"])
+    assert "mask" not in told(run, "ekf: maximum divergence")
+    left = divergence_onset(run, run.results["ekf"])
     assert left is not None
     excluded = np.where(frame == left.frame, Excluded.PREDICTION, Excluded.NO).astype(np.uint8)
     t = problem.sequence.t
     around = np.sum(np.abs(t - t[left.frame]) <= 1.0)
     masked = replace(run, problem=replace(problem, excluded=excluded))
-    sentence = told(masked, "ekf is first more than")
-    assert f"excluded {100 / around:.3g} % of the matches ({100 / 60:.3g} % in the whole recording)" in sentence
+    sentence = told(masked, "ekf: maximum divergence")
+    whole = f"({100 / 60:.3g} % in the whole recording)"
+    assert f"excluded {100 / around:.3g} % of the observations as wrong matches {whole}" in sentence
 
 
 def test_a_reference_worse_than_the_filter_is_called_so() -> None:
@@ -82,9 +90,10 @@ def test_a_reference_worse_than_the_filter_is_called_so() -> None:
         answer(problem, "ekf", (0.0, 0.2, 0.0)),
         answer(problem, "isam2", (4.0, 4.0, 0.0)),
     )
-    sentence = told(run, "The reference is worse than dead-reckoning")
+    sentence = told(run, "The reference isam2 has a larger ATE")
+    assert " than dead-reckoning (" in sentence
     assert "and ekf" in sentence
-    assert not [s for s in verdict(standard_run()) if "worse" in s]
+    assert not [s for s in verdict(standard_run()) if "larger ATE" in s]
 
 
 def test_the_online_answer_of_the_reference_is_no_rival_of_it() -> None:
@@ -92,9 +101,9 @@ def test_the_online_answer_of_the_reference_is_no_rival_of_it() -> None:
     online = answer(problem, "isam2-online", (0.0, 0.0, 0.1))
     reference = answer(problem, "isam2", (0.0, 0.0, 1.0), by_products={"isam2-online": online})
     run = run_of(problem, reference, online, answer(problem, "ekf", (0.0, 5.0, 0.0)))
-    assert any(" of the path) from isam2 (RMSE along" in s for s in verdict(run))
-    assert "same run" in told(run, "isam2-online")
-    assert not [s for s in verdict(run) if "worse" in s]
+    assert "isam2-online" not in told(run, "Divergence from isam2 (RMSE over")
+    assert "a by-product of isam2" in told(run, "isam2-online")
+    assert not [s for s in verdict(run) if "larger ATE" in s]
 
 
 def test_frames_without_truth_are_counted() -> None:
@@ -103,8 +112,8 @@ def test_frames_without_truth_are_counted() -> None:
     whole = plain_problem(sequence)
     problem = plain_problem(replace(sequence, truth=partly_known(sequence.truth, 7)))
     run = run_of(problem, answer(whole, "ekf", (1.0, 0.0, 0.0)), answer(whole, "isam2"))
-    assert "53 of 60 frames; the other 7 are left out" in told(run, "Against the truth")
-    assert not [s for s in verdict(standard_run(truth=None)) if "truth" in s]
+    assert "53 of 60 frames)" in told(run, "ATE (")
+    assert not [s for s in verdict(standard_run(truth=None)) if "truth" in s or "ATE" in s]
 
 
 def test_trust_comes_first_with_its_reasons() -> None:

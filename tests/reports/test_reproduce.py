@@ -14,10 +14,9 @@ from fgbaseline.data import Observations, Sequence, Status, write_npz
 from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.reproduction.recordings import read_subjects, reported
-from fgbaseline.reports.reproduction.stages import diagnosed_stages, simulated_stages
-from fgbaseline.reports.reproduction.stand_in import TRACKS_PER_FRAME, stand_in
-from fgbaseline.reports.reproduction.trial import Settings, run
+from fgbaseline.reports.reproduction.recordings import TRACKS_PER_FRAME, paper_recording, read_subjects, stand_in
+from fgbaseline.reports.reproduction.repair_stages import diagnosed_stages, simulated_stages
+from fgbaseline.reports.reproduction.study import FilterSettings, run_filter
 
 from ..builders.commands import everything_in, fgbaseline
 
@@ -145,7 +144,11 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(
 
 
 def test_recordings_are_known_by_their_frames_and_not_confused(tmp_path: Path) -> None:
-    assert [getattr(reported(frames), "name", None) for frames in (1010, 3026, 1011)] == ["03.npz", "10.npz", None]
+    assert [getattr(paper_recording(frames), "name", None) for frames in (1010, 3026, 1011)] == [
+        "03.npz",
+        "10.npz",
+        None,
+    ]
     drive = without_features(simulate(Simulation(duration=1.0)))
     for name, speed in (("a/x.npz", 1.0), ("b/x.npz", 2.0)):
         (tmp_path / name).parent.mkdir()
@@ -201,7 +204,7 @@ def test_what_the_diagnosis_repairs_is_repaired_one_cause_at_a_time(faulty: Sequ
 
 
 def test_without_any_noise_the_first_update_has_no_inverse(faulty: Sequence) -> None:
-    outcome, _ = run(faulty, Settings(features=50, motion=0.0))
+    outcome, _ = run_filter(faulty, FilterSettings(features=50, motion=0.0))
     assert outcome.status is Status.FAILED
     assert outcome.breaks
     assert "frame 1" in outcome.reason

@@ -18,7 +18,7 @@ import pytest
 from fgbaseline import data
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, pose_problem, read_sequence, solve
+from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence, solve
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
@@ -138,7 +138,7 @@ def test_elsewhere_than_on_a_terminal_progress_is_plain_lines(finished: Finished
     lines = finished.result.stderr.splitlines()
     assert lines[0].startswith("drive: 80 frames, ")
     assert [line for line in lines if line.endswith(": started")] == [f"{name}: started" for name in ESTIMATORS]
-    assert len([line for line in lines if ": ended after " in line]) == len(ESTIMATORS)
+    assert len([line for line in lines if ": finished after " in line]) == len(ESTIMATORS)
     assert lines[-1] == "writing the report"
     assert "\x1b" not in finished.result.stderr + finished.result.stdout
     assert "\r" not in finished.result.stderr
@@ -154,7 +154,7 @@ def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("without_figures")
 def test_the_same_run_from_python_gives_the_same_tables(finished: Finished, recording: Path, tmp_path: Path) -> None:
     settings = RunSettings(sequence=recording, estimators=ESTIMATORS)
-    run = solve(pose_problem(read_sequence(settings), settings), settings)
+    run = solve(build_problem(read_sequence(settings), settings), settings)
     write_run(run, tmp_path)
     for name in sorted(everything_in(finished.out)):
         if name.startswith(("trajectories/", "landmarks/")) and "." in name:
@@ -209,13 +209,13 @@ def test_truth_that_ends_early_is_counted(recording: Path, tmp_path: Path) -> No
     settings = RunSettings(
         sequence=recording, estimators=("dead-reckoning",), truth=tmp_path / "kitti.txt", truth_frame="imu"
     )
-    run = solve(pose_problem(read_sequence(settings), settings), settings)
+    run = solve(build_problem(read_sequence(settings), settings), settings)
     e = summarize(run).estimators["dead-reckoning"]
     assert e.truth is not None
     assert (e.truth.frames, e.truth.missing) == (70, 10)
     assert e.ate_unaligned is not None
     assert e.ate_unaligned.final is None
-    assert e.notes["ate_unaligned.final"] == "the last frame has no truth"
+    assert e.notes["ate_unaligned.final"] == "the last frame has no ground truth"
 
 
 OUTSIDE = """

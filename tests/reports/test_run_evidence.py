@@ -19,7 +19,7 @@ from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.evidence import frame_ranges
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, solve, split
+from fgbaseline.reports.run.problem import RunSettings, hold_out_tracks, solve
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty
@@ -33,7 +33,7 @@ SCHEMA = Path(__file__).parents[2] / "docs" / "summary.schema.json"
 def held_out_run() -> Run:
     """Dead reckoning and both filters on a short drive with a quarter of its tracks held out."""
     settings = RunSettings(held_out=0.25, seed=3, estimators=("dead-reckoning", "ekf", "joint-ekf"))
-    kept, held = split(drive(seconds=8.0, features_per_frame=25.0), settings)
+    kept, held = hold_out_tracks(drive(seconds=8.0, features_per_frame=25.0), settings)
     return solve(matched(kept), settings, held=held)
 
 
@@ -66,9 +66,9 @@ def test_nothing_is_held_out_unless_asked_for() -> None:
     assert summary["held_out"] is None
     assert all(e["notes"]["held_out"] == "no tracks were held out" for e in summary["estimators"].values())
     sequence = drive()
-    assert split(sequence, RunSettings()) == (sequence, None)
+    assert hold_out_tracks(sequence, RunSettings()) == (sequence, None)
     with pytest.raises(InputError, match="held-out"):
-        split(sequence, RunSettings(held_out=1.5))
+        hold_out_tracks(sequence, RunSettings(held_out=1.5))
 
 
 def test_the_folder_has_series_and_tables_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,21 +101,23 @@ def test_the_figures_show_it_and_the_page_has_its_table() -> None:
     assert page.count('id="figure-held_out"') == 1
     assert page.count('id="figure-three_sigma_ekf"') == 1
     assert 'id="evidence"' in page
-    assert "behind the best, px" in page
-    assert "not positive definite</th>" not in page  # a column of zeros tells nothing
+    assert "above the best, px" in page
+    assert "covariances not positive definite" not in page  # a column of zeros tells nothing
 
 
 def test_the_sentences_tell_who_is_best_and_who_cannot_be_told_apart() -> None:
     run = held_out_run()
     assert run.held_out is not None
-    (sentence,) = (s for s in verdict(run) if "held-out" in s)
+    (sentence,) = (s for s in verdict(run) if s.startswith("Held-out error"))
     ranking = run.held_out.ranking
-    assert f"{ranking.index[0]} errs by" in sentence
-    assert "does not separate dead-reckoning" not in sentence
+    assert f" px for {ranking.index[0]}" in sentence.partition(",")[0]
+    apart = " ".join(s for s in verdict(run) if s.startswith("No significant difference in held-out error"))
+    assert "dead-reckoning" not in apart
     twins = ranking.copy()
     twins["behind_low"] = 0.0
     alike = replace(run, held_out=replace(run.held_out, ranking=twins))
-    assert any("the bootstrap does not separate" in s and f"from {ranking.index[0]}" in s for s in verdict(alike))
+    same = f"No significant difference in held-out error between {ranking.index[0]} and "
+    assert any(s.startswith(same) for s in verdict(alike))
 
 
 def test_covariances_that_are_none_are_told_with_their_frames() -> None:
@@ -129,14 +131,14 @@ def test_covariances_that_are_none_are_told_with_their_frames() -> None:
     assert summary["covariance"] == {"frames": 60, "held": 0, "not_positive_definite": 4, "where": "3, 7 to 9"}
     assert summary["nees"]["frames"] == 56
     assert any("4 pose covariances that are not positive definite (frames 3, 7 to 9)" in s for s in verdict(run))
-    assert "not positive definite</th>" in render(run, as_dict(run), {})
+    assert "covariances not positive definite" in render(run, as_dict(run), {})
 
 
 def test_a_run_in_which_nobody_answers_says_that_nothing_can_be_judged() -> None:
     kept, held = diagnosis.hold_out(drive(), 0.5)
     problem = matched(kept)
     run = compare_all(problem, {"ekf": failed(problem, "ekf", "no")}, {}, held)
-    assert any("none is left to judge" in sentence for sentence in verdict(run))
+    assert any("There is no held-out error: none of " in sentence for sentence in verdict(run))
     summary = as_dict(run)
     assert summary["held_out"]["judged"] == 0
     assert summary["estimators"]["ekf"]["notes"] == {"*": "the estimator failed: no"}

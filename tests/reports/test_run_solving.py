@@ -177,7 +177,7 @@ def test_estimators_are_checked_before_anything_runs(names: tuple[str, ...], mes
 @pytest.mark.parametrize("name", ["a/b", "..", ".hidden", "c\\d"])
 def test_a_name_that_can_be_no_files_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr("fgbaseline.reports.run.problem.estimator_names", lambda: [name])
-    with pytest.raises(InputError, match="can be no file's name"):
+    with pytest.raises(InputError, match="cannot be a file name"):
         check_estimators((name,))
 
 

@@ -105,7 +105,7 @@ def test_every_null_has_its_reason_beside_it_and_nothing_else_has(kind: str) -> 
 def test_the_reasons_are_the_right_ones() -> None:
     estimators = as_dict(unfinished())["estimators"]
     assert estimators["ekf"]["notes"]["ate_unaligned.final"] == "it did not reach the last frame"
-    assert estimators["isam2"]["notes"]["ate_unaligned.final"] == "the last frame has no truth"
+    assert estimators["isam2"]["notes"]["ate_unaligned.final"] == "the last frame has no ground truth"
     assert estimators["ekf"]["notes"]["nees"] == "it gives no covariance"
     assert estimators["blind"]["notes"]["reprojection_used"] == "it uses no observations"
     assert estimators["blind"]["notes"]["components"] == "it estimated no landmarks"

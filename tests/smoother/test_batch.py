@@ -80,9 +80,9 @@ def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
 def test_an_answer_that_is_given_is_not_found_again() -> None:
     problem = PROBLEMS["plain"]
     known = smoother.isam2(problem)
-    told: list[tuple[int, int]] = []
-    estimate = smoother.batch(problem, lambda done, total: told.append((done, total)), given={"isam2": known})
-    assert told == [(10, 10)]
+    calls: list[tuple[int, int]] = []
+    estimate = smoother.batch(problem, lambda done, total: calls.append((done, total)), given={"isam2": known})
+    assert calls == [(10, 10)]
     assert not estimate.by_products
     np.testing.assert_array_equal(estimate.world_T_imu, smoother.batch(problem).world_T_imu)
 

@@ -259,9 +259,9 @@ def test_a_problem_is_not_changed_and_solved_the_same_way_twice() -> None:
 
 
 def test_progress_is_told_after_every_frame() -> None:
-    told: list[tuple[int, int]] = []
-    smoother.isam2(PROBLEMS["plain"], lambda done, total: told.append((done, total)))
-    assert told == [(k + 1, 10) for k in range(10)]
+    calls: list[tuple[int, int]] = []
+    smoother.isam2(PROBLEMS["plain"], lambda done, total: calls.append((done, total)))
+    assert calls == [(k + 1, 10) for k in range(10)]
 
 
 @pytest.mark.parametrize("seed", [2, 8, 15])
@@ -273,8 +273,10 @@ def test_the_first_landmarks_that_all_come_at_once_do_not_throw_the_path(seed: i
         )
     )
     noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.5, angular_velocity=0.05)
-    told = diagnosis.Calibration(noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None)
-    estimate = smoother.isam2(diagnosis.calibrated(sequence, settings=told))
+    settings = diagnosis.Calibration(
+        noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None
+    )
+    estimate = smoother.isam2(diagnosis.calibrated(sequence, settings=settings))
     assert position_errors(estimate.by_products["isam2-online"], sequence)[2:].max() < 0.12
 
 

@@ -39,18 +39,18 @@ def whole(problem: Problem) -> Estimate:
 @pytest.fixture
 def exchanged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """For each exchange its first frame, and how many poses the new tree has."""
-    told: list[tuple[int, int]] = []
+    windows: list[tuple[int, int]] = []
     shortened = MarginalizedISAM2.marginalize_before
 
     def watched(self: MarginalizedISAM2, first: int, groups: dict[int, int]) -> bool:
         done = shortened(self, first, groups)
         if done:
             point = self.tree.getLinearizationPoint()
-            told.append((first, sum(chr(key >> 56) == "x" for key in point.keys())))  # noqa: SIM118
+            windows.append((first, sum(chr(key >> 56) == "x" for key in point.keys())))  # noqa: SIM118
         return done
 
     monkeypatch.setattr(MarginalizedISAM2, "marginalize_before", watched)
-    return told
+    return windows
 
 
 def sigmas(estimate: Estimate) -> np.ndarray:

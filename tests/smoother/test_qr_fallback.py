@@ -1,4 +1,4 @@
-"""Where Cholesky would cost a frame, the whole is solved by QR; where it does not, nobody pays for that."""
+"""QR solves the whole problem where Cholesky would lose a frame; otherwise it is not used."""
 
 import numpy as np
 import pytest

@@ -109,7 +109,7 @@ class TimeChart {
     const lines = this.shown().sort(([a], [b]) => isReference(b) - isReference(a));
     for (const [key, line] of lines) {
       const d = polyline(line.length, k => (Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null));
-      parts.push(svg("path", { class: "line who-" + key, d }));
+      parts.push(svg("path", { class: "line estimator-" + key, d }));
     }
     this.cursor = svg("line", { class: "cursor", y1: ROOM.top, y2: height - ROOM.bottom });
     parts.push(this.cursor);

@@ -15,18 +15,18 @@ const TRUTH = "truth";
 
 // Trajectories by key: the number of an estimator as text, or "truth".
 const trajectories = new Map();
-run.who.forEach((who, i) => {
-  if (!who.answered) return;
-  const index = integers(who.landmarks);
+run.estimators.forEach((estimator, i) => {
+  if (!estimator.answered) return;
+  const index = integers(estimator.landmarks);
   trajectories.set(String(i), {
     key: String(i),
-    name: who.name,
-    path: floats(who.path),
-    cameras: floats(who.cameras),
-    covariance: who.covariance && floats(who.covariance),
-    points: floats(who.points),
+    name: estimator.name,
+    path: floats(estimator.path),
+    cameras: floats(estimator.cameras),
+    covariance: estimator.covariance && floats(estimator.covariance),
+    points: floats(estimator.points),
     row: new Map(Array.from(index, (landmark, row) => [landmark, row])),
-    used: who.used && bytes(who.used),
+    used: estimator.used && bytes(estimator.used),
   });
 });
 if (run.truth) trajectories.set(TRUTH, { key: TRUTH, name: "truth", path: floats(run.truth) });
@@ -44,5 +44,36 @@ const observations = run.observations && {
   excluded: bytes(run.observations.excluded),
 };
 
-const isReference = key => key !== TRUTH && run.who[Number(key)].name === run.reference;
+const isReference = key => key !== TRUTH && run.estimators[Number(key)].name === run.reference;
 const isBit = (flags, i) => flags !== null && ((flags[i >> 3] >> (i & 7)) & 1) === 1;
+
+// What is chosen: one frame and a set of estimators for the whole page.
+const chosen = { frame: 0, shown: new Set(trajectories.keys()) };
+const onFrame = [];
+const onShown = [];
+
+function goTo(frame) {
+  const last = run.frames - 1;
+  const next = Math.max(0, Math.min(last, Math.round(frame)));
+  if (next === chosen.frame) return;
+  chosen.frame = next;
+  onFrame.forEach(update => update());
+}
+
+function show(key, shown) {
+  if (shown) chosen.shown.add(key);
+  else chosen.shown.delete(key);
+  onShown.forEach(update => update());
+}
+
+// The frame whose time is nearest.
+function frameAt(time) {
+  let low = 0;
+  let high = run.frames - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (seconds[middle] <= time) low = middle;
+    else high = middle;
+  }
+  return time - seconds[low] <= seconds[high] - time ? low : high;
+}

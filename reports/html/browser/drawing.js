@@ -31,7 +31,7 @@ function quantity(value, unit = "") {
   let text;
   if (size === 0) text = "0";
   else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
-  else if (size >= 999.5) text = value.toFixed(0);
+  else if (size >= 999.5) text = Math.round(value).toLocaleString("en");
   else text = value.toPrecision(3);
   return text.replace("-", "−") + (unit === "°" ? "°" : unit ? "\u00a0" + unit : "");
 }
@@ -76,11 +76,11 @@ function whenResized(element, draw) {
 const hint = html("div", { class: "hint", role: "status", hidden: "" });
 document.body.append(hint);
 
-// Lines of [text, key of who it is about or null] beside the pointer.
+// Lines of [text, key of its estimator or null] beside the pointer.
 function showHint(event, lines) {
   hint.replaceChildren(...lines.map(([text, key]) => {
     const line = html("div");
-    if (key !== null) line.append(html("span", { class: "swatch who-" + key }));
+    if (key !== null) line.append(html("span", { class: "swatch estimator-" + key }));
     line.append(text);
     return line;
   }));

@@ -6,10 +6,10 @@ class FrameView {
       place.querySelector(`[data-side="${side}"]`).append(image);
       return image;
     });
-    this.words = place.querySelector(".said");
+    this.words = place.querySelector(".frame-summary");
     this.select = place.querySelector("select");
-    for (const who of trajectories.values()) {
-      if (who.points && who.points.length) this.select.append(html("option", { value: who.key }, who.name));
+    for (const trajectory of trajectories.values()) {
+      if (trajectory.points && trajectory.points.length) this.select.append(html("option", { value: trajectory.key }, trajectory.name));
     }
     const reference = [...this.select.options].find(option => isReference(option.value));
     const first = [...this.select.options].find(option => !isReference(option.value) && trajectories.get(option.value).used);
@@ -22,24 +22,24 @@ class FrameView {
 
   // Every observation of the frame: measured, predicted (or null), and what became of it.
   seen() {
-    const who = trajectories.get(this.select.value);
+    const trajectory = trajectories.get(this.select.value);
     const seen = [];
     for (let i = observations.starts[chosen.frame]; i < observations.starts[chosen.frame + 1]; i++) {
       const measured = Array.from(observations.pixel.subarray(4 * i, 4 * i + 4), value => value / observations.parts);
-      const predicted = who ? this.predict(who, observations.landmark[i]) : null;
+      const predicted = trajectory ? this.predict(trajectory, observations.landmark[i]) : null;
       const error = predicted ? Math.hypot(...measured.map((value, row) => value - predicted[row])) : NaN;
-      const fate = observations.excluded[i] ? "excluded" : who && isBit(who.used, i) ? "used" : "rejected";
+      const fate = observations.excluded[i] ? "excluded" : trajectory && isBit(trajectory.used, i) ? "used" : "rejected";
       seen.push({ landmark: observations.landmark[i], measured, predicted, error, fate, reason: observations.excluded[i] });
     }
     return seen;
   }
 
   // [uL, v, uR, v] of a landmark, from the camera's pose (3, 4) in the picture's world.
-  predict(who, landmark) {
-    const row = who.row.get(landmark);
-    const T = who.cameras.subarray(12 * chosen.frame, 12 * chosen.frame + 12);
+  predict(trajectory, landmark) {
+    const row = trajectory.row.get(landmark);
+    const T = trajectory.cameras.subarray(12 * chosen.frame, 12 * chosen.frame + 12);
     if (row === undefined || !Number.isFinite(T[0])) return null;
-    const d = [0, 1, 2].map(i => who.points[3 * row + i] - T[4 * i + 3]);
+    const d = [0, 1, 2].map(i => trajectory.points[3 * row + i] - T[4 * i + 3]);
     const [x, y, z] = [0, 1, 2].map(j => T[j] * d[0] + T[4 + j] * d[1] + T[8 + j] * d[2]);
     const { fu, fv, cu, cv, baseline } = run.camera;
     const u = fu * x / z + cu;
@@ -63,7 +63,7 @@ class FrameView {
     const parts = [];
     for (const one of seen) {
       const [x, y] = [2 * side, 2 * side + 1].map(row => scale * one.measured[row]);
-      const group = svg("g", { class: `observation ${one.fate} who-${key}` });
+      const group = svg("g", { class: `observation ${one.fate} trajectory-${key}` });
       if (one.predicted) {
         const [px, py] = [2 * side, 2 * side + 1].map(row => scale * one.predicted[row]);
         group.append(svg("path", { class: "error", d: `M${x.toFixed(1)} ${y.toFixed(1)}L${bounded(px)} ${bounded(py)}` }));
@@ -98,8 +98,8 @@ class FrameView {
       if (errors.length === 0) return NaN;
       return errors.length % 2 ? errors[half] : (errors[half - 1] + errors[half]) / 2;
     };
-    const parts = [`${seen.length} matches`];
-    const kinds = { used: `used by ${name}`, rejected: name ? `offered to but not used by ${name}` : "in the problem", excluded: "excluded by the mask" };
+    const parts = [`${seen.length} observation${seen.length === 1 ? "" : "s"}`];
+    const kinds = { used: `used by ${name}`, rejected: name ? `in the problem, not used by ${name}` : "in the problem", excluded: "excluded by the mask" };
     for (const [fate, text] of Object.entries(kinds)) {
       const some = of(fate);
       if (some.length === 0) continue;
@@ -115,7 +115,7 @@ class FrameView {
   }
 }
 
-// Relative paths around a measured point, told apart by shape and not by colour alone.
+// Relative paths around a measured point, distinguished by shape and not by color alone.
 const MARKS = {
   used: "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0",
   rejected: "m-4.5 0l4.5 -4.5l4.5 4.5l-4.5 4.5z",

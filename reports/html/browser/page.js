@@ -10,7 +10,7 @@ function showFrame() {
 slider.addEventListener("input", () => goTo(Number(slider.value)));
 onFrame.push(showFrame);
 
-for (const box of document.querySelectorAll("#who input")) {
+for (const box of document.querySelectorAll("#estimators-shown input")) {
   box.addEventListener("change", () => show(box.value, box.checked));
 }
 
@@ -63,5 +63,5 @@ document.querySelectorAll(".chart").forEach(place => new TimeChart(place, charts
 const frame = document.getElementById("frame-view");
 if (frame && observations) new FrameView(frame);
 document.documentElement.classList.add("live");
-if (run.jumps.length) goTo(run.jumps[0].frame);
+if (run.bookmarks.length) goTo(run.bookmarks[0].frame);
 showFrame();

@@ -22,9 +22,9 @@ class PathView {
 
   // The box of the paths; a path that runs off alone may be switched off, but does not hide the others.
   bounds() {
-    const reach = [...trajectories.values()].map(who => {
+    const reach = [...trajectories.values()].map(trajectory => {
       const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-      who.path.forEach((value, i) => {
+      trajectory.path.forEach((value, i) => {
         if (!Number.isFinite(value)) return;
         box[i % 3] = Math.min(box[i % 3], value);
         box[3 + i % 3] = Math.max(box[3 + i % 3], value);
@@ -86,23 +86,23 @@ class PathView {
     const parts = [];
     const shown = this.shown();
     if (this.landmarks) {
-      for (const who of shown) if (who.points) parts.push(svg("path", { class: "dots who-" + who.key, d: this.dots(who.points) }));
+      for (const trajectory of shown) if (trajectory.points) parts.push(svg("path", { class: "dots estimator-" + trajectory.key, d: this.dots(trajectory.points) }));
     }
-    for (const who of shown) parts.push(svg("path", { class: "line who-" + who.key, d: this.track(who.path) }));
+    for (const trajectory of shown) parts.push(svg("path", { class: "line estimator-" + trajectory.key, d: this.track(trajectory.path) }));
     if (this.ellipses) {
       const every = Math.max(1, Math.floor(run.frames / ELLIPSES));
-      for (const who of shown) {
-        if (!who.covariance) continue;
+      for (const trajectory of shown) {
+        if (!trajectory.covariance) continue;
         let d = "";
-        for (let k = 0; k < run.frames; k += every) d += this.ellipse(who, k);
-        parts.push(svg("path", { class: "ellipse who-" + who.key, d }));
+        for (let k = 0; k < run.frames; k += every) d += this.ellipse(trajectory, k);
+        parts.push(svg("path", { class: "ellipse estimator-" + trajectory.key, d }));
       }
     }
-    for (const who of shown) {
-      const last = this.lastPose(who.path);
+    for (const trajectory of shown) {
+      const last = this.lastPose(trajectory.path);
       if (last < 0) continue;
-      const [x, y] = this.project(who.path, 3 * last);
-      parts.push(svg("rect", { class: "end who-" + who.key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
+      const [x, y] = this.project(trajectory.path, 3 * last);
+      parts.push(svg("rect", { class: "end estimator-" + trajectory.key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
     }
     const [x, y] = this.project([0, 0, 0], 0);
     parts.push(svg("circle", { class: "start", cx: x, cy: y, r: 5 }));
@@ -116,7 +116,7 @@ class PathView {
 
   // The reference lies below the others.
   shown() {
-    return [...trajectories.values()].filter(who => chosen.shown.has(who.key))
+    return [...trajectories.values()].filter(trajectory => chosen.shown.has(trajectory.key))
       .sort((a, b) => isReference(b.key) - isReference(a.key));
   }
 
@@ -139,9 +139,9 @@ class PathView {
   }
 
   // Where 95 % of the positions would be, as seen in this picture.
-  ellipse(who, k) {
-    const P = who.covariance.subarray(6 * k, 6 * k + 6);
-    if (!Number.isFinite(P[0]) || !Number.isFinite(who.path[3 * k])) return "";
+  ellipse(trajectory, k) {
+    const P = trajectory.covariance.subarray(6 * k, 6 * k + 6);
+    if (!Number.isFinite(P[0]) || !Number.isFinite(trajectory.path[3 * k])) return "";
     const times = (a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2] * b[2]
       + P[1] * (a[0] * b[1] + a[1] * b[0]) + P[2] * (a[0] * b[2] + a[2] * b[0]) + P[4] * (a[1] * b[2] + a[2] * b[1]);
     const [a, b, c] = [times(this.right, this.right), times(this.right, this.up), times(this.up, this.up)];
@@ -151,7 +151,7 @@ class PathView {
     const [long, short] = [middle + apart, middle - apart].map(v => CHI * this.scale * Math.sqrt(v));
     if (long < 0.5 || long > 1e5) return "";
     const angle = -0.5 * Math.atan2(2 * b, a - c);
-    const [x, y] = this.project(who.path, 3 * k);
+    const [x, y] = this.project(trajectory.path, 3 * k);
     const [dx, dy] = [long * Math.cos(angle), long * Math.sin(angle)];
     const arc = `A${long.toFixed(1)} ${Math.max(short, 0.1).toFixed(1)} ${(angle * 180 / Math.PI).toFixed(1)} 0 0`;
     return `M${bounded(x - dx)} ${bounded(y - dy)}${arc} ${bounded(x + dx)} ${bounded(y + dy)}`
@@ -186,13 +186,13 @@ class PathView {
     if (!this.cursor) return;
     const k = chosen.frame;
     const parts = [];
-    for (const who of this.shown()) {
-      if (!Number.isFinite(who.path[3 * k])) continue;
-      const [x, y] = this.project(who.path, 3 * k);
-      if (this.ellipses && who.covariance) {
-        parts.push(svg("path", { class: "ellipse now who-" + who.key, d: this.ellipse(who, k) }));
+    for (const trajectory of this.shown()) {
+      if (!Number.isFinite(trajectory.path[3 * k])) continue;
+      const [x, y] = this.project(trajectory.path, 3 * k);
+      if (this.ellipses && trajectory.covariance) {
+        parts.push(svg("path", { class: "ellipse now estimator-" + trajectory.key, d: this.ellipse(trajectory, k) }));
       }
-      parts.push(svg("circle", { class: "here who-" + who.key, cx: bounded(x), cy: bounded(y), r: 5 }));
+      parts.push(svg("circle", { class: "here estimator-" + trajectory.key, cx: bounded(x), cy: bounded(y), r: 5 }));
     }
     this.cursor.replaceChildren(...parts);
   }
@@ -202,12 +202,12 @@ class PathView {
     const [px, py] = [event.clientX - box.left, event.clientY - box.top];
     let best = null;
     let least = 22 ** 2;
-    for (const who of this.shown()) {
+    for (const trajectory of this.shown()) {
       for (let k = 0; k < run.frames; k++) {
-        if (!Number.isFinite(who.path[3 * k])) continue;
-        const [x, y] = this.project(who.path, 3 * k);
+        if (!Number.isFinite(trajectory.path[3 * k])) continue;
+        const [x, y] = this.project(trajectory.path, 3 * k);
         const away = (x - px) ** 2 + (y - py) ** 2;
-        if (away < least) [least, best] = [away, { who, frame: k }];
+        if (away < least) [least, best] = [away, { trajectory, frame: k }];
       }
     }
     return best;
@@ -216,13 +216,13 @@ class PathView {
   showNearest(event) {
     const near = this.nearest(event);
     if (near === null) return hideHint();
-    const { who, frame } = near;
+    const { trajectory, frame } = near;
     const errors = ["divergence", "error"].flatMap(name => {
       const chart = charts.find(one => one.name === name);
-      const line = chart && chart.lines.get(who.key);
+      const line = chart && chart.lines.get(trajectory.key);
       return line ? [[`${quantity(line[frame], "m")} from ${name === "error" ? "the truth" : run.reference}`, null]] : [];
     });
-    return showHint(event, [[who.name, who.key], [`frame ${frame}, ${timeOf(frame)}`, null], ...errors]);
+    return showHint(event, [[trajectory.name, trajectory.key], [`frame ${frame}, ${timeOf(frame)}`, null], ...errors]);
   }
 
   change(how) {

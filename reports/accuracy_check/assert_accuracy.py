@@ -1,0 +1,212 @@
+"""`assert_accuracy`: limits on one trajectory, for tests with pytest."""
+
+import math
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.compare import (
+    MIN_SAMPLE_SIZE,
+    Align,
+    MatchedTrajectories,
+    absolute_errors,
+    associate,
+    summarized,
+    time_coverage,
+)
+from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.data import Estimate, Status, Trajectory, Truth
+from fgbaseline.data.formats import Order, read_trajectory_file
+from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..phrases.check import bound, number
+
+AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
+"""a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
+AT_LEAST = ("coverage", "pairs")
+"""metrics with lower limits; all others have upper limits"""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedMetric:
+    """A metric of a trajectory and its limit."""
+
+    metric: str
+    unit: str
+    value: float
+    bounds: Bounds
+
+    @property
+    def outcome(self) -> Outcome:
+        """Whether the limit holds."""
+        return self.bounds.judge(self.value)
+
+
+def assert_accuracy(
+    estimate: AnyTrajectory,
+    reference: AnyTrajectory,
+    *,
+    ate: float | None = None,
+    ate_max: float | None = None,
+    divergence: float | None = None,
+    divergence_max: float | None = None,
+    rotation_deg: float | None = None,
+    coverage: float = 0.95,
+    smallest_sample: int = MIN_SAMPLE_SIZE,
+    align: Align | str = Align.SE3,
+    tolerance: float | None = None,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    quaternion: Order | None = None,
+    figure: FilePath | None = None,
+) -> dict[str, float]:
+    """Raises AssertionError, with a table and a figure, where an estimate exceeds a limit; returns the metrics.
+
+    Upper limits: `ate` and `ate_max`, RMSE and maximum of the position error (m) after alignment; `divergence` and
+    `divergence_max`, without alignment; `rotation_deg`, RMSE of the rotation error (deg) after alignment. Lower limits:
+    `coverage`, the share of the reference's time with paired poses, and `smallest_sample` pairs of poses. Poses are
+    associated by time within `tolerance` (s; see `compare.associate`), those of an Estimate or a Truth by frame. The
+    figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit falls short.
+
+    Units and quaternion orders that a file does not state are detected as in `fgbaseline compare`, or given by
+    `time_unit` and `quaternion`. Trajectories without orientations are compared by position only.
+
+    The metrics are by name, such as "ate.rmse". Raises InputError for a call without limits, an invalid trajectory,
+    ambiguous units, or a limit on orientations that are missing or ambiguous.
+    """
+    __tracebackhide__ = True
+    asked = {
+        "ate.rmse": ate,
+        "ate.max": ate_max,
+        "divergence.rmse": divergence,
+        "divergence.max": divergence_max,
+        "rotation.rmse": rotation_deg,
+        "coverage": coverage,
+        "pairs": float(smallest_sample),
+    }
+    _require_bounds(asked)
+    if isinstance(estimate, Estimate) and estimate.status is Status.FAILED:
+        raise AssertionError(f"{estimate.name} failed: {estimate.reason}")
+    _require_one_clock(estimate, reference)
+    settings = Settings(tolerance=tolerance, time_unit=time_unit, quaternion=quaternion)
+    resolved = resolve([_source(reference, "reference"), _source(estimate, "estimate")], (), settings)
+    there, here = (each.trajectory(()) for each in resolved)
+    is_oriented = there.oriented and here.oriented
+    if rotation_deg is not None or Align(align) is Align.FIRST_POSE:
+        _require_orientations(resolved, [there, here])
+    matched = associate(there, here, tolerance=tolerance)
+    up = resolved[0].up
+    aligned = matched.aligned(align) if up is None else matched.aligned(align, up=up)
+    tables = {"divergence": absolute_errors(matched), "ate": absolute_errors(aligned)}
+    values = _values(tables, time_coverage(matched.reference.t, there.t)) | {"pairs": float(len(matched))}
+    if not is_oriented:
+        del values["rotation.rmse"]
+    checked = [_checked(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
+    checked = [each for each in checked if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
+    if all(each.outcome is Outcome.HOLDS for each in checked):
+        return values
+    recognized = [
+        f"{path.name}: {remark}." for path, each in zip((there, here), resolved, strict=True) for remark in each.remarks
+    ]
+    raise AssertionError(_message(checked, aligned, recognized, _drawn(aligned, tables, asked, figure)))
+
+
+def _require_bounds(asked: dict[str, float | None]) -> None:
+    if all(limit is None for metric, limit in asked.items() if metric not in AT_LEAST):
+        raise InputError("accuracy: there is no limit; give ate=0.5 or another one")
+    for metric, limit in asked.items():
+        if limit is not None and not (math.isfinite(limit) and limit >= 0):
+            raise InputError(f"accuracy: the limit on {metric} is {limit!r}; give a number of at least 0")
+
+
+def _require_one_clock(estimate: AnyTrajectory, reference: AnyTrajectory) -> None:
+    """Raises InputError where only one of both has time stamps, or their frames are of different problems."""
+    by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
+    if any(by_frame) and not all(by_frame):
+        raise InputError(
+            "accuracy: an Estimate and a Truth are frames of a problem and have no time stamps; give the stamps with "
+            "the poses, such as (sequence.t, estimate.world_T_imu), or two of them"
+        )
+    if isinstance(estimate, Estimate | Truth) and isinstance(reference, Estimate | Truth):
+        n, n_reference = len(estimate.world_T_imu), len(reference.world_T_imu)
+        if n != n_reference:
+            raise InputError(
+                f"accuracy: the estimate has {n} frames and the reference {n_reference}; give two of one problem"
+            )
+
+
+def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> None:
+    """Raises InputError where orientations are missing or their quaternion order is ambiguous."""
+    for each, path in zip(resolved, paths, strict=True):
+        file = path.source or path.name
+        if not path.oriented:
+            raise InputError(f"{file}: it has no orientations; leave out rotation_deg and align='first-pose'")
+        if each.order_in_doubt:
+            raise InputError(f"{file}: {each.remarks[-1]}".replace("--quaternion", "quaternion"))
+
+
+def _source(path: AnyTrajectory, name: str) -> Source:
+    if isinstance(path, Trajectory):
+        return path
+    if isinstance(path, Estimate | Truth):
+        frames = np.arange(len(path.world_T_imu), dtype=np.float64)
+        name = path.name if isinstance(path, Estimate) else "truth"
+        return replace(Trajectory.of_frames(frames, path.world_T_imu, name), stamped=False)
+    if isinstance(path, tuple):
+        t, poses = path
+        return Trajectory.of_frames(t, poses, name)
+    return read_trajectory_file(path)
+
+
+def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:
+    values = {"coverage": coverage, "rotation.rmse": summarized(tables["ate"]["rotation_deg"])["rmse"]}
+    for name, table in tables.items():
+        statistics = summarized(table["translation"])
+        values |= {f"{name}.rmse": statistics["rmse"], f"{name}.max": statistics["max"]}
+    return dict(sorted(values.items()))
+
+
+def _checked(metric: str, value: float, limit: float) -> CheckedMetric:
+    bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
+    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
+
+
+def _drawn(
+    aligned: MatchedTrajectories,
+    tables: dict[str, pd.DataFrame],
+    asked: dict[str, float | None],
+    place: FilePath | None,
+) -> Path:
+    from ..figures.comparison import draw_failed_check  # matplotlib: only where something fell short
+
+    path = Path(tempfile.mkdtemp(prefix="fgbaseline-")) / "accuracy.png" if place is None else Path(place)
+    limited = {metric.partition(".")[0] for metric, limit in asked.items() if limit is not None}
+    shown = [name for name in tables if name in limited] or ["ate"]
+    draw_failed_check(aligned, {name: (tables[name], asked[f"{name}.max"]) for name in shown}, path)
+    return path
+
+
+def _message(checked: Sequence[CheckedMetric], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
+    rows = [("limit", "metric", "value", "bound", "margin")]
+    for each in checked:
+        unit = f" ({each.unit})" if each.unit else ""
+        margin = number(each.bounds.margin(each.value), sign=True)
+        rows.append((each.outcome.value, each.metric + unit, number(each.value), bound(each.bounds), margin))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    table = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join(
+        [
+            f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:",
+            *table,
+            aligned.caption,
+            *recognized,
+            f"The figure is in {drawn}",
+        ]
+    )

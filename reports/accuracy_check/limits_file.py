@@ -1,0 +1,108 @@
+"""The limits file, in TOML."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
+from fgbaseline.compare.limits import Better, Bounds
+from fgbaseline.data.toml_file import TomlFile, read_toml
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Share = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Needed(StrEnum):
+    """Trust in the reference that a limit requires to hold."""
+
+    TRUSTED = "trusted"
+    DOUBTFUL = "doubtful"
+    """a doubtful one suffices, and is reported"""
+    NONE = "none"
+    """any, for metrics that do not depend on the reference; the others require a doubtful one"""
+
+
+class Tolerance(_Part):
+    """Allowed change of a metric for the worse: the larger of the two."""
+
+    better: Better
+    relative: NotNegative = 0.0
+    """share of the baseline"""
+    absolute: NotNegative = 0.0
+    """in the metric's unit"""
+
+    @property
+    def text(self) -> str:
+        """Such as `5 % or 0.01`."""
+        parts = [f"{100 * self.relative:.4g} %"] if self.relative else []
+        parts += [f"{self.absolute:.4g}"] if self.absolute else []
+        return " or ".join(parts) or "nothing"
+
+
+def _no_blank(text: str) -> str:
+    if not text.strip():
+        raise ValueError("it is empty; write a path or a pattern")
+    return text
+
+
+Pattern = Annotated[str, AfterValidator(_no_blank)]
+
+
+class Limit(_Part):
+    """A limit on a metric of every estimator and run that the patterns match."""
+
+    metric: Pattern
+    """its path below `estimators.NAME` in summary.json, such as ate.rmse"""
+    estimators: Pattern | Annotated[tuple[Pattern, ...], Field(min_length=1)] = "*"
+    runs: Pattern = "*"
+    """pattern, for a folder with several runs"""
+    at_most: Finite | None = None
+    at_least: Finite | None = None
+    baseline: Tolerance | None = None
+    smallest_sample: Count | None = None
+    """None for that of the file"""
+    smallest_coverage: Share | None = None
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """The patterns of estimators, one or several."""
+        return (self.estimators,) if isinstance(self.estimators, str) else self.estimators
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """The limit's own bounds; None where it has only a baseline."""
+        if self.at_most is None and self.at_least is None:
+            return None
+        return Bounds(**{side: value for side in ("at_most", "at_least") if (value := getattr(self, side)) is not None})
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "Limit":
+        if self.bounds is None and self.baseline is None:
+            raise ValueError(f"{self.metric} has no bound; add at_most, at_least or baseline")
+        if self.bounds is not None and self.bounds.at_least > self.bounds.at_most:
+            raise ValueError(f"at_least = {self.at_least:g} is above at_most = {self.at_most:g}; nothing lies between")
+        return self
+
+
+class Limits(_Part):
+    """The file."""
+
+    reference: Needed = Needed.DOUBTFUL
+    smallest_sample: Count = MIN_SAMPLE_SIZE
+    """number of poses, frames or observations behind a metric"""
+    smallest_coverage: Share = MIN_COVERAGE
+    """share of the time of the estimate; in a run, of the recording"""
+    limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
+
+
+def read_limits(path: Path) -> TomlFile[Limits]:
+    """Reads a limits file. Raises InputError with the file, the key path and the allowed values."""
+    return read_toml(path, Limits)

@@ -1,0 +1,286 @@
+"""Commands that evaluate and present: `compare`, `check`, `figures`, `bench` and `reproduce`."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import BODY, PATH, UNITS, Formats, Numbers
+
+XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
+
+
+@click.command(
+    epilog="Example: fgbaseline compare truth.tum mine=out.tum --align yaw --out out/comparison\n\n"
+    "\b\nAgainst a run, with reprojection of your own landmarks:\n"
+    "fgbaseline compare out/drive mine.tum --sequence out/problem --landmarks mine.csv --out out/comparison"
+)
+@click.argument("reference")
+@click.argument("estimates", nargs=-1, metavar="[NAME=]ESTIMATE...")
+@click.option("--out", type=PATH, help="Folder for tables, figures and report.html.")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier comparison.")
+@click.option(
+    "--align",
+    type=click.Choice(["none", "first-pose", "yaw", "se3", "sim3"]),
+    help="Alignment of each estimate.  [default: none against a run, which has the same world frame; else se3]",
+)
+@click.option("--align-first", type=click.IntRange(min=1), metavar="N", help="Align over the first N poses.")
+@click.option(
+    "--up",
+    type=XYZ,
+    help="Up in the reference's world.  [default: 0,-1,0 in KITTI files; else by the run or --sequence, else 0,0,1]",
+)
+@click.option(
+    "--association",
+    type=click.Choice(["nearest", "interpolated"]),
+    default="nearest",
+    show_default=True,
+    help="Association of poses by time, each at most once.",
+)
+@click.option("--tolerance", type=float, metavar="S", help="Largest time difference of a pair.  [default: 0.01]")
+@click.option("--offset", type=float, default=0.0, metavar="S", help="Added to the stamps of the estimates.")
+@click.option("--search-offset", type=float, metavar="S", help="Estimate the time offset, within +-S.")
+@click.option(
+    "--delta",
+    "deltas",
+    multiple=True,
+    metavar="LENGTH",
+    help="Delta of the relative errors: 1s, 10m, 30deg or 5frames; repeatable.  [default: 1s and 10m]",
+)
+@click.option("--all-pairs", is_flag=True, help="Relative errors from every pose, not end to end.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["tum", "kitti", "euroc", "npz"]),
+    help="Format of the files.  [default: detected from the content]",
+)
+@click.option(
+    "--times",
+    multiple=True,
+    type=PATH,
+    help="Time stamps of KITTI files, one a line; repeatable: a file takes those of the same number.",
+)
+@click.option(
+    "--time-unit",
+    type=UNITS,
+    help="Unit of ambiguous time stamps.  [default: by header, size, rate and the other file]",
+)
+@click.option(
+    "--quaternion",
+    type=click.Choice(["xyzw", "wxyz"]),
+    help="Order of quaternions without a header.  [default: the format's, unless the other fits better]",
+)
+@click.option(
+    "--lever-arm",
+    type=XYZ,
+    help="Position, m, of the reference's point in the body frame of the estimate, whose orientations rotate it.",
+)
+@click.option("--align-body", is_flag=True, help="Remove a constant rotation between the body frames.")
+@click.option(
+    "--sequence",
+    type=PATH,
+    help="The recording, or the folder of fgbaseline export: adds reprojection errors.",
+)
+@click.option(
+    "--landmarks",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    help="Landmarks of an estimate: CSV with id,x,y,z, id being the index in --sequence; repeatable.",
+)
+@click.option(
+    "--held-out",
+    type=float,
+    default=0.0,
+    metavar="SHARE",
+    help="Rank all paths by this share of the recording's tracks; export with the same SHARE and --seed for a filter "
+    "that does not use them.  [default: as the run]",
+)
+@click.option("--reference-body", type=BODY, default="imu", help="Body whose poses the reference has.")
+@click.option("--estimate-body", type=BODY, default="imu", help="Body whose poses the estimates have.")
+@click.option("--extrinsic", type=PATH, help="imu_T_cam, one line of 12 numbers.  [default: of --sequence]")
+@click.option(
+    "--beside", default="all", show_default=True, help="Estimators of the run to compare too: names, all or none."
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of the bootstrap and of the choice of held-out tracks.",
+)
+def compare(
+    reference: str,
+    estimates: tuple[str, ...],
+    landmarks: tuple[str, ...],
+    deltas: tuple[str, ...],
+    out: Path | None,
+    force: bool,
+    **options: Any,
+) -> None:
+    """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
+
+    REFERENCE may also be the folder of a run. Then its reference is used, the trust in it is printed first, and its
+    other estimators are compared too.
+
+    Exits 0, or 2 on bad input.
+    """
+    from fgbaseline.data.formats.atomic_folder import require_free
+    from fgbaseline.geometry import InputError
+
+    from ..comparison import compare as compare_files
+    from ..results.comparison import MARK
+    from ..tables import print_table
+
+    if out is not None:
+        require_free(out, force=force, mark=MARK)
+    elif force:
+        raise InputError("force: there is no folder to replace; add --out DIR")
+    report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
+    page = None if out is None else report.write(out, force=force)
+    first, *others = report.verdict
+    click.echo(f"{first}\n")
+    print_table(report.text_table, wrap_names=False)
+    click.echo("\n".join([f"{report.caption}\n", *others]))
+    if page is not None:
+        click.echo(f"\nThe report is in {page}")
+
+
+@click.command(
+    epilog="Example: fgbaseline check out/drive --limits limits.toml --baseline baseline.json --junit check.xml"
+)
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--limits", required=True, type=PATH, metavar="FILE", help="Limits, in TOML (docs/ci.md).")
+@click.option(
+    "--baseline",
+    type=PATH,
+    metavar="FILE",
+    help="Earlier metrics: written by --update-baseline, or the summary.json of an earlier run.",
+)
+@click.option("--junit", type=PATH, metavar="FILE", help="Write JUnit XML, which CI systems show as tests.")
+@click.option("--markdown", type=PATH, metavar="FILE", help="Write Markdown, for a comment on a pull request.")
+@click.option("--json", "as_json", type=PATH, metavar="FILE", help="Write JSON, with all digits.")
+@click.option("--update-baseline", is_flag=True, help="Write a new baseline, unless a limit falls short.")
+@click.option("--accept-worse", is_flag=True, help="Let --update-baseline write although a limit falls short.")
+def check(
+    folder: Path,
+    limits: Path,
+    baseline: Path | None,
+    junit: Path | None,
+    markdown: Path | None,
+    as_json: Path | None,
+    update_baseline: bool,
+    accept_worse: bool,
+) -> int:
+    """Check the metrics in DIR against limits and a baseline.
+
+    DIR is the folder of `run`, `compare` or `bench`. On GitHub the table also goes to the page of the job
+    (GITHUB_STEP_SUMMARY).
+
+    Exits 0 when all limits hold, 1 when one falls short, 2 when one is undecided, and on bad input. A limit is
+    undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
+    untrusted, or when there is no baseline to compare with.
+    """
+    from ..accuracy_check.command import Outputs
+    from ..accuracy_check.command import check as check_folder
+
+    outputs = Outputs(junit=junit, markdown=markdown, json=as_json)
+    return check_folder(folder, limits, baseline, outputs, update=update_baseline, accept_worse=accept_worse)
+
+
+@click.command(epilog="Example: fgbaseline figures out/drive --format pdf --out paper/figures")
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--format", "formats", type=Formats(), default="pdf", show_default=True, help="One or more of these.")
+@click.option("--out", type=PATH, help="Folder to write.  [default: DIR/paper]")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier call.")
+def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: bool) -> int:
+    """Draw the figures of a run's folder DIR again, for a paper in two columns.
+
+    They are one column wide, with letters of 7 points, embedded fonts, and lines that differ without color. They show
+    what the run wrote; nothing is computed again. captions.json has a caption for each.
+
+    Exits 0, or 2 on bad input.
+    """
+    from fgbaseline.data.formats.atomic_folder import atomic_folder
+    from fgbaseline.data.plural import plural
+
+    from ..figures.run import draw_for_paper
+    from ..figures.run_data import of_folder
+    from ..figures.saving import CAPTIONS, save, save_captions
+    from ..figures.style import PAPER
+
+    place = out or folder / "paper"
+    drawn = draw_for_paper(of_folder(folder))
+    with atomic_folder(place, force=force, mark=CAPTIONS) as building:
+        save({name: figure for name, (figure, _) in drawn.items()}, building, formats, PAPER)
+        save_captions({name: caption for name, (_, caption) in drawn.items()}, building)
+    click.echo(f"{plural(len(drawn), 'figure')} as {', '.join(formats)} in {place}")
+    return 0
+
+
+@click.command(epilog="Example: fgbaseline bench suites/quick.toml --out out/bench/quick")
+@click.argument("suite", type=PATH)
+@click.option("--out", type=PATH, help="Folder to write.  [default: out/bench/NAME]")
+@click.option(
+    "--data",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="Folder of the suite's relative paths.  [default: the suite's folder]",
+)
+@click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: one for each core]")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead (fgbaseline[cluster]).")
+@click.option("--force", is_flag=True, help="Run every job again.")
+def bench(
+    suite: Path, out: Path | None, data: Path | None, workers: int | None, scheduler: str | None, force: bool
+) -> int:
+    """Run every sequence, setting and seed of SUITE (TOML), and write a benchmark report.
+
+    Finished runs are kept. The same command resumes an interrupted bench, and runs again only what has changed: a
+    recording, a setting, the source code. docs/bench.md describes suites and report.
+
+    Exits 0 when every estimator gave an answer in every run, 1 when one failed, 2 on bad input.
+    """
+    from fgbaseline.geometry import InputError
+
+    from ..bench.command import bench as run_bench
+
+    if workers is not None and scheduler is not None:
+        raise InputError("workers: it is for this machine, and a cluster has its own; leave it out with --scheduler")
+    return run_bench(suite, out, data=data, workers=workers, scheduler=scheduler, force=force)
+
+
+@click.command(epilog="Example: fgbaseline reproduce 03.npz 10.npz --out out/reproduction")
+@click.argument("sequence", nargs=-1, required=True, type=PATH)
+@click.option("--out", type=PATH, default=Path("out/reproduction"), show_default=True, help="Folder to write.")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier reproduction.")
+@click.option(
+    "--sweep-features",
+    type=Numbers("N,N,...", "whole numbers from 1 on, separated by commas", of=int),
+    default="200,400,700,1000",
+    show_default=True,
+    help="Numbers of features of the sweep.",
+)
+@click.option(
+    "--sweep-noise",
+    type=Numbers("V,V,...", "numbers above 0, separated by commas"),
+    default="0.01,1,15,100",
+    show_default=True,
+    help="Variances V of the sweep, px², of each pixel row.",
+)
+def reproduce(
+    sequence: tuple[Path, ...],
+    out: Path,
+    force: bool,
+    sweep_features: tuple[int, ...],
+    sweep_noise: tuple[float, ...],
+) -> int:
+    """Draw the figures of the source paper from SEQUENCE... and test its claims.
+
+    The source paper's recordings are 03.npz and 10.npz, recognized by their numbers of frames; others get figures of
+    the same kind. A recording without features has its path drawn; the rest uses features that are simulated along it
+    and labeled as such. Each claim has the measured figure, its cause, and the result on the repaired recording.
+
+    Exits 0 when the reproduction is written, whatever the claims' results, and 2 on bad input.
+    """
+    from ..reproduction.command import reproduce as run_reproduction
+    from ..reproduction.study import SweepSettings
+
+    return run_reproduction(sequence, out, SweepSettings(sweep_features, sweep_noise), force=force)

@@ -1,0 +1,248 @@
+"""Commands on a recording: `run`, `diagnose`, `export` and `simulate`."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import options
+from .options import PATH, Numbers
+
+DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
+PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
+INTERVALS = ("after", "before", "mean")
+DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
+
+
+@click.command(epilog="Example: fgbaseline run drive.npz --truth poses.txt --truth-frame camera --out out/drive")
+@click.argument("sequence", required=False, type=PATH)
+@click.option("--out", type=PATH, help="Folder to write.  [default: out/NAME]")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
+@options.preset
+@click.option("--estimators", default=DEFAULT_ESTIMATORS, show_default=True, help="Names, separated by commas.")
+@options.features
+@click.option(
+    "--landmarks",
+    type=click.Choice(["in-turn", "held"]),
+    default="in-turn",
+    show_default=True,
+    help="Landmarks of the documented SLAM: updated in turn with the pose, or fixed at those of landmark mapping.",
+)
+@click.option("--truth", type=PATH, help="Ground truth: a trajectory file.")
+@click.option("--truth-frame", type=options.BODY, help="Body whose poses the ground truth has.")
+@options.as_recorded
+@options.imu
+@options.imu_calibration
+@options.time_unit
+@options.repairs
+@options.held_out
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of the simulated drive and of the choice of held-out tracks.",
+)
+@click.option(
+    "--rerun",
+    "rerun_file",
+    metavar="FILE.rrd",
+    type=PATH,
+    help="Write a recording for the viewer Rerun too (needs the extra fgbaseline[rerun]).",
+)
+def run(
+    out: Path | None,
+    force: bool,
+    estimators: str,
+    landmarks: str,
+    time_unit: str | None,
+    rerun_file: Path | None,
+    **given: Any,
+) -> int:
+    """Run all estimators on SEQUENCE, compare them and write a report.
+
+    Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
+
+    Exits 0 when every estimator gave an answer, 1 when one failed (the report is written nevertheless), 2 on bad
+    input.
+    """
+    from fgbaseline.data import LandmarkMode, TimeUnit
+
+    from ..run.command import run as run_and_report
+    from ..run.problem import RunSettings
+
+    settings = RunSettings(
+        estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
+        landmarks=LandmarkMode(landmarks),
+        time_unit=None if time_unit is None else TimeUnit(time_unit),
+        **given,
+    )
+    return run_and_report(settings, out, force=force, rerun_file=rerun_file)
+
+
+@click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")
+@click.argument("sequence", type=PATH)
+@click.option("--out", type=PATH, help="Folder for diagnosis.json and figures.")
+@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
+@click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
+@options.imu
+@options.imu_calibration
+@options.time_unit
+@click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
+def diagnose(
+    sequence: Path,
+    out: Path | None,
+    as_json: bool,
+    write_repairs: Path | None,
+    imu: Path | None,
+    imu_calibration: Path | None,
+    time_unit: str | None,
+    force: bool,
+) -> int:
+    """Detect the faults of SEQUENCE and estimate its noise.
+
+    Faults are wrong units, axes, gyroscope bias, delay, velocity scale, extrinsic and tracks. Ground truth in the
+    file is not used. `fgbaseline run` repairs the faults that are detected here.
+
+    Exits 0 without findings, 1 with findings, 2 when the diagnosis is undecided, and on bad input.
+    """
+    from fgbaseline.data import TimeUnit, read
+
+    from ..run.diagnose import print_diagnosis
+
+    unit = None if time_unit is None else TimeUnit(time_unit)
+    recording = read(sequence, time_unit=unit, imu=imu, imu_calibration=imu_calibration)
+    return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force)
+
+
+@click.command(epilog="Example: fgbaseline export drive.npz --out out/problem")
+@click.argument("sequence", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Folder to write.")
+@click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
+@options.preset
+@options.features
+@options.imu
+@options.imu_calibration
+@options.as_recorded
+@options.repairs
+@options.held_out
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice of held-out tracks."
+)
+def export(out: Path, force: bool, **given: Any) -> int:
+    """Write the problem that `fgbaseline run` would solve on SEQUENCE: npz, CSV and JSON.
+
+    The files hold repaired velocities, increments with covariances, observations with the mask, noise, kernel,
+    priors, calibration and time stamps. A filter in any language can solve the same problem; `fgbaseline compare`
+    reads its trajectory. Ground truth is not exported.
+
+    Exits 0, or 2 on bad input.
+    """
+    from ..run.command import export as export_problem
+    from ..run.problem import RunSettings
+
+    return export_problem(RunSettings(**given), out, force=force)
+
+
+@click.command(epilog="Example: fgbaseline simulate drive.npz --path loop --duration 120 --burst 20:22:0.5 --seed 7")
+@click.argument("output", type=PATH)
+@click.option("--path", help="Shape of the drive.  [default: town]", type=click.Choice(PATHS))
+@click.option("--along", help="Recording whose velocities are the motion (path 'along').", type=PATH)
+@click.option(
+    "--along-gyro-bias", help="rad/s, first subtracted from the rates of --along.", type=(float, float, float)
+)
+@click.option("--duration", help="Seconds.  [default: 60, or all of --along]", type=float)
+@click.option("--frame-rate", help="Frames a second.  [default: 10]", type=float)
+@click.option("--seed", help="The same seed gives the same bytes.  [default: 0]", type=int)
+@click.option("--standing", help="Seconds at rest before the motion starts.  [default: 0]", type=float)
+@click.option("--imu", is_flag=True, help="Raw inertial samples in place of body velocities.")
+@click.option("--imu-rate", help="Hz, with --imu.  [default: 200]", type=float)
+@click.option(
+    "--imu-noise",
+    help="With --imu: noise density and random walk of the gyroscope, then of the accelerometer (continuous time).  "
+    "[default: 1.7e-4 2e-5 2e-3 3e-3]",
+    type=(float, float, float, float),
+)
+@click.option("--accelerometer-bias", help="m/s^2, with --imu.", type=(float, float, float))
+@click.option("--sigma-linear", help="m/s, 1-sigma noise of a linear velocity sample.  [default: 0.1]", type=float)
+@click.option(
+    "--sigma-angular", help="rad/s, 1-sigma noise of an angular velocity sample.  [default: 0.01]", type=float
+)
+@click.option("--gyro-bias", help="rad/s, in recorded axes.", type=(float, float, float))
+@click.option("--velocity-scale", help="Recorded over true velocity.  [default: 1]", type=float)
+@click.option("--time-offset", help="s: a velocity stamped t was measured at t + offset.  [default: 0]", type=float)
+@click.option(
+    "--velocity-of-interval",
+    help="Interval that a velocity belongs to: after or before its frame, or the mean of both.  [default: after]",
+    type=click.Choice(INTERVALS),
+)
+@click.option("--linear-axes", help="Axis convention of the linear velocity, such as x,-y,-z.")
+@click.option("--angular-axes", help="Axis convention of the angular velocity.")
+@click.option("--features-per-frame", help="Number of tracks in a frame.  [default: 70]", type=float)
+@click.option("--track-length", help="Median length of a track, frames.  [default: 14]", type=float)
+@click.option("--returning-share", help="Share of tracks that are lost and found again.", type=float)
+@click.option("--return-after", help="s from the first observation of such a track to its return.", type=float)
+@click.option("--sigma-pixel", help="px, 1-sigma noise of each pixel row.  [default: 0.5]", type=float)
+@click.option("--row-correlation", help="Correlation of the noise of vL and vR.  [default: 0]", type=float)
+@click.option("--wrong-share", help="Share of wrong matches.  [default: 0.03]", type=float)
+@click.option(
+    "--burst",
+    help="Share of wrong matches between two times, s; repeatable.",
+    type=Numbers("START:END:SHARE", "START:END:SHARE in numbers"),
+    multiple=True,
+)
+@click.option(
+    "--blackout",
+    help="Time without features, s; repeatable.",
+    type=Numbers("START:END", "START:END in numbers"),
+    multiple=True,
+)
+@click.option("--moving-share", help="Share of observations on moving objects.", type=float)
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def simulate(
+    output: Path,
+    along: Path | None,
+    force: bool,
+    imu: bool,
+    imu_rate: float | None,
+    imu_noise: tuple[float, float, float, float] | None,
+    accelerometer_bias: tuple[float, float, float] | None,
+    **given: Any,
+) -> None:
+    """Simulate a recording and write it to OUTPUT (.npz) with its ground truth.
+
+    The file is a course file with `ground_truth` and `landmarks` added; `fgbaseline run` reads it.
+
+    Exits 0, or 2 on bad input.
+    """
+    from fgbaseline.data import read, write_npz
+    from fgbaseline.data.plural import plural
+    from fgbaseline.data.simulate import SimulatedImu, Simulation
+    from fgbaseline.data.simulate import simulate as simulated
+    from fgbaseline.geometry import InputError
+
+    if output.suffix != ".npz":
+        raise InputError(f"{output}: a recording is written as .npz; give a name that ends with it")
+    if output.exists() and not force:
+        raise InputError(f"{output}: the file exists; choose another, or replace it with --force")
+    settings = {name: value for name, value in given.items() if value not in (None, ())}
+    for many, one in (("bursts", "burst"), ("blackouts", "blackout")):
+        if one in settings:
+            settings[many] = settings.pop(one)
+    inertial: dict[str, Any] = {"rate": imu_rate, "accelerometer_bias": accelerometer_bias}
+    if imu_noise is not None:
+        inertial |= dict(zip(DENSITIES, imu_noise, strict=True))
+    inertial = {name: value for name, value in inertial.items() if value is not None}
+    if inertial and not imu:
+        raise InputError("imu-rate, imu-noise, accelerometer-bias: they are settings of --imu; add it")
+    if imu:
+        settings["imu"] = SimulatedImu(**inertial)
+    if along is not None:
+        settings["along"] = read(along)
+        settings.setdefault("path", "along")
+    sequence = simulated(Simulation(**settings))
+    write_npz(sequence, output)
+    click.echo(
+        f"{output}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} of "
+        f"{plural(sequence.n_landmarks, 'track')}"
+    )

@@ -1,0 +1,187 @@
+"""Inputs of a comparison, read and brought to one body frame: reference, estimates and the problem behind them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fgbaseline.compare.trajectory_comparison.bodies import moved_body, with_body_recognized, with_lever_arm
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
+from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
+from fgbaseline.data import Landmarks, Problem, Trajectory
+from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
+from fgbaseline.data.formats.named_file import shown
+from fgbaseline.geometry import FloatArray, InputError, se3
+
+from .reference_run import ReferenceRun, load_problem, read_reference_run
+
+Given = str | Path | Trajectory
+"""`[NAME=]FILE`, or a trajectory in memory"""
+
+CUT_OFF = 0.01
+"""largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
+ONLINE = "-online"
+"""suffix of a smoother's by-product: pose k from data up to frame k"""
+
+
+def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
+    """Reads all inputs. Raises InputError with the file and its fault."""
+    run = read_reference_run(Path(str(reference))) if _is_folder(reference) else None
+    problem, held = load_problem(settings, run)
+    own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
+    sources = own if run is None else [run.files.trajectory(run.reference), *own]
+    first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
+    beside = []
+    if run is not None:
+        first = replace(first, landmarks=run.files.landmarks(run.reference), trust=run.trust)
+        beside = [
+            Entry(run.files.trajectory(name), run.files.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
+            for name in _beside(run, settings.beside)
+        ]
+    entries = _named_apart([first, *beside, *others])
+    entries = _with_landmarks(entries, landmarks, [e.name for e in entries[1 + len(beside) :]], problem)
+    if len(entries) == 1:
+        raise InputError("estimate: there is nothing to compare; name at least one trajectory besides the reference")
+    up = None if run is None or run.up is None else np.array(run.up)
+    return Entries(entries[0], tuple(entries[1:]), problem, held, up, run is not None)
+
+
+def _is_folder(given: Given) -> bool:
+    return isinstance(given, str | Path) and Path(given).is_dir()
+
+
+def _opened(given: Given, settings: Settings) -> Source:
+    if isinstance(given, Trajectory):
+        return given
+    name, file = _split(str(given))
+    return read_trajectory_file(file, settings.form, name)
+
+
+def _in_one_body(
+    every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
+) -> list[Entry]:
+    """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
+    times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
+    reference, *estimates = [
+        Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
+    ]
+    bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
+    if settings.lever_arm is not None and bodies[0] != bodies[1]:
+        raise InputError(
+            "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
+        )
+    if settings.lever_arm is not None:
+        estimates = [with_lever_arm(each, np.array(settings.lever_arm)) for each in estimates]
+    elif not reference.trajectory.oriented and bodies[0] != bodies[1]:
+        imu_T_cam = _required(imu_T_cam, reference)
+        arm = imu_T_cam[:3, 3] if bodies[0] == "camera" else se3.inverse(imu_T_cam)[:3, 3]
+        estimates = [with_lever_arm(each, arm) for each in estimates]
+    elif reference.trajectory.oriented:
+        if bodies[0] == "camera":
+            reference = moved_body(reference, se3.inverse(_required(imu_T_cam, reference)))
+        if bodies[1] == "camera":
+            estimates = [moved_body(each, se3.inverse(_required(imu_T_cam, each))) for each in estimates]
+    return [reference, *(with_body_recognized(reference.trajectory, each, settings) for each in estimates)]
+
+
+def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
+    path = entry.trajectory
+    if imu_T_cam is None:
+        raise InputError(f"{path.source or path.name}: its poses are the camera's; add --sequence or --extrinsic FILE")
+    return imu_T_cam
+
+
+def _split(given: str) -> tuple[str | None, str]:
+    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
+    name, mark, file = given.partition("=")
+    if not mark or Path(given).exists() or "/" in name:
+        return None, given
+    if not name or not file:
+        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
+    return name, file
+
+
+def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
+    """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
+    if settings.times:
+        return [read_times(file, settings.unit) for file in settings.times]
+    if problem is None:
+        return []
+    t = problem.sequence.t
+    return [t[: len(t) - k] for k in range(int(CUT_OFF * len(t)) + 1)]
+
+
+def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:
+    if settings.extrinsic is None:
+        return None if problem is None else problem.sequence.imu_T_cam
+    poses = read_kitti(settings.extrinsic)
+    if len(poses) != 1:
+        raise InputError(f"{settings.extrinsic}: expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
+    return np.asarray(poses[0], dtype=np.float64)
+
+
+def _beside(run: ReferenceRun, wanted: str) -> list[str]:
+    others = [name for name in run.names if name != run.reference]
+    if wanted in ("all", "none"):
+        return others if wanted == "all" else []
+    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    for name in names:
+        if name not in others:
+            raise InputError(f"beside: the run has no '{name}' besides its reference; it has {', '.join(others)}")
+    return names
+
+
+def _named_apart(entries: list[Entry]) -> list[Entry]:
+    """Entries with unique names: equal names get the folder's name in front, then a number at the end."""
+    given = [entry.name for entry in entries]
+    names = list(given)
+    for i, entry in enumerate(entries):
+        if given.count(entry.name) > 1 and Path(entry.trajectory.source).parent.name:
+            names[i] = f"{Path(entry.trajectory.source).parent.name}-{entry.name}"
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
+        taken.add(names[i])
+    return [
+        replace(e, trajectory=replace(e.trajectory, name=_file_name(n))) for e, n in zip(entries, names, strict=True)
+    ]
+
+
+def _file_name(name: str) -> str:
+    """The name; raises InputError where a file cannot have it."""
+    if "/" in name or "\\" in name or name.startswith(".") or not name:
+        raise InputError(f"{name!r} cannot be a file name; give the trajectory another: NAME=FILE")
+    return name
+
+
+def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], problem: Problem | None) -> list[Entry]:
+    """The entries with landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
+    if files and problem is None:
+        raise InputError("landmarks: their reprojection needs the observations of a recording; add --sequence")
+    found: dict[str, Landmarks] = {}
+    for given in files:
+        name, file = _split(given)
+        if name is None:
+            if len(own) != 1:
+                raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; name one: NAME=FILE")
+            name = own[0]
+        if name not in own:
+            raise InputError(f"landmarks: there is no estimate '{name}'; there are {', '.join(own)}")
+        found[name] = read_landmarks(file)
+    merged = [replace(e, landmarks=found.get(e.name, e.landmarks)) for e in entries]
+    for entry in merged:
+        _require_known(entry, problem)
+    return merged
+
+
+def _require_known(entry: Entry, problem: Problem | None) -> None:
+    if problem is None or entry.landmarks is None or not len(entry.landmarks):
+        return
+    last, n = int(entry.landmarks.index[-1]), problem.sequence.n_landmarks
+    if last >= n:
+        raise InputError(
+            f"{entry.name}: its landmark {last} is not one of the sequence's {n}; a run numbers the pieces of split "
+            "tracks beyond the recording's, so give --sequence the folder of its fgbaseline export"
+        )

@@ -1,0 +1,100 @@
+"""The folder of a run as the reference of a comparison, and the problem behind a comparison."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fgbaseline.compare import Trust, Verdict
+from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
+from fgbaseline.data.formats.named_file import reading, regular_file
+from fgbaseline.geometry import InputError
+
+from ..results.reader import SUMMARY, RunFolder
+from ..run.problem import RunSettings, build_problem, hold_out_tracks
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceRun:
+    """A run whose reference others are compared with."""
+
+    files: RunFolder
+    reference: str
+    trust: Trust
+    names: tuple[str, ...]
+    """the estimators that gave an answer"""
+    settings: dict[str, Any]
+    up: tuple[float, ...] | None
+    """up in the world of its trajectories; None in the summaries of older versions"""
+
+
+def read_reference_run(folder: Path) -> ReferenceRun:
+    """Reads the summary. Raises InputError with the file where the folder is not that of a run with a reference."""
+    path = folder / SUMMARY
+    if not path.is_file():
+        raise InputError(
+            f"{folder}: this folder has no {SUMMARY}, so it is not that of a run; give a trajectory file, or a folder "
+            "that fgbaseline run wrote"
+        )
+    with reading(path):
+        try:
+            summary = json.loads(regular_file(path).read_text(encoding="utf-8"))
+            reference, estimators = summary["reference"], summary["estimators"]
+            chosen = str(reference["name"])
+            trust = Trust(Verdict[str(reference["trust"]).upper()], tuple(map(str, reference["reasons"])))
+            names = tuple(str(name) for name, e in estimators.items() if e["status"] != "failed")
+            settings = dict(summary["settings"])
+            up = summary["sequence"].get("up")
+            up = None if up is None else tuple(map(float, up))
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+            raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
+        if chosen not in names:
+            raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
+    return ReferenceRun(RunFolder(folder), chosen, trust, names, settings, up)
+
+
+def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem | None, HeldOut | None]:
+    """Problem and held-out tracks: of an exported folder, or built from a recording as in the run, else calibrated.
+
+    Raises InputError.
+    """
+    sequence = settings.sequence
+    if settings.held_out and (sequence is None or sequence.is_dir()):
+        raise InputError("held-out: the tracks come from a recording; give it with --sequence, not an exported folder")
+    if sequence is None:
+        return None, None
+    if sequence.is_dir():
+        return read_problem(sequence), None
+    recorded = read(sequence)
+    if run is None:
+        wanted = RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
+    else:
+        wanted = _settings_of(run, sequence)
+        if settings.held_out not in (0.0, wanted.held_out):
+            raise InputError(
+                f"held-out: {run.files.folder} was run with {wanted.held_out:g}; leave out --held-out, or run it again"
+            )
+    kept, held = hold_out_tracks(recorded, wanted)
+    return build_problem(kept, wanted), held
+
+
+def _settings_of(run: ReferenceRun, sequence: Path) -> RunSettings:
+    """Settings that build the problem of a run, from its summary. Raises InputError where it lacks one."""
+    known = run.settings
+    try:
+        return RunSettings(
+            sequence=sequence,
+            preset=known["preset"],
+            features="all" if known["features"] == "all" else int(known["features"]),
+            landmarks=LandmarkMode(known["landmarks"]),
+            as_recorded=bool(known["as_recorded"]),
+            held_out=float(known["held_out"]),
+            seed=int(known["seed"]),
+            repairs=None if known["repairs"] is None else Path(known["repairs"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{run.files.folder}: its summary lacks the settings of its problem ({type(error).__name__}: {error}); "
+            "give --sequence the folder of fgbaseline export"
+        ) from error

@@ -1,0 +1,185 @@
+"""Evidence beside the paths: consistency (NEES, NIS, sigmas), held-out tracks, and landmarks of the reference."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from fgbaseline.data.plural import plural
+from fgbaseline.geometry import FloatArray
+
+from .over_time import Expected, Panel, time_panels
+from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
+from .reprojection import medians_by_class
+from .run_data import RunData
+from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
+
+MIN_LANDMARKS = 10
+"""of a class that has a median in sigmas: few of them have a covariance of the difference"""
+AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
+PAPER_BAND = "95 % if consistent"
+
+
+def nees(run: RunData) -> Figure | None:
+    """NEES of each pose against ground truth; None without truth or covariances."""
+    label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
+    panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
+    title = "NEES of each pose: squared error over covariance"
+    return time_panels(run, [panel], title, SCREEN, linewidth=1.1)
+
+
+def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Reference NEES, NIS and sigma ratios over time; None without any of these. On paper also the NEES."""
+    if not style.titled:
+        pose, innovation = _pose_band(PAPER_BAND, 0.6), _innovation_band(PAPER_BAND, 0.6)
+        panels = [
+            Panel("NEES", "nees", 0.95, 5.0, pose),
+            Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),
+            Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
+            Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
+        ]
+        return time_panels(run, panels, "", style)
+    panels = [
+        Panel("reference NEES", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
+        Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
+        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.75, 5.0, _one),
+        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.75, 5.0, _one),
+    ]
+    title = "Consistency without truth: overconfident above the band, conservative below it"
+    return time_panels(run, panels, title, style, linewidth=1.0)
+
+
+def _pose_band(label: str, width: float = 0.9) -> Expected:
+    return lambda _, axes: [chi_square_band(axes, DEGREES_OF_FREEDOM, label, width=width)]
+
+
+def _innovation_band(label: str, width: float = 0.9) -> Expected:
+    """Band for the median number of rows of an innovation."""
+
+    def draw(run: RunData, axes: Axes) -> list[Any]:
+        rows = run.nis_rows
+        return [] if rows is None else [chi_square_band(axes, rows, label, per=rows, width=width)]
+
+    return draw
+
+
+def _one(_: RunData, axes: Axes) -> list[Any]:
+    axes.axhline(1.0, color=GREEN, linewidth=0.9, zorder=1.5)
+    return []
+
+
+def three_sigma(run: RunData, name: str) -> Figure | None:
+    """Error of each pose in its own body frame, between three of its sigmas; None without truth or covariances."""
+    if run.observed is None or name not in run.observed.errors:
+        return None
+    error, covariance = run.observed.errors[name]
+    if not np.isfinite(error).any() or not np.isfinite(covariance).any():
+        return None
+    return three_sigma_of(name, run.t, error, covariance, run.line()(name))
+
+
+def three_sigma_of(
+    name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, look: Mapping[str, Any]
+) -> Figure:
+    """Errors (n, 6) in the body frame at t (n,), s, between three sigmas of their covariances (n, 6, 6)."""
+    scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
+    with np.errstate(invalid="ignore"):
+        sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
+    figure = Figure(figsize=(SCREEN.width, 5.4))
+    panels = figure.subplots(3, 2, sharex=True)
+    handles: list[Any] = []
+    for i, axis in enumerate(AXES):
+        panel = panels[i % 3, i // 3]
+        e, s = scale[i] * error[:, i], sigma[:, i]
+        band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="three sigmas")
+        drawn = panel.plot(t, e, **{**look, "linewidth": 1.0, "label": "error"})
+        panel.set_ylim(-(reach := _reach(e, s)), reach)
+        both = np.isfinite(e) & np.isfinite(s) & (s > 0)
+        inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
+        panel.set_title(f"{axis}: {100.0 * inside:.1f} % inside")
+        handles = handles or [*drawn, band]
+    for panel in panels[-1]:
+        panel.set_xlim(float(t[0]), float(t[-1]))
+        panel.set_xlabel("time, s")
+    title_and_legend(figure, f"{safe_text(name)}: error in the body frame, and three sigmas (99.7 %)", handles)
+    return figure
+
+
+def _reach(error: FloatArray, sigma: FloatArray) -> float:
+    """Limit of a panel: over nearly all of the error, and the band as far as that leaves it visible."""
+    e = np.abs(error[np.isfinite(error)])
+    s = 3.0 * sigma[np.isfinite(sigma)]
+    most = float(np.percentile(e, 99)) if len(e) else 0.0
+    band = float(np.percentile(s, 98)) if len(s) else 0.0
+    return 1.15 * max(most, min(band, 30.0 * most), 1e-9)
+
+
+def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median distance of landmarks from the reference's by depth; None where none is shared."""
+    if not run.by_depth:
+        return None
+    classes = max(map(len, run.by_depth.values()))
+    return maps_by_depth(run.by_depth, run.line(style, classes), run.reference or "", style)
+
+
+def maps_by_depth(
+    tables: Mapping[str, pd.DataFrame], line: Line, reference: str, style: Style = SCREEN
+) -> Figure | None:
+    """Tables of `compare.map_by_depth` by name: in meters and sigmas, on paper only in the camera frame."""
+    columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
+    if style.titled:
+        tables = {n: t.assign(sigmas=t["sigmas"].where(t["with_sigmas"] >= MIN_LANDMARKS)) for n, t in tables.items()}
+    else:
+        columns = {"seen": ""}
+    shown = {c: title for c, title in columns.items() if any(t[c].notna().any() for t in tables.values())}
+    if not shown:
+        return None
+    figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.7))
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    handles = []
+    for panel, (column, title) in zip(panels, shown.items(), strict=True):
+        medians = {name: table[column] for name, table in tables.items()}
+        handles += medians_by_class(panel, medians, line, style, _depth)
+        log_where_positive(panel)
+        panel.set_title(title)
+        panel.set_xlabel("depth, m")
+    if not style.titled:
+        panels[0].set_ylabel("distance, m")
+    title_and_legend(
+        figure, f"Landmarks: median distance from those of {safe_text(reference)}, by depth", handles, style
+    )
+    return figure
+
+
+def _depth(name: str) -> str:
+    return short(name.replace(" m and more", "+")).removesuffix(" m")
+
+
+def held_out(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median error of each path on held-out tracks, with its 95 % interval, best on top; None without any."""
+    table = run.held_out
+    if table is None:
+        return None
+    n, colors = len(table), run.colors
+    figure = Figure(figsize=(style.width, 1.5 + 0.36 * n if style.titled else 0.6 + 0.2 * n))
+    panel = figure.subplots()
+    names = [str(name) for name in table["estimator"]]
+    low, median, high = (table[column].to_numpy(dtype=np.float64) for column in ("low", "median", "high"))
+    rows = zip(range(n), low, median, high, [colors[name] for name in names], strict=True)
+    intervals(panel, rows, *((6.0, 2.2) if style.titled else (3.5, 1.6)))
+    panel.set_yticks(range(n), [safe_text(name) for name in names])
+    panel.set_ylim(n - 0.4, -0.6)
+    if style.titled and 0.0 < float(median.min()) < 0.2 * float(median.max()) < np.inf:
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel("median held-out error, px" + (", with its 95 % interval" if style.titled else ""))
+    pieces = 0 if run.observed is None else run.observed.held_out_tracks
+    title = f"Held-out error: {plural(pieces, 'piece')} of tracks that no estimator used"
+    title_and_legend(figure, title, style=style)
+    return figure

@@ -1,0 +1,282 @@
+"""Data of the plots on a run's page: paths, landmarks, covariances, observations and series, packed as base64."""
+
+from base64 import b64encode
+from collections.abc import Callable, Iterable, Mapping
+from json import dumps
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import ArrayLike
+
+from fgbaseline.compare import chi_square_bounds, reprojection_by
+from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold
+from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.data import Estimate, Excluded, Problem
+from fgbaseline.data.problem import WRONG_MATCH
+from fgbaseline.data.top_view import TopView
+from fgbaseline.geometry import FloatArray
+from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
+from fgbaseline.reports.tables.run import REASONS
+
+FINEST = 16
+"""parts of a pixel that observations are rounded to, unless the image is too large for that"""
+
+
+def floats(values: ArrayLike) -> str:
+    """Single precision; NaN for what is not finite."""
+    array = np.asarray(values, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        single = np.where(np.isfinite(array), array, np.nan).astype("<f4")
+    return _text(np.where(np.isfinite(single), single, np.nan).astype("<f4"))
+
+
+def integers(values: ArrayLike) -> str:
+    """Unsigned, 32 bits."""
+    return _text(np.asarray(values).astype("<u4"))
+
+
+def small_integers(values: ArrayLike) -> str:
+    """Unsigned, 8 bits."""
+    return _text(np.asarray(values).astype("u1"))
+
+
+def flags(values: ArrayLike) -> str:
+    """One bit each, the lowest first."""
+    return _text(np.packbits(np.asarray(values, dtype=np.bool_), bitorder="little"))
+
+
+def pixels(values: ArrayLike) -> tuple[str, int]:
+    """Signed 16 bit integers, and how many of them make a pixel: a power of two, at most `FINEST`."""
+    array = np.asarray(values, dtype=np.float64)
+    largest = float(np.abs(array).max()) if array.size else 0.0
+    parts = FINEST
+    while parts > 1 and largest * parts > 32000.0:
+        parts //= 2
+    return _text(np.clip(np.rint(array * parts), -32768, 32767).astype("<i2")), parts
+
+
+def embedded_json(value: Any) -> Markup:
+    """JSON that cannot end the element it stands in, whatever its texts are."""
+    text = dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)  # nosec: no markup can be left in it
+
+
+def _text(array: np.ndarray) -> str:
+    return b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+TRUTH_LINE = "truth"
+"""key of ground truth among the lines of a chart; those of estimators are numbers"""
+OUTLIER = 30.0
+"""times farther than every other line: then one line alone would flatten all others on a linear axis"""
+
+Lines = Mapping[str, FloatArray]
+
+
+def charts(run: Run) -> list[dict[str, Any]]:
+    """The charts in their order: `name`, `title`, `unit`, `hint`, `log`, `band`, `middle`, `group` and `lines`.
+
+    `lines` has (T,) values by the number of the estimator in the run, as text.
+    """
+    drawn = [*_errors(run), *_pixels(run), *_consistency(run), *_cost(run)]
+    return [chart for chart in drawn if chart is not None]
+
+
+def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
+    away, group = f"from {run.reference}", "Divergence and errors"
+    yield _chart(group, "divergence", f"Divergence {away}", "m", _column(run, "divergence", "position"))
+    yield _chart(group, "rotation", f"Rotation {away}", "°", _column(run, "divergence", "rotation_deg"))
+    yield _chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
+    yield _chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
+    without = "difference from ground truth; all start at the true pose"
+    yield _chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
+    yield _chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
+    view, truth = TopView.of(run.problem), run.problem.sequence.truth
+    heights = {r.name: view.height(r.estimate.world_T_imu[:, :3, 3]) for r in run.answered}
+    along = {} if truth is None else {TRUTH_LINE: view.height(truth.world_T_imu[:, :3, 3])}
+    yield _chart(group, "height", "Height above the start", "m", {**_numbered(run, heights), **along})
+
+
+def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
+    medians = {r.name: _by_frame(run, r) for r in run.answered if len(r.reprojection)}
+    title = "Median reprojection error by frame"
+    hint = "over all observations of the landmarks that an estimator has"
+    yield _chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
+
+
+def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
+    group, expected = "Consistency", "the band holds 95 % of the frames of a consistent estimator"
+    of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
+    pose = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": expected}
+    yield _chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
+    beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
+    title = f"Reference NEES, to {run.reference}"
+    yield _chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
+    band = _innovation_band(run)
+    nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
+    innovations = "NIS per row"
+    yield _chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
+    for part in ("position", "rotation"):
+        tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
+        ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
+        title, hint = f"Sigma ratio of {part}, to {run.reference}", "expected above 1 for a filter"
+        yield _chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
+
+
+def _innovation_band(run: Run) -> tuple[float, ...] | None:
+    """For as many rows as the median frame that sees anything has; None where no filter sees anything."""
+    seen = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
+    rows = np.concatenate([degrees[degrees > 0] for degrees in seen]) if seen else np.empty(0)
+    if len(rows) == 0:
+        return None
+    n = float(np.median(rows))
+    return tuple(float(limit) / n for limit in chi_square_bounds(n))
+
+
+def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
+    T = run.problem.n_frames
+    spent = {r.name: 1e3 * r.estimate.seconds for r in run.answered if len(r.estimate.seconds) == T}
+    spent = {name: ms for name, ms in spent.items() if ms.any()}
+    interval = 1e3 * float(np.median(run.problem.sequence.dt))
+    hint = "below the thin line an estimator keeps up with the camera"
+    yield _chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), log=True, middle=interval, hint=hint)
+
+
+def _chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
+    """A chart; None where no line has a value."""
+    known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
+    if not known:
+        return None
+    settings = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "hint": "", **more}
+    packed = {key: floats(values) for key, values in known.items()}
+    return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **settings}
+
+
+def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
+    """Whether a logarithmic axis is needed to see more than one of lines that are nowhere negative."""
+    series = [values[np.isfinite(values)] for values in lines]
+    if any(values.min() < 0.0 for values in series):
+        return False
+    largest = sorted((float(values.max()) for values in series), reverse=True)
+    return len(largest) > 1 and largest[0] > OUTLIER * largest[1] > 0.0
+
+
+def _column(run: Run, table: str, column: str) -> Lines:
+    """A column of each estimator's errors; the reference is not compared with itself."""
+    read: Callable[[Result], Any] = {"divergence": lambda r: r.divergence, "truth": lambda r: r.truth}[table]
+    compared = [r for r in run.answered if table == "truth" or r.name != run.reference]
+    return _numbered(run, {r.name: read(r)[column].to_numpy() for r in compared if read(r) is not None})
+
+
+def _by_frame(run: Run, result: Result) -> FloatArray:
+    median = reprojection_by(result.reprojection, "frame")["median"]
+    values: FloatArray = median.reindex(range(run.problem.n_frames)).to_numpy(dtype=np.float64)
+    return values
+
+
+def _numbered(run: Run, lines: Lines) -> Lines:
+    number = {name: str(i) for i, name in enumerate(run.results)}
+    return {number[name]: np.asarray(values, dtype=np.float64) for name, values in lines.items()}
+
+
+EDGE = 8.0
+"""px between the outermost observations and the frame drawn around them"""
+
+
+def page_data(run: Run) -> dict[str, Any]:
+    """Everything in the coordinates of the view from above: x ahead of the start, y to its left, z up, m."""
+    view, sequence = TopView.of(run.problem), run.problem.sequence
+    axes = np.stack([view.ahead, view.left, view.up])
+    truth = sequence.truth
+    return {
+        "frames": sequence.n_frames,
+        "t": floats(sequence.t - sequence.t[0]),
+        "reference": run.reference,
+        "estimators": [_estimator(run, r, axes) for r in run.results.values()],
+        "truth": None if truth is None else floats(truth.world_T_imu[:, :3, 3] @ axes.T),
+        "camera": _camera(run),
+        "observations": _observations(run),
+        "reasons": {str(int(Excluded[key.upper().replace(" ", "_")])): text for key, text in REASONS.items()},
+        "charts": charts(run),
+        "bookmarks": _bookmarks(run),
+    }
+
+
+def _estimator(run: Run, result: Result, axes: FloatArray) -> dict[str, Any]:
+    """An estimator: path (T, 3), camera poses (T, 3, 4), position covariances (T, 6), landmarks, what it used."""
+    estimate = result.estimate
+    about: dict[str, Any] = {"name": result.name, "answered": result.answered}
+    if not result.answered:
+        return about
+    cameras = estimate.world_T_imu @ run.problem.sequence.imu_T_cam
+    used = estimate.used
+    with np.errstate(invalid="ignore"):  # a landmark at infinity
+        points = estimate.landmarks.position @ axes.T
+    return about | {
+        "path": floats(estimate.world_T_imu[:, :3, 3] @ axes.T),
+        "cameras": floats(axes @ cameras[:, :3, :]),
+        "covariance": _position_covariance(estimate, axes),
+        "landmarks": integers(estimate.landmarks.index),
+        "points": floats(points),
+        "used": flags(used) if used.any() else None,
+    }
+
+
+def _position_covariance(estimate: Estimate, axes: FloatArray) -> str | None:
+    """(T, 6) m^2: xx, xy, xz, yy, yz, zz; the covariance is of the right perturbation, so the body's axes turn it."""
+    if estimate.covariance is None:
+        return None
+    R = axes @ estimate.world_T_imu[:, :3, :3]
+    P = R @ estimate.covariance[:, :3, :3] @ np.swapaxes(R, 1, 2)
+    row, column = np.triu_indices(3)
+    return floats(P[:, row, column])
+
+
+def _camera(run: Run) -> dict[str, Any]:
+    """Intrinsics, and the size of the image as far as it is known: what the observations reach to."""
+    camera, pixel = run.problem.sequence.camera, run.problem.sequence.observations.pixel
+    reach = pixel.max(axis=0) if len(pixel) else np.zeros(4)
+    width, height = (max(c, float(reach[i::2].max()) + EDGE) for i, c in enumerate((camera.cu, camera.cv)))
+    intrinsics = {name: float(getattr(camera, name)) for name in ("fu", "fv", "cu", "cv", "baseline")}
+    return {**intrinsics, "width": round(width), "height": round(height)}
+
+
+def _observations(run: Run) -> dict[str, Any] | None:
+    observations = run.problem.sequence.observations
+    if len(observations) == 0:
+        return None
+    pixel, parts = pixels(observations.pixel)
+    starts = np.searchsorted(observations.frame, np.arange(run.problem.n_frames + 1))
+    return {
+        "starts": integers(starts),
+        "landmark": integers(observations.landmark),
+        "pixel": pixel,
+        "parts": parts,
+        "excluded": small_integers(run.problem.excluded),
+    }
+
+
+def _bookmarks(run: Run) -> list[dict[str, Any]]:
+    """Frames worth a look: first divergences, and the second with the most wrong matches."""
+    bookmarks: list[dict[str, Any]] = []
+    for result in run.compared:
+        left = divergence_onset(run, result)
+        if left is not None:
+            text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
+            bookmarks.append({"frame": left.frame, "text": text})
+    worst = _most_excluded(run.problem)
+    return bookmarks if worst is None else [*bookmarks, {"frame": worst, "text": "most wrong matches"}]
+
+
+def _most_excluded(problem: Problem) -> int | None:
+    """The frame around which, for a second, the largest share of matches was found wrong; None where none was."""
+    frame, T = problem.sequence.observations.frame, problem.n_frames
+    wrong = np.bincount(frame[np.isin(problem.excluded, (*WRONG_MATCH, Excluded.COPIED))], minlength=T)
+    every = np.bincount(frame[problem.excluded != Excluded.FEATURE_NOT_CHOSEN], minlength=T)
+    if not wrong.any():
+        return None
+    half = round(min(0.5 / float(np.median(problem.sequence.dt)), T))
+    return int(np.argmax(moving_sum(wrong, 1 + 2 * half) / np.maximum(1, moving_sum(every, 1 + 2 * half))))

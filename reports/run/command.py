@@ -1,0 +1,111 @@
+"""`fgbaseline run` and `fgbaseline export`: progress, output folder, and the results on the terminal."""
+
+from pathlib import Path
+
+import click
+
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.parallel import background_map, cores
+from fgbaseline.data.plural import plural
+from fgbaseline.data.problem_export import layout, write_problem
+
+from .problem import (
+    MARK,
+    RunSettings,
+    build_problem,
+    check_estimators,
+    hold_out_tracks,
+    import_estimators,
+    preliminary_remarks,
+    read_sequence,
+    solve,
+)
+
+FAILED = 1
+UNWRAPPED = 120
+"""columns of the table where no terminal says how many there are"""
+
+
+def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
+    """Runs the estimators, writes the folder, prints the main results; returns 1 where an estimator failed, else 0."""
+    check_estimators(settings.estimators)
+    sequence = read_sequence(settings)
+    place = out or Path("out") / sequence.name
+    require_free(place, force=force, mark=MARK)
+    if rerun_file is not None:
+        from .rerun import require_rerun
+
+        require_rerun(rerun_file)
+
+    kept, held = hold_out_tracks(sequence, settings)
+
+    from ..progress import reporter
+
+    progress = reporter()
+    progress.print_line(
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
+        f"of {plural(sequence.n_landmarks, 'track')}"
+    )
+    if held is not None:
+        n_observations = plural(len(held.observations), "observation")
+        progress.print_line(f"{plural(held.n_tracks, 'track')} held out, with {n_observations}")
+    if settings.preset == "calibrated" and not settings.as_recorded:
+        progress.print_line("diagnosing the recording")
+    with background_map(lambda _: build_problem(kept, settings, cores()), 1, cores()) as built:
+        # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
+        from ..phrases.run import verdict
+        from ..tables import print_table
+        from ..tables.run import terminal_table
+        from .folder import as_dict, write_run
+
+        import_estimators(settings.estimators)
+        (problem,) = built()
+    for sentence in preliminary_remarks(problem):
+        click.echo(sentence)
+    solved = solve(problem, settings, progress.estimator, held, cores())
+    for name, result in solved.results.items():
+        if not result.answered:
+            progress.print_line(f"{name} failed: {result.estimate.reason}")
+    progress.print_line("writing the report")
+    with atomic_folder(place, force=force, mark=MARK) as folder:
+        summary = write_run(solved, folder, cores())
+        if rerun_file is not None:
+            from .rerun import write_rerun
+
+            write_rerun(solved, rerun_file)
+    print_table(terminal_table(as_dict(summary)["estimators"], summary.reference.name), width=UNWRAPPED)
+    for sentence in verdict(solved):
+        click.echo(sentence)
+    click.echo(f"\nThe report is in {place / 'report.html'}")
+    return 0 if len(solved.answered) == len(solved.results) else FAILED
+
+
+def export(settings: RunSettings, out: Path, *, force: bool) -> int:
+    """Writes the problem of a recording into a folder and prints its contents; returns 0."""
+    require_free(out, force=force, mark=layout.SCALARS)
+    sequence, held = hold_out_tracks(read_sequence(settings), settings)
+    problem = build_problem(sequence, settings)
+    with atomic_folder(out, force=force, mark=layout.SCALARS) as folder:
+        write_problem(problem, folder)
+    for sentence in _contents(problem):
+        click.echo(sentence)
+    if held is not None:
+        click.echo(f"Held out, not in the problem: {plural(held.n_tracks, 'track')}")
+    click.echo(f"\nThe problem is in {out}; docs/export.md describes its files")
+    return 0
+
+
+def _contents(problem: Problem) -> list[str]:
+    sigma = problem.pixel_variance**0.5
+    kernel = "no kernel" if problem.kernel is None else f"Huber kernel at {problem.kernel.threshold:g} sigma"
+    prior = "no landmark prior" if problem.landmark_prior is None else "a prior on every landmark"
+    excluded = int((problem.excluded != Excluded.NO).sum())
+    return [
+        f"{problem.sequence.name}, {problem.preset}: {plural(problem.n_frames, 'frame')}, "
+        f"{plural(int(problem.mask.sum()), 'observation')} of {plural(len(problem.features), 'landmark')}; "
+        f"{plural(excluded, 'observation')} excluded",
+        f"Pixel sigma {sigma:.3g} px, {kernel}, {prior}",
+        *problem.remarks,
+        *problem.repairs,
+    ]
