@@ -14,8 +14,8 @@ from fgbaseline.geometry import FloatArray
 
 from ..axis_conventions import axes_matrix
 from ..imu import ImuNoise, ImuSamples
-from .random_streams import RandomStream, generator
 from .path import Path
+from .random_streams import RandomStream, generator
 from .settings import Simulation
 
 DEGREE = 5

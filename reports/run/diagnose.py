@@ -110,7 +110,7 @@ def _print_inertial(sequence: Sequence, out: Path | None, *, as_json: bool, repa
         if out is not None:
             click.echo(f"\nThe evidence is in {out}")
     if found.cannot_tell:
-        return CANNOT_TELL
+        return UNDECIDED
     return FINDINGS if findings else CLEAN
 
 

@@ -87,9 +87,7 @@ class InertialFactors:
         noise = gtsam.noiseModel.Gaussian.Covariance(matrix)
         pose_T_world, keys = se3.inverse(pose), state_keys(k, True)
 
-        def error(
-            _: gtsam.CustomFactor, values: gtsam.Values, jacobians: gtsam.JacobianVector | None
-        ) -> FloatArray:
+        def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: gtsam.JacobianVector | None) -> FloatArray:
             x, v, b = keys
             twist = se3.log(pose_T_world @ values.atPose3(x).matrix())
             if jacobians is not None:

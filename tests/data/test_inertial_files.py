@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.data.formats.imu_csv import read_imu_csv
 from fgbaseline.data.formats.imu_yaml import read_imu_calibration
 from fgbaseline.data.imu import ASSUMED_NOISE, ImuNoise
 from fgbaseline.data.problem.imu_gaps import interval_densities, sample_gaps
 from fgbaseline.data.problem.inertial import imu_intervals
+from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.geometry import InputError, se3
 
 from ..builders.inertial import inertial_problem

@@ -80,7 +80,10 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
         after = states.world_T_imu[k + 1]
         twist = se3.log(se3.inverse(after) @ pose)
         turn = np.eye(4)
-        turn[:3, :3], turn[:3, 3] = after[:3, :3].T @ pose[:3, :3], after[:3, :3].T @ (velocity - states.velocity[k + 1])
+        turn[:3, :3], turn[:3, 3] = (
+            after[:3, :3].T @ pose[:3, :3],
+            after[:3, :3].T @ (velocity - states.velocity[k + 1]),
+        )
         drift = states.bias[k] - states.bias[k + 1]
         apart = np.concatenate([twist, se3.log(turn)[:3], drift])  # GTSAM's chart of the navigation state
         parts.append(np.linalg.solve(np.linalg.cholesky(motion.noise), apart))
@@ -273,7 +276,9 @@ def test_a_failed_update_costs_one_landmark(
 ) -> None:
     update, named = CheckpointedISAM2.update, list[int]()
 
-    def failing(self: CheckpointedISAM2, factors: gtsam.NonlinearFactorGraph, *rest: object, **others: object) -> object:
+    def failing(
+        self: CheckpointedISAM2, factors: gtsam.NonlinearFactorGraph, *rest: object, **others: object
+    ) -> object:
         keys = [key for key in factors.keyVector() if chr(key >> 56) in "abcdefghijk"]
         if not named and len(self.tree.getLinearizationPoint().keys()) > 200 and keys:
             named.append(keys[0])
