@@ -65,7 +65,7 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
     imu, start, model = problem.imu, problem.start, problem.measurement
     assert imu is not None
     assert start is not None
-    held = np.concatenate([np.full(3, 1e-6 * model.camera.baseline), np.full(3, 1e-6), np.full(9, HELD_SIGMA)])
+    held = np.concatenate([np.full(3, 1e-5 * model.camera.baseline), np.full(3, 1e-5), np.full(9, HELD_SIGMA)])
     first = np.concatenate(
         [
             se3.log(se3.inverse(problem.initial_pose) @ states.world_T_imu[0]),
@@ -80,7 +80,8 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
         after = states.world_T_imu[k + 1]
         twist = se3.log(se3.inverse(after) @ pose)
         turn = np.eye(4)
-        turn[:3, :3], turn[:3, 3] = after[:3, :3].T @ pose[:3, :3], after[:3, :3].T @ (velocity - states.velocity[k + 1])
+        turn[:3, :3] = after[:3, :3].T @ pose[:3, :3]
+        turn[:3, 3] = after[:3, :3].T @ (velocity - states.velocity[k + 1])
         drift = states.bias[k] - states.bias[k + 1]
         apart = np.concatenate([twist, se3.log(turn)[:3], drift])  # GTSAM's chart of the navigation state
         parts.append(np.linalg.solve(np.linalg.cholesky(motion.noise), apart))
@@ -215,7 +216,9 @@ def test_joint_marginals_are_blocks_of_the_dense_inverse() -> None:
     for key in [*np.concatenate(keys).tolist(), *(key for key in values.keys() if chr(key >> 56) == "l")]:  # noqa: SIM118
         ordering.push_back(key)
     J = graph.linearize(values).jacobian(ordering)[0]
-    dense = np.linalg.pinv(J.T @ J, rcond=1e-24, hermitian=True)
+    scale = 1.0 / np.linalg.norm(J, axis=0)
+    root = np.linalg.inv(np.linalg.qr(J * scale, mode="r")) * scale[:, None]
+    dense = root @ root.T
     assert estimate.state_covariance is not None
     for k, (x, _, _) in enumerate(keys):
         block = dense[15 * k : 15 * k + 15, 15 * k : 15 * k + 15]
@@ -232,7 +235,7 @@ def test_position_and_heading_of_the_first_frame_have_no_variance(problem: Probl
         assert estimate.state_covariance is not None
         P = estimate.state_covariance[0]
         np.testing.assert_array_equal(P[:3], 0.0)
-        np.testing.assert_allclose(P[3:6, 3:6] @ up, 0.0, atol=1e-15)
+        np.testing.assert_allclose(P[3:6, 3:6] @ up, 0.0, atol=1e-12)
         assert np.all(np.diag(P)[6:] > 0.0)
         np.testing.assert_array_equal(estimate.covariance, estimate.state_covariance[:, :6, :6])
 
@@ -252,8 +255,9 @@ def test_answers_turn_with_the_world(problem: Problem, answer: Estimate) -> None
         ),
     )
     expected, result = answer.moved(turn), smoother.isam2(turned)
-    for name in ("world_T_imu", "velocity", "state_covariance"):
-        np.testing.assert_allclose(getattr(result, name), getattr(expected, name), atol=1e-7)
+    for name in ("world_T_imu", "velocity"):
+        np.testing.assert_allclose(getattr(result, name), getattr(expected, name), atol=1e-6)
+    np.testing.assert_allclose(result.state_covariance, expected.state_covariance, atol=1e-6)
 
 
 def test_a_marginalized_tree_ends_where_one_tree_ends() -> None:
@@ -273,7 +277,9 @@ def test_a_failed_update_costs_one_landmark(
 ) -> None:
     update, named = CheckpointedISAM2.update, list[int]()
 
-    def failing(self: CheckpointedISAM2, factors: gtsam.NonlinearFactorGraph, *rest: object, **others: object) -> object:
+    def failing(
+        self: CheckpointedISAM2, factors: gtsam.NonlinearFactorGraph, *rest: object, **others: object
+    ) -> object:
         keys = [key for key in factors.keyVector() if chr(key >> 56) in "abcdefghijk"]
         if not named and len(self.tree.getLinearizationPoint().keys()) > 200 and keys:
             named.append(keys[0])
