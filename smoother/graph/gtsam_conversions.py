@@ -62,6 +62,8 @@ def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> Floa
     Directions of the first pose that the problem holds have none, and not what stands for zero in the graph.
     """
     matrix = reorder_tangent(covariance)
+    if problem.start is not None:
+        matrix = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
     if first == 0 and problem.start is not None:
         free = np.eye(len(STATE_ORDER))
         free[:6, :6] -= held_directions(problem.start.covariance)

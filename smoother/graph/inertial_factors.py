@@ -22,6 +22,9 @@ LEAST_WALK = 1e-4
 """1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
 HELD_SIGMA = 1e-6
 """m/s, rad/s and m/s^2: what stands for zero in the covariance of a velocity or bias that is known"""
+HELD_POSE = 10.0
+"""times what stands for zero in a pose without inertial data: velocity and biases of the first frame hang on it, and
+Cholesky loses twice as many digits as this has"""
 
 
 class InertialFactors:
@@ -30,7 +33,7 @@ class InertialFactors:
     def __init__(self, imu: ImuIntervals, start: InertialStart, initial_pose: FloatArray, held: FloatArray) -> None:
         """`held` (6,) are standard deviations, rad and m, that stand for zero in the covariance of a pose."""
         self._imu, self.start, self._initial_pose = imu, start, initial_pose
-        self._held = np.concatenate([held, np.full(9, HELD_SIGMA)])
+        self._held = np.concatenate([HELD_POSE * held, np.full(9, HELD_SIGMA)])
         self._params: dict[bytes, gtsam.PreintegrationCombinedParams] = {}
 
     def preintegrated(self, k: int, bias: FloatArray) -> gtsam.PreintegratedCombinedMeasurementsG:

@@ -29,7 +29,7 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
     """
     with threadpool_limits(limits=1, user_api="blas"):
         posed, world_T_solver = in_solver_frame(problem)
-        return _solve(posed, progress, settings or ISAM2Settings()).transformed(world_T_solver)
+        return _solve(posed, progress, settings or ISAM2Settings.of(problem)).transformed(world_T_solver)
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:

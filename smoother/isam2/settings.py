@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import gtsam
 import numpy as np
 
+from fgbaseline.data.problem import Problem
+
 from ..graph.keys import thresholds
 from ..initialization.landmark_initialization import InitializationCriterion
 
@@ -58,3 +60,12 @@ class ISAM2Settings:
         params.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE_THRESHOLD * min(2.0 * baseline, 1.0)))
         params.setFactorization("QR" if self.qr else "CHOLESKY")
         return params
+
+    @classmethod
+    def of(cls, problem: Problem) -> "ISAM2Settings":
+        """Default settings for a problem.
+
+        With raw inertial data a frame bends the path behind it by more than the thresholds, and all of the tree would
+        be relinearized again and again: it is shorter, and relinearizes less often.
+        """
+        return cls() if problem.imu is None else cls(relinearize_skip=5, tree_frames=100, kept_frames=40)
