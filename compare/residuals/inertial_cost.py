@@ -27,7 +27,7 @@ def inertial_residuals(imu: ImuIntervals, estimate: Estimate) -> tuple[FloatArra
         return residual, covariance
     T = estimate.world_T_imu
     known = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(np.concatenate([v, bg, ba], axis=1)).all(axis=1)
-    for k in np.flatnonzero(known[:-1] & known[1:]):
+    for k in np.flatnonzero(known[:-1] & known[1:]).tolist():
         motion = imu.motion(k, bg[k], ba[k])
         pose, velocity = strapdown.predict(T[k], v[k], motion, imu.gravity_vector)
         residual[k, :6] = se3.log(se3.inverse(pose) @ T[k + 1])
