@@ -11,6 +11,7 @@ from .consistency.covariance import (
 from .consistency.nees import body_error, nees, nees_table, sigma_ratio
 from .consistency.nis import NisSummary, nis_per_degree, nis_summary
 from .consistency.reference_nees import ReferenceNees, reference_nees
+from .consistency.state import quantity_summary, state_error, state_nees, velocity_and_bias_errors
 from .landmarks.dynamic_landmarks import dynamic_landmarks
 from .landmarks.map_difference import map_by_depth, map_difference
 from .residuals.cost import cost
@@ -63,6 +64,7 @@ from .trajectory.divergence import (
     divergence_summary,
     first_exceedance,
     pose_errors,
+    truth_alignment,
     truth_errors,
 )
 from .trajectory.drift import drift
@@ -154,6 +156,7 @@ __all__ = [
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
+    "quantity_summary",
     "rankable",
     "reference_nees",
     "relative_errors",
@@ -169,14 +172,18 @@ __all__ = [
     "segment_errors",
     "share_inside_bounds",
     "sigma_ratio",
+    "state_error",
+    "state_nees",
     "summarized",
     "time_coverage",
     "time_offset",
     "track_chi_square",
     "travel_direction_misfit",
     "trust",
+    "truth_alignment",
     "truth_errors",
     "used_by_all",
+    "velocity_and_bias_errors",
     "whitened_summary",
     "world_rotation_from_orientations",
     "world_rotation_from_positions",

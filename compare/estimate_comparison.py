@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from fgbaseline import compare
-from fgbaseline.data import Estimate, HeldOut, Problem, Status
+from fgbaseline.data import Estimate, HeldOut, Problem, Status, Truth
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.parallel import background_map
 from fgbaseline.geometry import FloatArray
@@ -66,6 +66,23 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class InertialEvidence:
+    """Velocity and biases of an estimate from raw inertial data; what compares with truth or reference is None without.
+
+    For the columns see `compare.velocity_and_bias_errors`.
+    """
+
+    errors: pd.DataFrame | None
+    """from the truth as it is, the world of the sigmas"""
+    aligned: pd.DataFrame | None
+    """from the truth after the alignment of `Result.truth_aligned`"""
+    divergence: pd.DataFrame | None
+    """from the reference; None for the reference itself"""
+    nees: pd.DataFrame | None
+    """of the 15 and of each block: see `compare.state_nees`"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class HeldOutReport:
     """Tracks that were held out of the run, and the prediction errors of the paths on them."""
 
@@ -88,8 +105,10 @@ class Result:
     truth: pd.DataFrame | None
     """from the truth as it is; None without truth"""
     truth_aligned: pd.DataFrame | None
-    """from the truth after SE(3) alignment"""
+    """from the truth after alignment in yaw and position with raw inertial data, otherwise in SE(3)"""
     evidence: Evidence
+    inertial: InertialEvidence | None = None
+    """None for an estimate without velocity and biases"""
     divergence_common: CommonRmse | None = None
     """what ranks it: over the frames that all estimators have; None where it is not ranked"""
     ate_common: CommonRmse | None = None
@@ -192,6 +211,7 @@ def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) 
     """Fields of a `Result` but the estimate itself, which need not be sent from one process to another."""
     sequence, truth = problem.sequence, problem.sequence.truth
     other = None if reference is None or reference.name == estimate.name else reference
+    alignment = True if problem.imu is None else compare.Align.YAW
     reprojection = compare.reprojection(sequence, estimate)
     evidence = Evidence(
         covariance=compare.covariance_state(estimate),
@@ -206,13 +226,30 @@ def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) 
         moved=compare.dynamic_landmarks(problem, estimate, reprojection),
         map=None if other is None else compare.map_difference(sequence, estimate, other),
     )
+    aligned = None if truth is None else compare.truth_errors(estimate, truth, sequence.up, aligned=alignment)
     return {
         "reprojection": reprojection,
         "divergence": None if reference is None else compare.divergence(estimate, reference, sequence.up),
         "truth": None if truth is None else compare.truth_errors(estimate, truth, sequence.up),
-        "truth_aligned": None if truth is None else compare.truth_errors(estimate, truth, sequence.up, aligned=True),
+        "truth_aligned": aligned,
         "evidence": evidence,
+        "inertial": None if estimate.velocity is None else _inertial_evidence(estimate, truth, other, sequence.up),
     }
+
+
+def _inertial_evidence(
+    estimate: Estimate, truth: Truth | None, reference: Estimate | None, up: FloatArray
+) -> InertialEvidence:
+    divergence = None if reference is None else compare.velocity_and_bias_errors(estimate, reference)
+    if truth is None:
+        return InertialEvidence(None, None, divergence, None)
+    rotation = compare.truth_alignment(estimate, truth, compare.Align.YAW, up).rotation
+    return InertialEvidence(
+        compare.velocity_and_bias_errors(estimate, truth),
+        compare.velocity_and_bias_errors(estimate, truth, rotation),
+        divergence,
+        compare.state_nees(estimate, truth),
+    )
 
 
 def _held_out_report(problem: Problem, estimates: Iterable[Estimate], held: HeldOut) -> HeldOutReport:

@@ -26,8 +26,8 @@ def anees(runs: Iterable[tuple[Estimate, Truth]]) -> pd.DataFrame:
     return average_nees([nees(estimate, truth) for estimate, truth in runs])
 
 
-def average_nees(columns: Sequence[FloatArray]) -> pd.DataFrame:
-    """NEES (T,) of each run averaged over runs; for the columns see `anees`."""
+def average_nees(columns: Sequence[FloatArray], degrees: int = POSE_DEGREES) -> pd.DataFrame:
+    """NEES (T,), with these `degrees` of freedom, of each run averaged over runs; for the columns see `anees`."""
     frames = max((len(values) for values in columns), default=0)
     values = np.full((len(columns), frames), np.nan)
     for row, column in zip(values, columns, strict=True):
@@ -35,7 +35,7 @@ def average_nees(columns: Sequence[FloatArray]) -> pd.DataFrame:
     n = (~np.isnan(values)).sum(axis=0)
     total = np.nansum(values, axis=0)
     some = np.maximum(n, 1)
-    low, high = chi_square_bounds(float(POSE_DEGREES), some)
+    low, high = chi_square_bounds(float(degrees), some)
     table = pd.DataFrame(
         {"anees": total / some, "runs": n, "low": low, "high": high}, index=pd.RangeIndex(frames, name="frame")
     )

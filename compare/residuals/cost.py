@@ -4,8 +4,9 @@ import numpy as np
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, se3, strapdown
 
+from .inertial_cost import inertial_squares, start_square
 from .reprojection import ROWS, reprojection
 
 
@@ -13,15 +14,17 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
     """Half the sum of squared whitened residuals over the observations `taken` (n,) of the sequence's.
 
     Pixels under the problem's kernel, plus motion increments and landmark priors; NaN where the estimate lacks a pose
-    or a landmark of `taken`. The prior of the first pose is left out, since that pose is held.
+    or a landmark of `taken`. The prior of the first pose is left out, since that pose is held; with raw inertial data
+    the start counts in the directions in which it has variance.
     """
     table = reprojection(problem.sequence, estimate)
     table = table[taken[table["observation"].to_numpy()]]
     if len(table) < taken.sum():
         return float("nan")
     squared = problem.measurement.loss(pixel_squares(problem, table[list(ROWS)].to_numpy()))
+    start = 0.0 if problem.start is None else start_square(problem, problem.start, estimate)
     return 0.5 * float(
-        squared.sum() + motion_squares(problem, estimate).sum() + prior_squares(problem, estimate, taken)
+        squared.sum() + motion_squares(problem, estimate).sum() + start + prior_squares(problem, estimate, taken)
     )
 
 
@@ -31,10 +34,17 @@ def pixel_squares(problem: Problem, residual: FloatArray) -> FloatArray:
 
 
 def motion_squares(problem: Problem, estimate: Estimate) -> FloatArray:
-    """Squared whitened norms (T-1,) of `motion_residuals`."""
+    """Squared whitened norms (T-1,) of `motion_residuals`, or of `inertial_residuals`."""
+    if problem.imu is not None:
+        return inertial_squares(problem.imu, estimate)
     residual = motion_residuals(problem, estimate)
     whitened = np.linalg.solve(problem.increment_covariance, residual[:, :, None])[:, :, 0]
     return np.asarray(np.einsum("ti,ti->t", residual, whitened))
+
+
+def motion_degrees(problem: Problem) -> int:
+    """Degrees of freedom of each of `motion_squares`: 6, or 15 with raw inertial data."""
+    return 6 if problem.imu is None else strapdown.STATE
 
 
 def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:

@@ -7,7 +7,7 @@ from scipy.special import gammainc
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.geometry import FloatArray
 
-from .cost import motion_squares, pixel_squares, prior_squares
+from .cost import motion_degrees, motion_squares, pixel_squares, prior_squares
 from .reprojection import ROWS, reprojection
 
 RANGE = (1e-9, 1e9)
@@ -34,7 +34,7 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     _, track, seen = np.unique(table["landmark"].to_numpy(), return_inverse=True, return_counts=True)
     prior = problem.landmark_prior is not None
     freedom = np.ones(len(table)) if prior else 1.0 - 1.0 / seen[track]
-    kept = np.minimum(motion_squares(problem, estimate), 6.0).sum()
+    kept = np.minimum(motion_squares(problem, estimate), float(motion_degrees(problem))).sum()
     if prior:
         kept += min(prior_squares(problem, estimate, estimate.used), 3.0 * len(seen))
     freedom *= max(0.0, 1.0 - kept / max(3.0 * freedom.sum(), 1.0))
@@ -56,7 +56,7 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
 
 def motion_scale(problem: Problem, estimate: Estimate) -> float:
     """RMS of the whitened motion residuals per degree of freedom (expected at most 1, as poses also fit the pixels)."""
-    return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / 6.0))
+    return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / motion_degrees(problem)))
 
 
 def expected_square(scale: ArrayLike, threshold: float | None) -> FloatArray:

@@ -10,7 +10,7 @@ from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, so3
 
 from ..statistics.descriptive import summarized
-from .alignment import align_se3
+from .alignment import Align, Alignment, align, align_se3
 from .association import MatchedTrajectories
 from .path import along_track_frame, distance_traveled
 
@@ -24,18 +24,29 @@ def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.
 
 
 def truth_errors(
-    estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool = False
+    estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool | Align = False
 ) -> pd.DataFrame:
-    """Error of each pose against ground truth, without alignment or after SE(3) alignment of all positions.
+    """Error of each pose against ground truth, without alignment, after SE(3) alignment (`True`) or another one.
 
-    NaN in frames without truth and in frames that the estimator did not reach. For the columns see `pose_errors`.
+    The alignment is over all frames that both have. NaN in frames without truth and in frames that the estimator did
+    not reach. For the columns see `pose_errors`.
     """
     poses = estimate.world_T_imu
-    if aligned:
+    if aligned is True:
         both = truth.known & np.isfinite(poses).all(axis=(1, 2))
         if both.any():
             poses = align_se3(poses[both, :3, 3], truth.world_T_imu[both, :3, 3]) @ poses
+    elif aligned:
+        poses = truth_alignment(estimate, truth, aligned, up).apply(poses)
     return pose_errors(poses, truth.world_T_imu, up)
+
+
+def truth_alignment(estimate: Estimate, truth: Truth, kind: Align, up: ArrayLike = (0.0, 0.0, 1.0)) -> Alignment:
+    """Transformation of this kind that aligns an estimate to the truth over the frames that both have; none without."""
+    both = truth.known & np.isfinite(estimate.world_T_imu).all(axis=(1, 2))
+    if not both.any():
+        return Alignment()
+    return align(estimate.world_T_imu[both], truth.world_T_imu[both], kind, up=up)
 
 
 def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.DataFrame:

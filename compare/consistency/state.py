@@ -1,0 +1,108 @@
+"""Errors and consistency of the states that raw inertial data determine: pose, velocity and biases.
+
+Errors are those of `geometry.strapdown`: [translation, rotation, velocity, gyroscope bias, accelerometer bias]. That of
+the pose is e = log(T^-1 T_true) in the estimated body frame. The others are the true less the estimated value, with
+velocities in world axes. No alignment precedes the NEES: position and heading of frame 0 define the world of both.
+Where the truth begins later, both are tied over its first frames: position and heading then have too low a NEES.
+"""
+
+import numpy as np
+import pandas as pd
+
+from fgbaseline.data import Estimate, Truth
+from fgbaseline.geometry import FloatArray, se3, strapdown
+
+from ..statistics.descriptive import summarized
+from .covariance import is_positive_definite
+from .nees import mahalanobis_squared
+
+BLOCKS = {
+    "translation": strapdown.TRANSLATION,
+    "rotation": strapdown.ROTATION,
+    "velocity": strapdown.VELOCITY,
+    "gyroscope_bias": strapdown.GYROSCOPE_BIAS,
+    "accelerometer_bias": strapdown.ACCELEROMETER_BIAS,
+}
+"""of the error state, 3 degrees of freedom each"""
+QUANTITIES = ("velocity", "gyroscope_bias", "accelerometer_bias")
+"""blocks that are additive, in m/s, rad/s and m/s^2"""
+AXES = "xyz"
+
+
+def state_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
+    """Error (T, 15) of the state against truth or another estimate; NaN where either lacks a value."""
+    T = len(estimate.world_T_imu)
+    error = np.full((T, strapdown.STATE), np.nan)
+    k = np.flatnonzero(np.isfinite(estimate.world_T_imu).all(axis=(1, 2)) & np.isfinite(other.world_T_imu).all((1, 2)))
+    error[k, :6] = se3.log(se3.inverse(estimate.world_T_imu[k]) @ other.world_T_imu[k])
+    for name in QUANTITIES:
+        here, there = getattr(estimate, name), getattr(other, name)
+        if here is not None and there is not None:
+            error[:, BLOCKS[name]] = there - here
+    return error
+
+
+def state_nees(estimate: Estimate, truth: Truth) -> pd.DataFrame:
+    """NEES by frame of the whole `state` (15 degrees of freedom) and of each of `BLOCKS` (3 each).
+
+    NaN where truth or estimate lacks a value or the block's covariance is not positive definite: position and heading
+    of frame 0 have no variance. Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+    """
+    blocks = {"state": slice(0, strapdown.STATE), **BLOCKS}
+    table = pd.DataFrame(
+        np.nan, index=pd.RangeIndex(len(estimate.world_T_imu), name="frame"), columns=list(blocks), dtype=np.float64
+    )
+    if estimate.state_covariance is None:
+        return table
+    error = state_error(estimate, truth)
+    for name, block in blocks.items():
+        e, P = error[:, block], estimate.state_covariance[:, block, block]
+        k = np.flatnonzero(np.isfinite(e).all(axis=1) & np.isfinite(P).all(axis=(1, 2)))
+        k = k[is_positive_definite(P[k])]
+        table.loc[k, name] = mahalanobis_squared(e[k], P[k])
+    return table
+
+
+def velocity_and_bias_errors(
+    estimate: Estimate, other: Truth | Estimate, rotation: FloatArray | None = None
+) -> pd.DataFrame:
+    """Errors of velocity and biases against truth or another estimate, one row per `frame`, with the columns
+
+    Q, the norm, Q_x to Q_z, the estimated less the other value, and Q_sigma_x to Q_sigma_z, the estimate's 1-sigma, for
+    Q in `QUANTITIES`: `velocity` in m/s and world axes, `gyroscope_bias` in rad/s, `accelerometer_bias` in m/s^2, both
+    in the axes of the IMU. `rotation` (3, 3), other_R_estimate, aligns the worlds. NaN where either lacks a value.
+    """
+    T = len(estimate.world_T_imu)
+    columns: dict[str, FloatArray] = {}
+    for name in QUANTITIES:
+        here, there, P = getattr(estimate, name), getattr(other, name), estimate.state_covariance
+        unknown = np.full((T, 3), np.nan)
+        variance = None if P is None else P[:, BLOCKS[name], BLOCKS[name]]
+        if name == "velocity" and rotation is not None:
+            here = None if here is None else here @ rotation.T
+            variance = None if variance is None else rotation @ variance @ rotation.T
+        error = unknown if here is None or there is None else here - there
+        sigma = unknown if variance is None else np.sqrt(np.maximum(np.einsum("tii->ti", variance), 0.0))
+        columns[name] = np.linalg.norm(error, axis=1)
+        columns |= {f"{name}_{axis}": error[:, i] for i, axis in enumerate(AXES)}
+        columns |= {f"{name}_sigma_{axis}": sigma[:, i] for i, axis in enumerate(AXES)}
+    return pd.DataFrame(columns, index=pd.RangeIndex(T, name="frame"))
+
+
+def quantity_summary(table: pd.DataFrame, name: str) -> dict[str, float]:
+    """RMSE, mean, median, p95, maximum and last known value of the norm, and the RMSE of each axis.
+
+    `inside_3_sigma` is the share of components within 3 sigma (0.9973 of Gaussian errors); all NaN without an error.
+    """
+    norm = table[name].to_numpy()
+    error, sigma = (table[[f"{name}_{part}{axis}" for axis in AXES]].to_numpy() for part in ("", "sigma_"))
+    known = np.isfinite(norm)
+    judged = known[:, None] & (sigma > 0.0)
+    inside = float((np.abs(error) <= 3.0 * sigma)[judged].mean()) if judged.any() else float("nan")
+    per_axis = np.sqrt((error[known] ** 2).mean(axis=0)) if known.any() else np.full(3, np.nan)
+    return {
+        **summarized(table[name]),
+        "final": float(norm[known][-1]) if known.any() else float("nan"),
+        **{f"rmse_{axis}": float(value) for axis, value in zip(AXES, per_axis, strict=True)},
+        "inside_3_sigma": inside,
+    }

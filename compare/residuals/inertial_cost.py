@@ -1,0 +1,76 @@
+"""Residuals of raw inertial samples between the frames, and of the start, of an estimate with velocity and biases."""
+
+import numpy as np
+
+from fgbaseline.data import Estimate, Problem
+from fgbaseline.data.problem.inertial import ImuIntervals, InertialStart
+from fgbaseline.geometry import FloatArray, se3, strapdown
+
+LEAST_WALK = 1e-4
+"""1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
+HELD_VARIANCE = 1e-9
+"""of the largest variance in a block of the start's covariance: up to it a direction of the pose is held"""
+WALKS = (strapdown.GYROSCOPE_BIAS, strapdown.ACCELEROMETER_BIAS)
+
+
+def inertial_residuals(imu: ImuIntervals, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
+    """Residuals (T-1, 15) of the samples between frames, and their covariances (T-1, 15, 15).
+
+    The state of frame k + 1 less the one predicted from frame k with the biases of frame k, as an error of the
+    prediction: see `geometry.strapdown`. NaN where the estimate lacks a pose, velocity or bias.
+    """
+    n = len(estimate.world_T_imu) - 1
+    residual = np.full((n, strapdown.STATE), np.nan)
+    covariance = np.tile(np.eye(strapdown.STATE), (n, 1, 1))
+    v, bg, ba = estimate.velocity, estimate.gyroscope_bias, estimate.accelerometer_bias
+    if v is None or bg is None or ba is None:
+        return residual, covariance
+    T = estimate.world_T_imu
+    known = np.isfinite(T).all(axis=(1, 2)) & np.isfinite(np.concatenate([v, bg, ba], axis=1)).all(axis=1)
+    for k in np.flatnonzero(known[:-1] & known[1:]).tolist():
+        motion = imu.motion(k, bg[k], ba[k])
+        pose, velocity = strapdown.predict(T[k], v[k], motion, imu.gravity_vector)
+        residual[k, :6] = se3.log(se3.inverse(pose) @ T[k + 1])
+        residual[k, 6:] = np.concatenate([v[k + 1] - velocity, bg[k + 1] - bg[k], ba[k + 1] - ba[k]])
+        covariance[k] = strapdown.world_axes(motion, T[k, :3, :3], pose[:3, :3])[1]
+        for block, density in zip(WALKS, imu.densities[k, [0, 2]], strict=True):
+            least = (LEAST_WALK * density) ** 2 * motion.dt
+            index = range(block.start, block.stop)
+            covariance[k, index, index] = np.maximum(covariance[k, index, index], least)
+    return residual, covariance
+
+
+def inertial_squares(imu: ImuIntervals, estimate: Estimate) -> FloatArray:
+    """Squared whitened norms (T-1,) of `inertial_residuals`, 15 degrees of freedom each."""
+    residual, covariance = inertial_residuals(imu, estimate)
+    return np.array([mahalanobis(e, P) for e, P in zip(residual, covariance, strict=True)])
+
+
+def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> float:
+    """Squared whitened norm of the state of frame 0 less the start, over the directions in which it has variance."""
+    v, bg, ba = estimate.velocity, estimate.gyroscope_bias, estimate.accelerometer_bias
+    if v is None or bg is None or ba is None:
+        return float("nan")
+    off = [v[0] - start.velocity, bg[0] - start.gyroscope_bias, ba[0] - start.accelerometer_bias]
+    pose = se3.log(se3.inverse(problem.initial_pose) @ estimate.world_T_imu[0])
+    free = free_directions(start.covariance)
+    return mahalanobis(free.T @ np.concatenate([pose, *off]), free.T @ start.covariance @ free)
+
+
+def free_directions(covariance: FloatArray) -> FloatArray:
+    """Orthonormal directions (15, r) in which a start's covariance (15, 15) is not zero, block by block."""
+    columns = []
+    for i in range(0, strapdown.STATE, 3):
+        variance, axes = np.linalg.eigh(covariance[i : i + 3, i : i + 3])
+        kept = axes[:, (variance > 0.0) & (variance > HELD_VARIANCE * variance[-1])]
+        column = np.zeros((strapdown.STATE, kept.shape[1]))
+        column[i : i + 3] = kept
+        columns.append(column)
+    return np.concatenate(columns, axis=1)
+
+
+def mahalanobis(error: FloatArray, P: FloatArray) -> float:
+    """Squared norm e^T P^-1 e of an error (d,), P scaled to correlations first, as its units differ."""
+    scale = np.sqrt(np.diag(P))
+    scaled = error / scale
+    return float(scaled @ np.linalg.solve(P / np.outer(scale, scale), scaled))
