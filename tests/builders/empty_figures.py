@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from fgbaseline.reports.comparing import folder
 from fgbaseline.reports.figures import comparison, layout, run, saving
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import RunData
@@ -37,3 +38,9 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(run, "figure_functions", blank)
     for module in (run, comparison):
         patch.setattr(module, "lay_out", lambda _: None)
+
+
+def figures_left_out(patch: pytest.MonkeyPatch) -> None:
+    """Runs and comparisons have no figures, which saves what even empty ones take."""
+    patch.setattr(run, "drawings", lambda _: {})
+    patch.setattr(folder, "draw", lambda _: {})
