@@ -1,4 +1,4 @@
-"""How fast trajectory metrics are beside evo's, in one run: `python benchmarks/metrics.py --poses 100000 --repeat 3`.
+"""How fast trajectory metrics are beside evo's, in one run: `python -m benchmarks.metrics --repeat 3`.
 
 Each row is one metric from arrays to its statistics, as a user of either library calls it. evo and this project take
 turns, so that a machine that gets slower does so for both; both have to give the same figures to 1e-9, or the row
@@ -21,8 +21,7 @@ from dataclasses import dataclass
 
 import click
 import numpy as np
-from evo.core.metrics import APE, PE, RPE, PoseRelation, StatisticsType
-from evo.core.metrics import Unit as EvoUnit
+from evo.core.metrics import APE, PE, RPE, StatisticsType
 from evo.core.sync import associate_trajectories
 from evo.core.trajectory import PoseTrajectory3D
 from rich.console import Console
@@ -32,19 +31,8 @@ from fgbaseline import compare, data
 from fgbaseline.compare import Align, Unit
 from fgbaseline.compare import PoseRelation as Relation
 from fgbaseline.geometry import FloatArray, se3
+from tests.builders.evo_metrics import OF_MOTIONS, OF_POSES, UNITS
 
-OF_POSES = {
-    Relation.TRANSLATION: PoseRelation.translation_part,
-    Relation.ROTATION: PoseRelation.rotation_angle_rad,
-    Relation.ROTATION_DEG: PoseRelation.rotation_angle_deg,
-    Relation.ROTATION_CHORD: PoseRelation.rotation_part,
-    Relation.POSE: PoseRelation.full_transformation,
-}
-OF_MOTIONS = OF_POSES | {
-    Relation.DISTANCE: PoseRelation.point_distance,
-    Relation.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
-}
-UNITS = {Unit.FRAMES: EvoUnit.frames, Unit.METRES: EvoUnit.meters, Unit.DEGREES: EvoUnit.degrees}
 DELTA = {Unit.FRAMES: 10, Unit.METRES: 10.0, Unit.DEGREES: 10.0}
 
 

@@ -18,7 +18,7 @@ import pytest
 from fgbaseline import reports
 from fgbaseline.reports.cli import main
 
-from .empty_figures import figures_left_empty
+from .empty_figures import empty_files, figures_left_empty
 
 COMMAND = Path(sys.executable).with_name("fgbaseline")
 ROOT = Path(__file__).parents[2]
@@ -113,6 +113,8 @@ def _in_a_fork(
 ) -> Callable[[], NoReturn]:
     """What `subprocess` is to call in the child it forks, which does not come to starting another program then."""
     _everything_imported()
+    if not drawing:
+        empty_files()
     return partial(_become, arguments, env, drawing, first, _descriptors())
 
 

@@ -1,6 +1,7 @@
 """Figures that are written in no time: nine tenths of a run on a short recording are drawing them."""
 
 from collections.abc import Callable
+from functools import cache
 from io import BytesIO
 from typing import Any
 
@@ -13,13 +14,20 @@ from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import RunData
 
 
-def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
-    """For tests of something else: tests/reports/test_figures.py looks at figures."""
-    written, empty = Figure.savefig, {}
+@cache
+def empty_files() -> dict[str, bytes]:
+    """An empty figure in each form; the first call imports what writes them."""
+    empty = {}
     for form in ("png", "svg", "pdf"):
         stream = BytesIO()
         Figure(figsize=(0.1, 0.1)).savefig(stream, format=form)
         empty[form] = stream.getvalue()
+    return empty
+
+
+def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
+    """For tests of something else: tests/reports/test_figures.py looks at figures."""
+    empty, written = empty_files(), Figure.savefig
 
     def savefig(figure: Figure, target: object, **options: Any) -> None:
         if isinstance(target, BytesIO):
@@ -37,3 +45,9 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(run, "figure_functions", blank)
     for module in (run, comparison):
         patch.setattr(module, "lay_out", lambda _: None)
+
+
+def figures_left_out(patch: pytest.MonkeyPatch) -> None:
+    """Runs and comparisons have no figures, which saves what even empty ones take."""
+    patch.setattr(run, "figure_functions", lambda _: {})
+    patch.setattr(comparison, "draw", lambda _: {})

@@ -155,7 +155,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
             separated.append(name)
     assert claims == (len(whole) > 1 and len(separated) == len(whole) - 1 and runs > 1)
     if claims:
-        assert f"smallest error to truth {first} " in sentence
+        assert f"smallest ATE {first} " in sentence
     larger = sentence.partition("larger, by the paired interval: ")[2].partition(";")[0]
     assert [name for name in whole if f"{name} " in larger] == (separated if runs > 1 else [])
 
@@ -163,7 +163,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
 def test_one_run_ranks_nobody_and_missing_answers_are_named() -> None:
     assert "one run does not rank them" in winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
     said = winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
-    assert "smallest error to truth a " in said
+    assert "smallest ATE a " in said
     assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a in these)" in said
     same = winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
     assert "batch" not in same

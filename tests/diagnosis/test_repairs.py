@@ -181,7 +181,7 @@ def test_repairs_beside_what_takes_the_recording_as_it_is_are_refused(tmp_path: 
     for refused in ("--as-recorded", "--preset=documented"):
         result = fgbaseline("run", "drive.npz", "--repairs", "repairs.toml", refused, cwd=tmp_path)
         assert result.returncode == 2
-        assert "--repairs" in result.stderr
+        assert "repairs" in result.stderr
     assert everything_in(tmp_path) == {"drive.npz", "repairs.toml"}
 
 

@@ -92,7 +92,7 @@ def test_an_interrupt_keeps_what_is_done_and_leaves_nothing_half_done(place: Pat
     process.send_signal(signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130
-    assert f"of {N_RUNS} runs are kept; the same command goes on from there" in said
+    assert f"of {N_RUNS} runs kept; the same command resumes from there" in said
     assert "Traceback" not in said
     folder = place / "interrupted"
     assert {path.name for path in folder.iterdir()} == {"bench.json", "runs"}
@@ -107,7 +107,7 @@ def test_adding_to_a_suite_runs_only_what_is_new_and_leaves_no_old_runs(place: P
     (place / "more.toml").write_text(SUITE.replace("count = 2", "count = 3").replace("[8, 12]", "8"))
     shutil.copytree(undisturbed, place / "more")
     result = fgbaseline("bench", "more.toml", "--out", "more", "--workers", "1", cwd=place, drawing=False)
-    assert "3 of 4 runs are done already" in result.stderr
+    assert "3 of 4 runs done already" in result.stderr
     assert "1 of 1: town seed=3" in result.stderr
     assert len(list((place / "more" / "runs").iterdir())) == 4
 
@@ -160,7 +160,7 @@ def test_a_folder_of_somebody_elses_is_left_alone(place: Path) -> None:
     (place / "letters" / "dear.txt").write_text("diary")
     result = fgbaseline("bench", "suite.toml", "--out", "letters", "--force", cwd=place)
     assert result.returncode == 2
-    assert "no bench wrote it" in result.stderr
+    assert "is not the folder of a bench" in result.stderr
     assert [path.name for path in (place / "letters").iterdir()] == ["dear.txt"]
 
 

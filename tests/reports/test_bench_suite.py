@@ -85,8 +85,8 @@ def test_repairs_that_a_preset_would_not_use_are_refused(drive: Path) -> None:
     assert len(planned(drive.parent, text)) == 1
     for sweep, said in (
         ('preset = ["calibrated", "documented"]', "the documented preset uses no repairs"),
-        ('noise = "assumed"', 'noise = "assumed" takes'),
-        ("noise = { pixel = 1.0 }", "noise is set by [sweep] as well"),
+        ('noise = "assumed"', 'noise = "assumed" uses no repairs'),
+        ("noise = { pixel = 1.0 }", "[sweep] sets the noise too"),
     ):
         with pytest.raises(InputError, match=r"suite\.toml: sequence\[0\]\.repairs: ") as error:
             planned(drive.parent, f"{text}[sweep]\n{sweep}\n")

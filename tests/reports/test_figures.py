@@ -208,7 +208,7 @@ def test_a_runaway_does_not_decide_what_the_others_look_like() -> None:
     paths, height, divergence = drawn(run, "paths_overlaid", "height", "divergence").values()
     assert np.ptp(paths.axes[0].get_xlim()) < 200.0
     assert "ekf" in all_texts(paths)
-    assert "poses outside the picture" in all_texts(paths)
+    assert "poses outside the panel" in all_texts(paths)
     assert np.ptp(height.axes[0].get_ylim()) < 200.0
     assert "ekf leaves the panel at" in all_texts(height)
     assert "ekf leaves the panel at" in all_texts(divergence)
@@ -222,7 +222,7 @@ def test_landmarks_far_away_are_counted_and_not_shown() -> None:
     estimate = replace(estimate, landmarks=replace(estimate.landmarks, position=position))
     figure = drawn(run_of(problem, estimate), "path_isam2")["path_isam2"]
     assert np.ptp(figure.axes[0].get_xlim()) < 300.0
-    assert "2 landmarks outside the picture" in all_texts(figure)
+    assert "2 landmarks outside the panel" in all_texts(figure)
 
 
 def test_names_are_drawn_as_they_are(tmp_path: Path) -> None:

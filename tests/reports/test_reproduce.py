@@ -81,7 +81,7 @@ def test_claims_are_tested_and_equal_in_both_forms(reproduced: Path) -> None:
     mapping = verdicts["<b>drive&", "mapping"]
     assert mapping["verdict"] == "holds in part"
     assert "equal to the last bit" in mapping["measured"]
-    assert "with W = 0 it stops" in verdicts["<b>drive&", "low noise"]["measured"]
+    assert "with W = 0 the filter fails" in verdicts["<b>drive&", "low noise"]["measured"]
     assert not verdicts["<b>drive&", "works"]["simulated"]
     assert verdicts["velocities", "works"]["simulated"]
     assert not verdicts["velocities", "prediction"]["simulated"]
@@ -153,7 +153,7 @@ def test_recordings_are_known_by_their_frames_and_not_confused(tmp_path: Path) -
     for name, speed in (("a/x.npz", 1.0), ("b/x.npz", 2.0)):
         (tmp_path / name).parent.mkdir()
         write_npz(replace(drive, linear_velocity=speed * drive.linear_velocity), tmp_path / name)
-    with pytest.raises(InputError, match="is called x"):
+    with pytest.raises(InputError, match="has the name x"):
         read_subjects([tmp_path / "a/x.npz", tmp_path / "b/x.npz"])
 
 
@@ -172,7 +172,7 @@ def test_a_stand_in_has_the_size_and_the_velocities_of_its_recording() -> None:
     assert again.observations.pixel.tobytes() == sequence.observations.pixel.tobytes()
     never_still = stand_in(replace(still, linear_velocity=still.linear_velocity + 5.0))
     assert not never_still.gyro_bias.any()
-    assert "never stands still" in never_still.remark
+    assert "there is no standstill" in never_still.remark
 
 
 def test_each_repair_of_what_was_simulated_brings_dead_reckoning_nearer_to_the_truth(faulty: Sequence) -> None:

@@ -32,7 +32,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(
 ) -> None:
     monkeypatch.setattr(rerun_file, "find_spec", lambda _: object())
     for file in (tmp_path, tmp_path / "no" / "folder.rrd"):
-        with pytest.raises(InputError, match="choose another place"):
+        with pytest.raises(InputError, match="choose another"):
             rerun_file.require_rerun(file)
 
 
