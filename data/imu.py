@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .finite import measurable
+from .value_range import measurable
 
 STANDARD_GRAVITY = 9.81
 """m/s^2, where a recording does not state it"""

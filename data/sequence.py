@@ -54,7 +54,7 @@ class Truth:
         world_T_imu[~np.isfinite(world_T_imu).all(axis=(1, 2))] = np.nan
         return Truth(world_T_imu, moved, source)
 
-    def moved(self, motion: FloatArray) -> "Truth":
+    def transformed(self, motion: FloatArray) -> "Truth":
         """The truth in another world; `motion` (4, 4) is new_T_old."""
         R = motion[:3, :3]
         return replace(

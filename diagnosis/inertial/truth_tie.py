@@ -24,16 +24,16 @@ def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tupl
     up, how = _up(truth, path, known)
     level = np.eye(4)
     level[:3, :3] = so3.rotation_to_z(up)
-    moved = truth.moved(level)
+    moved = truth.transformed(level)
     count = 1 if known[0] == 0 else min(TIED, max(3, round(frames_per_second)), len(known))
     at = known[:count]
     motion = np.eye(4)
     motion[:3, :3] = _yaw(path[at, :3, :3], moved.world_T_imu[at, :3, :3])
-    turned = moved.moved(motion)
+    turned = moved.transformed(motion)
     shift = np.eye(4)
     shift[:3, 3] = np.mean(path[at, :3, 3] - turned.world_T_imu[at, :3, 3], axis=0)
     where = "at frame 0" if count == 1 else f"over frames {at[0]} to {at[-1]}, the first with truth"
-    return turned.moved(shift), f"the ground truth is leveled by {how}; heading and position are tied {where}"
+    return turned.transformed(shift), f"the ground truth is leveled by {how}; heading and position are tied {where}"
 
 
 def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:

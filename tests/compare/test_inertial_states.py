@@ -89,7 +89,7 @@ def test_errors_drawn_from_the_covariance_have_a_nees_of_their_degrees_of_freedo
 def test_a_turned_and_shifted_world_leaves_every_nees() -> None:
     estimate, truth = drawn(1)
     motion = turned_world(1.1)
-    there = compare.state_nees(estimate.moved(motion), truth.moved(motion))
+    there = compare.state_nees(estimate.transformed(motion), truth.transformed(motion))
     np.testing.assert_allclose(there, compare.state_nees(estimate, truth), rtol=1e-6)
 
 
@@ -101,7 +101,7 @@ def test_yaw_alignment_undoes_the_unobservable_directions_also_for_velocities_wi
     truth = replace(truth, world_T_imu=poses)
     before = compare.truth_errors(estimate, truth, aligned=compare.Align.YAW)
     assert before["position"].isna().sum() == 11
-    turned = estimate.moved(turned_world(-2.0))
+    turned = estimate.transformed(turned_world(-2.0))
     after = compare.truth_errors(turned, truth, aligned=compare.Align.YAW)
     np.testing.assert_allclose(after["position"], before["position"], atol=1e-9)
     np.testing.assert_allclose(after["rotation_deg"], before["rotation_deg"], atol=1e-6)

@@ -65,7 +65,7 @@ def moved_truth(recording: data.Sequence, first: int, motion: FloatArray, up: Fl
     """The recording with its truth in another world, and without its first frames."""
     truth = recording.truth
     assert truth is not None
-    late = replace(truth.moved(motion), up=up)
+    late = replace(truth.transformed(motion), up=up)
     poses = late.world_T_imu.copy()
     poses[:first] = np.nan
     return recording.with_truth(replace(late, world_T_imu=poses))

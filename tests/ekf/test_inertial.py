@@ -135,7 +135,7 @@ def test_a_turned_and_shifted_world_gives_the_turned_and_shifted_answer(solve: E
     problem = inertial_problem(2, n_frames=20)
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = so3.exp_so3([0.0, 0.0, 2.0]), [3.0, -8.0, 5.0]
-    there, expected = solve(moved(problem, motion), None), solve(problem, None).moved(motion)
+    there, expected = solve(moved(problem, motion), None), solve(problem, None).transformed(motion)
     np.testing.assert_allclose(there.world_T_imu, expected.world_T_imu, atol=1e-8)
     for name in ("velocity", "gyroscope_bias", "accelerometer_bias", "state_covariance"):
         np.testing.assert_allclose(getattr(there, name), getattr(expected, name), atol=1e-8, err_msg=name)

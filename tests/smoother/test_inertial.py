@@ -256,7 +256,7 @@ def test_answers_turn_with_the_world(problem: Problem, answer: Estimate) -> None
             start, velocity=turn[:3, :3] @ start.velocity, covariance=velocity @ start.covariance @ velocity.T
         ),
     )
-    expected, result = answer.moved(turn), smoother.isam2(turned)
+    expected, result = answer.transformed(turn), smoother.isam2(turned)
     for name in ("world_T_imu", "velocity"):
         np.testing.assert_allclose(getattr(result, name), getattr(expected, name), atol=1e-6)
 
