@@ -59,9 +59,12 @@ def marginal_covariances(
     For the variables of each list of `joint`, which a factor connects, there is one joint covariance, in their order,
     by the first key. Raises RuntimeError where the system is indeterminate.
     """
-    conditionals = _conditionals(graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD))
+    frames = list(joint)
+    chronological = any(len(keys) > 1 for keys in frames)
+    order = _chronological(values, frames) if chronological else gtsam.Ordering.OrderingType.COLAMD
+    conditionals = _conditionals(graph.linearize(values).eliminateSequential(order))
     position = {conditional.key: i for i, conditional in enumerate(conditionals)}
-    together = {min(keys, key=position.__getitem__): keys for keys in joint if len(keys) > 1}
+    together = {min(keys, key=position.__getitem__): keys for keys in frames if len(keys) > 1}
     children: dict[int, list[int]] = defaultdict(list)
     pending: list[tuple[int, _Joint]] = []
     for i, conditional in enumerate(conditionals):
@@ -84,6 +87,23 @@ def marginal_covariances(
         pending.extend((child, clique) for child in inner)
         found |= _leaves([conditionals[child] for child in children[i] if child not in inner], clique)
     return found | found_together
+
+
+def _chronological(values: gtsam.Values, frames: list[list[int]]) -> gtsam.Ordering:
+    """Landmarks first, then the states of the frames in time.
+
+    The backward sweep then is a Rauch-Tung-Striebel smoother, which is stable. With raw inertial data COLAMD eliminates
+    some states between later and earlier ones; its gains, as large as 1 / dt^2, multiply rounding errors from frame to
+    frame until variances are negative.
+    """
+    states = [key for keys in frames for key in keys]
+    order, named = gtsam.Ordering(), set(states)
+    for key in values.keys():  # noqa: SIM118 - gtsam.Values does not iterate over its keys
+        if key not in named:
+            order.push_back(key)
+    for key in states:
+        order.push_back(key)
+    return order
 
 
 def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
