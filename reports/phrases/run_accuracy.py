@@ -37,7 +37,8 @@ def ate_sentences(run: Run) -> list[str]:
     if not known:
         return [f"There is no ATE: no estimator has a pose where the ground truth ({source}, {coverage}) has one."]
     each = listed(f"{number(rmse[name])} m for {name}" for name in known)
-    sentences = [f"ATE (RMSE after SE(3) alignment to the ground truth, {source}, {coverage}): {each}."]
+    alignment = "SE(3) alignment" if run.problem.imu is None else "alignment in yaw and position"
+    sentences = [f"ATE (RMSE after {alignment} to the ground truth, {source}, {coverage}): {each}."]
     if run.reference not in known:
         return sentences
     errors = {name: tables[name]["position"].to_numpy() for name in known if run.results[name].ate_common is not None}

@@ -76,7 +76,12 @@ class EstimatorSummary(Part):
         CommonRmse | None, Field(description="over the frames that all ranked estimators have; ranks by it")
     ]
     ate_common: Annotated[CommonRmse | None, Field(description="ATE over the frames that all ranked estimators have")]
-    ate: Annotated[Spread | None, Field(description="ATE: position error to ground truth after SE(3) alignment, m")]
+    ate: Annotated[
+        Spread | None,
+        Field(
+            description="ATE: position error to ground truth, aligned in SE(3) (raw inertial data: yaw and position), m"
+        ),
+    ]
     ate_unaligned: Annotated[Divergence | None, Field(description="pose error to ground truth without alignment")]
     truth: TruthCount | None
     nees: NeesInDetail | None

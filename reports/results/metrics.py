@@ -305,8 +305,8 @@ METRICS = (
 )
 TERMS: Mapping[str, str] = {
     "coverage": "Share of the recording's time (in a comparison: of the reference's) in which an estimator has poses.",
-    ATE: "Distance of the positions from ground truth after SE(3) alignment, m; in a comparison from the reference, "
-    "after the alignment that was asked for.",
+    ATE: "Distance of the positions from ground truth after SE(3) alignment, m; with raw inertial data after "
+    "alignment in yaw and position; in a comparison from the reference, after the alignment that was asked for.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
     RPE: "Error of the motion between two poses a delta apart, m and °.",
     "drift": "Relative error per meter (or second) over a tenth of the path.",
