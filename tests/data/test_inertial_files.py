@@ -18,7 +18,7 @@ from fgbaseline.geometry import InputError, se3
 
 from ..builders.inertial import inertial_problem
 from ..builders.inertial_paths import NOISE, inertial_recording, turn
-from .test_exchange import assert_equal
+from .test_problem_export import assert_equal
 
 HEADER = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],"

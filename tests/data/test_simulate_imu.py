@@ -68,7 +68,7 @@ def test_a_body_at_rest_senses_gravity_upward_and_its_biases() -> None:
     np.testing.assert_allclose(sequence.imu.angular_velocity[at_rest] - [0.01, 0.02, -0.03], 0.0, atol=1e-6)
     np.testing.assert_allclose(
         sequence.imu.specific_force[at_rest] - [0.1, -0.2, 0.3],
-        9.79 * np.tile(sequence.up, (at_rest.sum(), 1)),
+        9.79 * np.tile(sequence.up_imu, (at_rest.sum(), 1)),
         atol=1e-4,
     )
 
@@ -78,7 +78,7 @@ def test_the_world_is_upright_and_begins_at_the_first_frame() -> None:
     assert sequence.truth is not None
     first = sequence.truth.world_T_imu[0]
     np.testing.assert_allclose(first[:3, 3], 0.0, atol=1e-12)
-    np.testing.assert_allclose(first[:3, :3], so3.rotation_to_z(sequence.up), atol=1e-9)
+    np.testing.assert_allclose(first[:3, :3], so3.rotation_to_z(sequence.up_imu), atol=1e-9)
 
 
 def test_without_imu_a_recording_has_velocities_and_the_same_observations() -> None:
