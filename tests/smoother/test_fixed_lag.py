@@ -213,8 +213,8 @@ def test_the_covariances_of_some_are_those_of_all() -> None:
     for k in range(8):
         lag.update(*frame(k))
     keys = list(lag.checkpoint.times)
-    everyone = lag.checkpoint.covariances(keys)
-    some = lag.checkpoint.covariances(keys[2:5])
+    everyone = lag.checkpoint.covariances([[key] for key in keys])
+    some = lag.checkpoint.covariances([[key] for key in keys[2:5]])
     assert list(some) == keys[2:5]
     for key, covariance in some.items():
         np.testing.assert_allclose(covariance, everyone[key], rtol=1e-6, atol=1e-12)

@@ -232,12 +232,13 @@ def test_joint_marginals_are_blocks_of_the_dense_inverse() -> None:
 
 
 def test_position_and_heading_of_the_first_frame_have_no_variance(problem: Problem, answer: Estimate) -> None:
-    up = problem.initial_pose[2, :3]
+    assert problem.sequence.truth is not None
+    up = problem.sequence.truth.world_T_imu[0, 2, :3]  # about which the start's covariance has none
     for estimate in (answer, answer.by_products["isam2-online"], smoother.fixed_lag(problem)):
         assert estimate.state_covariance is not None
         P = estimate.state_covariance[0]
         np.testing.assert_array_equal(P[:3], 0.0)
-        np.testing.assert_allclose(P[3:6, 3:6] @ up, 0.0, atol=1e-6)
+        np.testing.assert_allclose(P[3:6, 3:6] @ up, 0.0, atol=1e-15)
         assert np.all(np.diag(P)[6:] > 0.0)
         np.testing.assert_array_equal(estimate.covariance, estimate.state_covariance[:, :6, :6])
 
@@ -282,7 +283,7 @@ def test_a_failed_update_costs_one_landmark(
         self: CheckpointedISAM2, factors: gtsam.NonlinearFactorGraph, *rest: object, **others: object
     ) -> object:
         keys = [key for key in factors.keyVector() if chr(key >> 56) in "abcdefghijk"]
-        if not named and len(self.tree.getLinearizationPoint().keys()) > 200 and keys:
+        if not named and len(self.tree.getLinearizationPoint().keys()) > 100 and keys:
             named.append(keys[0])
             raise IndeterminateSystemError(keys[0], "made up")
         return update(self, factors, *rest, **others)  # type: ignore[arg-type]
@@ -306,7 +307,7 @@ def test_without_observations_of_a_frame_the_samples_carry_on(problem: Problem) 
 
 def test_the_window_of_the_fixed_lag_is_the_whole_graph_where_it_is_long(problem: Problem, answer: Estimate) -> None:
     estimate = smoother.fixed_lag(problem, settings=FixedLagSettings(lag=100.0))
-    np.testing.assert_allclose(estimate.world_T_imu, answer.world_T_imu, atol=1e-3)
+    np.testing.assert_allclose(estimate.world_T_imu, answer.world_T_imu, atol=2e-3)  # the relinearization thresholds
     assert estimate.state_covariance is not None
     assert answer.state_covariance is not None
     now, then = (np.sqrt(np.einsum("nii->ni", e.state_covariance)) for e in (estimate, answer))
