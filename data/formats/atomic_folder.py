@@ -59,7 +59,7 @@ def require_free(place: Path, *, force: bool, mark: str) -> None:
             raise InputError(f"{place}: it exists and is no folder; choose another --out")
         elif any(place.iterdir()):
             if not force:
-                raise InputError(f"{place}: the folder exists; choose another --out, or replace it with --force")
+                raise _exists(place)
             if not (place / mark).is_file():
                 raise InputError(
                     f"{place}: --force replaces only what an earlier run wrote, and this folder has no {mark}; "
@@ -82,7 +82,7 @@ def atomic_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
             building.mkdir(parents=True)
             yield building
             require_free(place, force=force, mark=mark)
-            _replace(place, building, mark)
+            _replace(place, building, force=force, mark=mark)
         finally:
             _remove(building, mark)
             _remove_empty(new_parents)
@@ -96,15 +96,25 @@ def _require_room(place: Path) -> None:
         raise InputError(f"{place}: {parent} may not be written to; choose another --out, or change its permissions")
 
 
-def _replace(place: Path, building: Path, mark: str) -> None:
-    """Replaces the folder `place`, if it exists, by `building`.
+def _exists(place: Path) -> InputError:
+    return InputError(f"{place}: the folder exists; choose another --out, or replace it with --force")
 
-    If the system can exchange two names in one step, `place` is always a complete folder, even if the process is
-    killed. Otherwise the old folder is restored if the exchange fails or is interrupted.
+
+def _replace(place: Path, building: Path, *, force: bool, mark: str) -> None:
+    """Gives `building` the name `place`; replaces a folder of that name, which has files, only with `force`.
+
+    The system refuses to rename onto a folder with files: of two processes that write to one place at once, one is
+    refused. If the system can exchange two names in one step, `place` is always a complete folder, even if the process
+    is killed. Otherwise the old folder is restored if the exchange fails or is interrupted.
     """
-    if not place.exists():
+    try:
         building.rename(place)
         return
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+        if not force:
+            raise _exists(place) from error
     if exchanged(building, place):  # the old folder now has the temporary name and is removed with it
         return
     old = place.with_name(f".{place.name}.{os.getpid()}.old")

@@ -85,15 +85,16 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
 
     rivals = {name: e for name, e in errors.items() if name != "isam2"}
     both = ~np.any([np.isnan(e) for e in rivals.values()], axis=0)
-    first = min(rivals, key=lambda name: rmse(rivals[name][both]))
+    least = min(rmse(e[both]) for e in rivals.values())
+    tied = [name for name, e in rivals.items() if rmse(e[both]) == least]
     first_sentence, *others = [s for s in divergence_sentences(run) if "minimum" not in s]
+    first = next(name for name in tied if f": {name} " in first_sentence)
     farther = names_after(next((s for s in others if s.startswith("Larger divergence than")), ""), ":", "$")
     for name in rivals.keys() - {first}:
         d = compare.rmse_difference(rivals[name][both], rivals[first][both])
         figures = [number(rmse(rivals[rival][both])) for rival in (name, first)]
         assert (name in farther) == (d.low > 0.0 and figures[0] != figures[1])
     alone = set(farther) - {first} == rivals.keys() - {first} and len(rivals) > 1
-    assert f": {first} " in first_sentence
     assert first_sentence.startswith("Smallest divergence from isam2") == alone
 
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -53,6 +54,20 @@ def test_an_existing_folder_is_refused_and_replaced_with_force(tmp_path: Path) -
     written(tmp_path / "out", "new", force=True)
     assert everything_in(tmp_path) == {"out", "out/inner", f"out/{MARK}"}
     assert (tmp_path / "out" / MARK).read_text() == "new"
+
+
+def test_a_folder_that_appears_after_the_last_look_is_not_replaced(tmp_path: Path, monkeypatch: Any) -> None:
+    def late(place: Path, **options: Any) -> None:
+        require_free(place, **options)
+        if list(tmp_path.glob(f".out.*/{MARK}")):  # the second look: the block has ended
+            place.mkdir()
+            (place / MARK).write_text("of another process")
+
+    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder.require_free", late)
+    with pytest.raises(InputError, match="the folder exists"):
+        written(tmp_path / "out", "new")
+    assert everything_in(tmp_path) == {"out", f"out/{MARK}"}
+    assert (tmp_path / "out" / MARK).read_text() == "of another process"
 
 
 def test_an_empty_folder_may_be_written_into(tmp_path: Path) -> None:
@@ -111,7 +126,7 @@ def test_a_parent_that_may_not_be_written_to_is_refused_at_once(tmp_path: Path) 
 
 @pytest.mark.parametrize("error", [OSError("no space"), KeyboardInterrupt()])
 @pytest.mark.parametrize("when", ["before", "after"])
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [2, 3])  # the first rename is refused: the old folder has files
 def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_exchange(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, when: str, which: int
 ) -> None:
@@ -122,7 +137,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
     def failing(self: Path, target: Path) -> Path:
         nonlocal calls
         calls += 1
-        fails = calls == which + 1
+        fails = calls == which
         if fails and when == "before":
             raise error
         moved = rename(self, target)
@@ -134,7 +149,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
     with pytest.raises((InputError, KeyboardInterrupt)):
         written(tmp_path / "out", "new", force=True)
     assert everything_in(tmp_path) == {"out", "out/inner", f"out/{MARK}"}
-    expected = "new" if (which, when) == (1, "after") else "old"
+    expected = "new" if (which, when) == (3, "after") else "old"
     assert (tmp_path / "out" / MARK).read_text() == expected
 
 
