@@ -10,6 +10,7 @@ from .consistency.covariance import (
 )
 from .consistency.nees import body_error, nees, nees_table, sigma_ratio
 from .consistency.nis import NisSummary, nis_per_degree, nis_summary
+from .consistency.pose_sigma import PoseSigma, pose_sigma
 from .consistency.reference_nees import ReferenceNees, reference_nees
 from .landmarks.dynamic_landmarks import dynamic_landmarks
 from .landmarks.map_difference import map_by_depth, map_difference
@@ -80,7 +81,7 @@ from .trajectory.frame_conventions import (
 from .trajectory.path import distance_traveled
 from .trajectory.segments import SegmentErrors, segment_errors
 from .trajectory.time_offset import TimeOffset, time_offset
-from .trust import Trust, Verdict, trust
+from .trust import Criterion, Trust, Verdict, trust
 
 __all__ = [
     "MIN_COVERAGE",
@@ -92,6 +93,7 @@ __all__ = [
     "Association",
     "BodyRotation",
     "CovarianceState",
+    "Criterion",
     "ErrorDecomposition",
     "Exceedance",
     "HeldOutErrors",
@@ -100,6 +102,7 @@ __all__ = [
     "NisSummary",
     "PairedRanking",
     "PoseRelation",
+    "PoseSigma",
     "ReferenceNees",
     "RmseDifference",
     "SegmentErrors",
@@ -154,6 +157,7 @@ __all__ = [
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
+    "pose_sigma",
     "rankable",
     "reference_nees",
     "relative_errors",
