@@ -32,7 +32,7 @@ def test_sigma_is_the_root_mean_square_of_sampled_position_and_rotation_errors()
 def test_a_rigid_motion_of_the_world_leaves_sigma_unchanged() -> None:
     P = np.array([np.diag([1.0, 4.0, 4.0, 0.01, 0.02, 0.01]) * k for k in (1.0, 2.0, 3.0)])
     before = compare.pose_sigma(with_covariances(P))
-    after = compare.pose_sigma(with_covariances(P).moved(se3.exp([1.0, 2.0, 3.0, 0.3, 0.2, 0.1])))
+    after = compare.pose_sigma(with_covariances(P).transformed(se3.exp([1.0, 2.0, 3.0, 0.3, 0.2, 0.1])))
     assert np.array_equal(before.position, after.position)
     assert before.position_rmse == pytest.approx(3.0 * np.sqrt(2.0))
     assert before.position_final == pytest.approx(3.0 * np.sqrt(3.0))
