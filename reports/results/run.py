@@ -95,8 +95,9 @@ class Summary(Part):
     held_out: Annotated[HeldOutSummary | None, Field(description="null where no tracks were held out")]
     estimators: dict[str, EstimatorSummary]
     added: Annotated[
-        dict[str, str], Field(description="trajectories from files among the estimators: pairing and alignment")
-    ] = {}
+        dict[str, str],
+        Field(default_factory=dict, description="trajectories from files among the estimators: pairing and alignment"),
+    ]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
     machine: dict[str, str | int]
