@@ -1,4 +1,4 @@
-"""Commands on a recording: `run`, `diagnose`, `export` and `simulate`."""
+"""Commands on a recording: `run`, `diagnose`, `export` and `simulate`; `estimators` lists what can run on it."""
 
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,23 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
 @options.preset
 @click.option("--estimators", default=DEFAULT_ESTIMATORS, show_default=True, help="Names, separated by commas.")
+@click.option(
+    "--estimator",
+    "user_estimators",
+    multiple=True,
+    metavar="[NAME=]FILE:FUNCTION",
+    help="Function of a Python file, beside --estimators; repeatable.",
+)
+@click.option(
+    "--add",
+    multiple=True,
+    metavar="[NAME=]PATH",
+    help="Trajectory file beside the estimators, aligned to the reference by yaw, or by SE(3) where the worlds are not "
+    "level; repeatable.",
+)
+@click.option("--add-body", type=options.BODY, help="Body whose poses --add has.  [default: imu]")
+@click.option("--add-time-unit", type=options.UNITS, help="Unit of ambiguous time stamps of --add.")
+@click.option("--add-offset", type=float, default=0.0, metavar="S", help="Added to the stamps of --add.")
 @options.features
 @click.option(
     "--landmarks",
@@ -54,6 +71,7 @@ def run(
     out: Path | None,
     force: bool,
     estimators: str,
+    user_estimators: tuple[str, ...],
     landmarks: str,
     time_unit: str | None,
     rerun_file: Path | None,
@@ -67,17 +85,35 @@ def run(
     input.
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
+    from fgbaseline.data.user_estimator import load_all
 
     from ..run.command import run as run_and_report
     from ..run.problem import RunSettings
 
+    functions = load_all(user_estimators)
+    names = [name.strip() for name in estimators.split(",") if name.strip()]
     settings = RunSettings(
-        estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
+        estimators=(*names, *(name for name in functions if name not in names)),
+        functions=functions,
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
         **given,
     )
     return run_and_report(settings, out, force=force, rerun_file=rerun_file)
+
+
+@click.command(epilog="Example: fgbaseline estimators")
+def estimators() -> None:
+    """List the installed estimators, the ones of other packages included, with a line each.
+
+    Exits 0.
+    """
+    from fgbaseline.data import estimator_summaries
+
+    summaries = estimator_summaries()
+    width = max(map(len, summaries))
+    for name, summary in summaries.items():
+        click.echo(f"{name:{width}}  {summary}")
 
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")

@@ -94,6 +94,10 @@ class Summary(Part):
     reference: ReferenceSummary
     held_out: Annotated[HeldOutSummary | None, Field(description="null where no tracks were held out")]
     estimators: dict[str, EstimatorSummary]
+    added: Annotated[
+        dict[str, str],
+        Field(default_factory=dict, description="trajectories from files among the estimators: pairing and alignment"),
+    ]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
     machine: dict[str, str | int]
@@ -135,6 +139,7 @@ def summarize(run: Run) -> Summary:
                 },
                 "held_out": _held_out(run),
                 "estimators": {name: summarize_estimator(run, result) for name, result in run.results.items()},
+                "added": dict(run.added),
                 "settings": dict(run.settings),
                 "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
                 "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count() or 0},

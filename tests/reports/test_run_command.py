@@ -18,7 +18,8 @@ import pytest
 from fgbaseline import data
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence, solve
+from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence
+from fgbaseline.reports.run.solution import solve
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
