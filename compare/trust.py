@@ -17,6 +17,8 @@ from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
+NOTABLE_INFLATION = 1.1
+"""factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
 """share of observations without positive disparity above which it is reported"""
 CRITERIA = {
@@ -122,7 +124,11 @@ def trust(
     given_up = len(lost) / problem.n_frames
     robust = "" if problem.kernel is None else ", robust"
     inflated = inflation_remark(problem)
-    expected = f"expected 1{robust}" if not inflated else f"{inflated}; {1.0 / problem.pixel_inflation:.2g} is expected"
+    expected = (
+        f"expected 1{robust}"
+        if not inflated
+        else f"{inflated}; {1.0 / problem.pixel_inflation:.2g} if independent from frame to frame"
+    )
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     intervals = problem.n_frames - 1
     judged = [
@@ -171,8 +177,8 @@ def trust(
 
 
 def inflation_remark(problem: Problem) -> str:
-    """States the inflation of the pixel noise; empty where there is none."""
-    if problem.pixel_inflation == 1.0:
+    """States the inflation of the pixel noise; empty where there is none to speak of."""
+    if problem.pixel_inflation < NOTABLE_INFLATION:
         return ""
     return f"the pixel sigma is inflated {problem.pixel_inflation:.2g} times for time-correlated track errors"
 

@@ -26,20 +26,23 @@ def overconfidence_sentences(run: Run) -> list[str]:
 
 
 def is_overconfident(run: Run, result: Result) -> bool:
-    """Whether the claimed covariances contradict the errors to ground truth or the reference.
+    """Whether the claimed sigma is below the error to truth or the reference, and their covariances contradict it.
 
     The median NEES of either exceeds the bound of a single pose, or P is smaller than P_ref in most frames.
     """
+    if not 0.0 < _claimed(result) < _actual(run, result)[0]:
+        return False
     difference = None if result.name in run.unranked else result.evidence.difference
     beside = difference is not None and (difference.is_overconfident or _median(difference.nees) > BEYOND)
-    return _claimed(result) > 0.0 and (beside or (result.nees is not None and _median(result.nees) > BEYOND))
+    return beside or (result.nees is not None and _median(result.nees) > BEYOND)
 
 
 def _claim(run: Run, result: Result) -> str:
     distance, other = _actual(run, result)
-    ratio = result.evidence.sigma_ratio
+    ratio, difference = result.evidence.sigma_ratio, result.evidence.difference
     figures = {
         "NEES": float("nan") if result.nees is None else _median(result.nees),
+        "reference NEES": float("nan") if difference is None else _median(difference.nees),
         "sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
     }
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))

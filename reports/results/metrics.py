@@ -152,7 +152,7 @@ def _frames_per_second(run: Run, result: Result) -> float:
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
 REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
 NEES, REFERENCE_NEES, RESIDUALS, COST = "NEES", "reference NEES", "residuals of tracks", "cost"
-SIGMA, CONSISTENCY = "claimed 1-sigma", "consistency"
+SIGMA, CONSISTENCY = "1-sigma", "consistency"
 COMMON = "RMSE over common frames"
 NO_TRUTH = "no frame has both a pose and truth"
 NO_LANDMARK = "no observed landmark was estimated"
@@ -192,8 +192,8 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("ate", "max"), ATE, "max, aligned", "m", LOWER, MAIN, absent=NO_TRUTH),
-    Metric(("ate_unaligned", "final"), ATE, "final, unaligned", "m", LOWER, MAIN, absent=NO_TRUTH),
+    Metric(("ate", "max"), ATE, "max, aligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
+    Metric(("ate_unaligned", "final"), ATE, "final, unaligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
     Metric(("translation", "rmse"), ATE, "RMSE", "m", LOWER, COMPARISON),
     Metric(("common", "rmse"), ATE, "RMSE over common moments", "m", LOWER, COMPARISON, same_data=True),
     Metric(("behind",), ATE, "RMSE above the smallest", "m", tables=COMPARISON),
@@ -212,10 +212,10 @@ METRICS = (
         uneven_only=True,
     ),
     Metric(("divergence", "max"), DIVERGENCE, "max", "m", LOWER, MAIN),
-    Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, MAIN),
-    Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, MAIN),
-    Metric(("sigma", "position_rmse"), SIGMA, "RMS", "m", tables=MAIN | TERMINAL),
-    Metric(("sigma", "position_final"), SIGMA, "final", "m", tables=MAIN),
+    Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, EVIDENCE),
+    Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed 1-sigma"),
+    Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),
     Metric(("sigma_ratio", "position"), CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
     Metric(("nees", "median"), CONSISTENCY, "NEES", tables=MAIN, term=NEES, absent="no positive definite covariance"),
     Metric(
@@ -242,7 +242,7 @@ METRICS = (
         name="reprojection",
         absent=NO_LANDMARK,
     ),
-    Metric(("reprojection", "p95"), REPROJECTION, "95th percentile", "px", LOWER, MAIN, absent=NO_LANDMARK),
+    Metric(("reprojection", "p95"), REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE, absent=NO_LANDMARK),
     Metric(
         ("reprojection", "under_3px"),
         REPROJECTION,
@@ -288,7 +288,7 @@ METRICS = (
         "rate",
         "frames/s",
         HIGHER,
-        MAIN,
+        EVIDENCE,
         same_data=True,
         absent="it took no measurable time",
         measure=_frames_per_second,

@@ -71,7 +71,10 @@ def test_inflated_pixel_noise_is_stated_and_low_residuals_are_no_praise() -> Non
     inflated = run_of(replace(problem, pixel_inflation=5.5), answer(problem, "isam2"))
     pixel = next(c for c in inflated.trust.criteria if c.code == "pixel_scale")
     assert pixel.remark == "the pixel sigma is inflated 5.5 times for time-correlated track errors"
-    assert any("inflated 5.5 times" in reason and "0.18 is expected" in reason for reason in inflated.trust.reasons)
+    assert any(
+        "inflated 5.5 times" in reason and "0.18 if independent from frame to frame" in reason
+        for reason in inflated.trust.reasons
+    )
     rows = trust_table(inflated.trust.criteria).rows
     assert "inflated 5.5 times" in rows[0].cells[-1].text
     assert summarize(inflated).problem.pixel_inflation == 5.5
@@ -112,3 +115,16 @@ def test_a_difference_of_the_decimals_alone_is_zero_and_not_best() -> None:
     assert not mine.best
     assert not off.text.startswith("0 ±")
     assert any(s.startswith("Nearer to truth than the decimals of the files resolve: mine") for s in result.verdict)
+
+
+def test_a_claim_above_the_error_is_not_called_overconfident() -> None:
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    loose = answer(problem, "dead-reckoning", (0.5, 0.0, 0.0), covariance=claiming(1.0, T))
+    run = run_of(problem, loose, answer(problem, "isam2", covariance=claiming(0.1, T)))
+    assert not [s for s in verdict(run) if s.startswith("Overconfident")]
+
+
+def test_an_inflation_of_a_few_percent_is_not_mentioned() -> None:
+    problem = replace(plain_problem(scene()), pixel_inflation=1.04)
+    assert not any("inflated" in reason for reason in run_of(problem, answer(problem, "isam2")).trust.reasons)
