@@ -45,6 +45,8 @@ class Evidence:
     """see `compare.nees_table`"""
     difference: compare.ReferenceNees | None
     """NEES of the difference from the reference"""
+    sigma: compare.PoseSigma
+    """1-sigma of the poses by its own covariances; NaN without"""
     sigma_ratio: pd.DataFrame | None
     """sigmas over those of the reference, by frame"""
     nis_per_degree: FloatArray
@@ -235,6 +237,7 @@ def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) 
         error=None if truth is None else compare.body_error(estimate, truth),
         nees=None if truth is None else compare.nees_table(estimate, truth),
         difference=None if other is None else compare.reference_nees(estimate, other),
+        sigma=compare.pose_sigma(estimate),
         sigma_ratio=None if other is None else compare.sigma_ratio(estimate, other),
         nis_per_degree=compare.nis_per_degree(estimate),
         nis=compare.nis_summary(estimate),

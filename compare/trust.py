@@ -17,6 +17,8 @@ from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
+NOTABLE_INFLATION = 1.1
+"""factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
 """share of observations without positive disparity above which it is reported"""
 CRITERIA = {
@@ -60,6 +62,8 @@ class Criterion:
     at_least: bool
     """whether the value must not fall below its limits; else it must not exceed them"""
     verdict: Verdict
+    remark: str = ""
+    """what the value rests on beside the reference; empty where nothing needs to be said"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +123,18 @@ def trust(
     lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
     given_up = len(lost) / problem.n_frames
     robust = "" if problem.kernel is None else ", robust"
+    inflated = inflation_remark(problem)
+    expected = (
+        f"expected 1{robust}"
+        if not inflated
+        else f"{inflated}; {1.0 / problem.pixel_inflation:.2g} if independent from frame to frame"
+    )
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     intervals = problem.n_frames - 1
     judged = [
         (
-            _criterion(limit, "pixel_scale", pixel),
-            f"normalized pixel residual RMS {_figure(pixel)} (expected 1{robust})",
+            _criterion(limit, "pixel_scale", pixel, inflated),
+            f"normalized pixel residual RMS {_figure(pixel)} ({expected})",
         ),
         (
             _criterion(limit, "motion_scale", motion),
@@ -166,12 +176,19 @@ def trust(
     )
 
 
-def _criterion(limits: TrustLimits, code: str, value: float) -> Criterion:
+def inflation_remark(problem: Problem) -> str:
+    """States the inflation of the pixel noise; empty where there is none to speak of."""
+    if problem.pixel_inflation < NOTABLE_INFLATION:
+        return ""
+    return f"the pixel sigma is inflated {problem.pixel_inflation:.2g} times for time-correlated track errors"
+
+
+def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -> Criterion:
     doubtful, untrusted = getattr(limits, code)
     name, unit = CRITERIA[code]
     at_least = code in AT_LEAST
     verdict = (_below if at_least else _above)(value, (doubtful, untrusted))
-    return Criterion(code, name, value, unit, doubtful, untrusted, at_least, verdict)
+    return Criterion(code, name, value, unit, doubtful, untrusted, at_least, verdict, remark)
 
 
 def expected_observations(problem: Problem) -> BoolArray:

@@ -87,8 +87,8 @@ def charts(run: Run) -> list[dict[str, Any]]:
 
 def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
     away, group = f"from {run.reference}", "Divergence and errors"
-    yield _chart(group, "divergence", f"Divergence {away}", "m", _column(run, "divergence", "position"))
-    yield _chart(group, "rotation", f"Rotation {away}", "°", _column(run, "divergence", "rotation_deg"))
+    yield _chart(group, "divergence", f"Divergence {away}, unaligned", "m", _column(run, "divergence", "position"))
+    yield _chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
     yield _chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
     yield _chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
     without = "difference from ground truth; all start at the true pose"

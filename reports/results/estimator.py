@@ -28,7 +28,7 @@ from .evidence import (
     summarize_evidence,
 )
 from .metrics import MEASURED, measured, with_measured
-from .statistics import INFINITE, Divergence, Number, Part, Reprojection, Spread, nulls
+from .statistics import INFINITE, Divergence, Number, Part, PoseSigma, Reprojection, Spread, nulls
 
 
 class Component(Part):
@@ -87,6 +87,7 @@ class EstimatorSummary(Part):
     nees: NeesInDetail | None
     covariance: CovarianceCount | None
     nees_reference: ReferenceNees | None
+    sigma: PoseSigma | None
     sigma_ratio: SigmaRatio | None
     nis: Nis | None
     whitened: Whitened
