@@ -42,6 +42,8 @@ class EventKind(StrEnum):
     NO_COVARIANCES = "no covariances"
     DESCENT_FAILED = "descent failed"
     """Levenberg-Marquardt ended with an exception from one of its starts"""
+    STARTED_AT_ISAM2 = "started at isam2's answer only"
+    """a batch solution without the descent from dead reckoning, as wanted: it shows whether isam2 has converged"""
     ONE_START = "one start only"
     """minimum not confirmed by a second start; lowers the trust in the reference"""
     SAME_COST = "both starts end at the same cost"

@@ -63,12 +63,15 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
         from ..tables import print_table
         from ..tables.run import terminal_table
         from .folder import as_dict, write_run
-        from .solution import solve
+        from .solution import batch_is_added, solve
 
         import_estimators(settings.estimators)
         (problem,) = built()
     for sentence in preliminary_remarks(problem):
         click.echo(sentence)
+    if settings.batch_up_to and "isam2" in settings.estimators and not batch_is_added(problem, settings):
+        many = plural(int(problem.mask.sum()), "observation")
+        progress.print_line(f"batch is left out: {many}, by default up to {settings.batch_up_to}; --estimators adds it")
     solved = solve(problem, settings, progress.estimator, held, cores(), added)
     for name, result in solved.results.items():
         if not result.answered:
