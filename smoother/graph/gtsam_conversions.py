@@ -17,8 +17,6 @@ ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """Index that takes [v, w] (ours) to [w, v] (GTSAM), and back."""
 STATE_ORDER = np.r_[ROTATION_FIRST, 6:9, 12:15, 9:12]
 """Index that takes our error state, and noise, to GTSAM's, which has the accelerometer's bias first, and back."""
-HELD_VARIANCE = 1e-9
-"""as a share of the largest in a block of a start's covariance: what is no more than this is rounding"""
 
 
 def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
@@ -65,22 +63,12 @@ def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> Floa
     if problem.start is not None:
         matrix = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
     if first == 0 and problem.start is not None:
-        free = np.eye(len(STATE_ORDER))
-        free[:6, :6] -= held_directions(problem.start.covariance)
+        directions, free = problem.start.free_directions[:6], np.eye(len(STATE_ORDER))
+        free[:6, :6] = directions @ directions.T
         matrix[:1] = free @ matrix[:1] @ free
     elif first == 0 and not problem.initial_covariance.any():
         matrix[:1] = 0.0
     return matrix
-
-
-def held_directions(covariance: FloatArray) -> FloatArray:
-    """Projection (6, 6) onto the directions of the pose that have no variance in a start's covariance (15, 15)."""
-    held = np.zeros((6, 6))
-    for block in (slice(0, 3), slice(3, 6)):
-        variance, axes = np.linalg.eigh(covariance[block, block])
-        without = axes[:, variance <= HELD_VARIANCE * max(float(variance[-1]), 0.0)]
-        held[block, block] = without @ without.T
-    return held
 
 
 def reorder_tangent(covariance: Any) -> FloatArray:

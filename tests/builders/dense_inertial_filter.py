@@ -25,7 +25,7 @@ class DenseInertialFilter(DenseJointFilter):
         start = self.problem.start
         assert start is not None
         self.P = start.covariance.copy()
-        self.bias = np.concatenate([start.velocity, start.gyroscope_bias, start.accelerometer_bias])
+        self.bias = np.concatenate([start.velocity, start.bias])
         self.N_predicted = self.unobservable()
 
     def predict(self, k: int) -> None:

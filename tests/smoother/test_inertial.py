@@ -71,7 +71,7 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
         [
             se3.log(se3.inverse(problem.initial_pose) @ states.world_T_imu[0]),
             states.velocity[0] - start.velocity,
-            states.bias[0] - np.concatenate([start.gyroscope_bias, start.accelerometer_bias]),
+            states.bias[0] - start.bias,
         ]
     )
     parts = [np.linalg.solve(np.linalg.cholesky(start.covariance + np.diag(held**2)), first)]
