@@ -26,8 +26,10 @@ def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
     depend on how the world is turned. With raw inertial data z stays up, and the frame is that of the first pose but
     for the smallest rotation that takes the pose's up to z.
     """
-    first = np.eye(4) if problem.imu is None else _level(problem)
-    world_T_solver = problem.initial_pose if problem.imu is None else problem.initial_pose @ se3.inverse(first)
+    first = np.eye(4)
+    if problem.imu is not None:
+        first[:3, :3] = so3.rotation_to_z(problem.initial_pose[2, :3])
+    world_T_solver = problem.initial_pose @ se3.inverse(first)
     prior, start = problem.landmark_prior, problem.start
     if np.array_equal(world_T_solver, np.eye(4)):
         return problem, world_T_solver
@@ -36,21 +38,9 @@ def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
     if prior is not None:
         prior = replace(prior, mean=se3.transform(solver_T_world, prior.mean), covariance=R @ prior.covariance @ R.T)
     if start is not None:
-        turn = np.eye(strapdown.STATE)
-        turn[strapdown.VELOCITY, strapdown.VELOCITY] = R
-        start = replace(start, velocity=R @ start.velocity, covariance=turn @ start.covariance @ turn.T)
+        covariance = strapdown.rotated_velocity(start.covariance, R, R)
+        start = replace(start, velocity=R @ start.velocity, covariance=covariance)
     return replace(problem, initial_pose=first, landmark_prior=prior, start=start), world_T_solver
-
-
-def _level(problem: Problem) -> FloatArray:
-    """Pose (4, 4) at the origin with the tilt of the first pose, by the smallest rotation (about x if upside down)."""
-    up = problem.initial_pose[2, :3]
-    axis = np.array([up[1], -up[0], 0.0])
-    sine = float(np.linalg.norm(axis))
-    axis = axis / sine if sine > 0.0 else np.array([1.0, 0.0, 0.0])
-    level = np.eye(4)
-    level[:3, :3] = so3.exp_so3(np.arctan2(sine, up[2]) * axis)
-    return level
 
 
 def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
