@@ -6,6 +6,8 @@ from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.problem.inertial import LEAST_WALK, ImuIntervals, InertialStart
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
+from ..statistics.chi_square import mahalanobis_squared
+
 WALKS = (strapdown.GYROSCOPE_BIAS, strapdown.ACCELEROMETER_BIAS)
 
 
@@ -38,8 +40,7 @@ def inertial_residuals(imu: ImuIntervals, estimate: Estimate) -> tuple[FloatArra
 
 def inertial_squares(imu: ImuIntervals, estimate: Estimate) -> FloatArray:
     """Squared whitened norms (T-1,) of `inertial_residuals`, 15 degrees of freedom each."""
-    residual, covariance = inertial_residuals(imu, estimate)
-    return np.array([mahalanobis(e, P) for e, P in zip(residual, covariance, strict=True)])
+    return mahalanobis_squared(*inertial_residuals(imu, estimate))
 
 
 def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> float:
@@ -50,11 +51,5 @@ def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> 
     off = [v[0] - start.velocity, np.concatenate([bg[0], ba[0]]) - start.bias]
     pose = se3.log(se3.inverse(problem.initial_pose) @ estimate.world_T_imu[0])
     free = start.free_directions
-    return mahalanobis(free.T @ np.concatenate([pose, *off]), free.T @ start.covariance @ free)
-
-
-def mahalanobis(error: FloatArray, P: FloatArray) -> float:
-    """Squared norm e^T P^-1 e of an error (d,), P scaled to correlations first, as its units differ."""
-    scale = np.sqrt(np.diag(P))
-    scaled = error / scale
-    return float(scaled @ np.linalg.solve(P / np.outer(scale, scale), scaled))
+    error, P = free.T @ np.concatenate([pose, *off]), free.T @ start.covariance @ free
+    return float(mahalanobis_squared(error[None], P[None])[0])
