@@ -261,6 +261,7 @@ def simulate(
     Exits 0, or 2 on bad input.
     """
     from fgbaseline.data import read, write_npz
+    from fgbaseline.data.formats.atomic_write import require_new
     from fgbaseline.data.plural import plural
     from fgbaseline.data.simulate import SimulatedImu, Simulation
     from fgbaseline.data.simulate import simulate as simulated
@@ -268,8 +269,7 @@ def simulate(
 
     if output.suffix != ".npz":
         raise InputError(f"{output}: a recording is written as .npz; give a name that ends with it")
-    if output.exists() and not force:
-        raise InputError(f"{output}: the file exists; choose another, or replace it with --force")
+    require_new(output, force=force)
     settings = {name: value for name, value in given.items() if value not in (None, ())}
     for many, one in (("bursts", "burst"), ("blackouts", "blackout")):
         if one in settings:
@@ -286,7 +286,7 @@ def simulate(
         settings["along"] = read(along)
         settings.setdefault("path", "along")
     sequence = simulated(Simulation(**settings))
-    write_npz(sequence, output)
+    write_npz(sequence, output, force=force)
     click.echo(
         f"{output}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} of "
         f"{plural(sequence.n_landmarks, 'track')}"
