@@ -24,7 +24,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.preset
 @click.option(
     "--estimators",
-    help=f"Names, separated by commas.  [default: {DEFAULT_ESTIMATORS}; up to {BATCH_OBSERVATIONS} observations also "
+    help=f"Names, separated by commas.  [default: {DEFAULT_ESTIMATORS}; up to {BATCH_OBSERVATIONS:,} observations also "
     "batch, started at the answer of isam2 only]",
 )
 @click.option(

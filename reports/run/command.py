@@ -71,7 +71,9 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
         click.echo(sentence)
     if settings.batch_up_to and "isam2" in settings.estimators and not batch_is_added(problem, settings):
         many = plural(int(problem.mask.sum()), "observation")
-        progress.print_line(f"batch is left out: {many}, by default up to {settings.batch_up_to}; --estimators adds it")
+        progress.print_line(
+            f"batch is left out: {many}, by default up to {settings.batch_up_to:,}; --estimators adds it"
+        )
     solved = solve(problem, settings, progress.estimator, held, cores(), added)
     for name, result in solved.results.items():
         if not result.answered:
