@@ -53,7 +53,7 @@ ROOM = 0.95
 
 
 def draw(studies: Several["Study"]) -> dict[str, Figure]:
-    """The source paper's figures by their numbers, those of other recordings by name, then `sweep` and `causes_NAME`."""
+    """The source paper's figures by number, those of other recordings by name, then `sweep` and `causes_NAME`."""
     figures: dict[str, Figure] = {}
     with in_style():
         for study in studies:
