@@ -63,13 +63,13 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
         from ..tables import print_table
         from ..tables.run import terminal_table
         from .folder import as_dict, write_run
-        from .solution import batch_is_added, solve
+        from .solution import solve
 
         import_estimators(settings.estimators)
         (problem,) = built()
     for sentence in preliminary_remarks(problem):
         click.echo(sentence)
-    if settings.batch_up_to and "isam2" in settings.estimators and not batch_is_added(problem, settings):
+    if 0 < settings.batch_up_to < int(problem.mask.sum()) and "isam2" in settings.estimators:
         many = plural(int(problem.mask.sum()), "observation")
         progress.print_line(
             f"batch is left out: {many}, by default up to {settings.batch_up_to:,}; --estimators adds it"

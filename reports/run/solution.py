@@ -83,7 +83,7 @@ def batch_is_added(problem: Problem, settings: RunSettings) -> bool:
     return (
         "isam2" in settings.estimators
         and "batch" not in settings.estimators
-        and int(problem.mask.sum()) <= settings.batch_up_to
+        and 0 < int(problem.mask.sum()) <= settings.batch_up_to
     )
 
 
