@@ -24,6 +24,8 @@ from fgbaseline.data.simulate import (
 )
 from fgbaseline.geometry import FloatArray, InputError, disparity, se3
 
+from ..builders.refusals import refused
+
 PATHS = ["town", "loop", "highway", "handheld"]
 CLEAN = {"sigma_linear": 0.0, "sigma_angular": 0.0, "sigma_pixel": 0.0, "wrong_share": 0.0}
 
@@ -432,9 +434,8 @@ def test_what_is_no_right_handed_convention_is_refused(wrong: str) -> None:
     ],
 )
 def test_what_cannot_be_is_refused_with_setting_and_value(name: str, value: object) -> None:
-    with pytest.raises(InputError, match=name) as refusal:
+    with refused(name):
         Simulation(**{name: value})  # type: ignore[arg-type]
-    assert "\n" not in str(refusal.value)
 
 
 def test_velocities_that_cannot_be_followed_are_refused() -> None:

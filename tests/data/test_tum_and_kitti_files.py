@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from fgbaseline.data.formats import read_kitti, read_tum, write_tum
 from fgbaseline.geometry import InputError, se3, so3
 
+from ..builders.refusals import refused
+
 FINITE = st.floats(-1e12, 1e12)
 
 
@@ -94,10 +96,8 @@ def test_a_bad_tum_file_is_told_with_its_line(tmp_path, case):
     lines, sentence = BAD_TUM[case]
     path = tmp_path / "a.tum"
     path.write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(InputError, match=sentence) as raised:
+    with refused(sentence, path):
         read_tum(path)
-    assert str(raised.value).startswith(f"{path}: ")
-    assert "\n" not in str(raised.value)
 
 
 def test_bytes_that_are_no_text(tmp_path):

@@ -9,16 +9,14 @@ import pytest
 from fgbaseline import compare, data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
 from fgbaseline.data.motion import dead_reckoned_path
-from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent, values_from_state
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 from fgbaseline.smoother.graph.marginal_covariances import marginal_covariances
 from fgbaseline.smoother.initialization.windowed_initialization import optimize_in_windows
 
-from ..builders.four_rows import assert_no_small_step_lowers_the_cost, information
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
-from .test_isam2 import PROBLEMS, SCENE, state_of
+from .test_isam2 import PROBLEMS, SCENE
 
 
 def kinds(estimate: Estimate) -> set[str]:
@@ -35,32 +33,6 @@ def test_from_both_starts_it_ends_where_isam2_does(name: str) -> None:
     np.testing.assert_array_equal(estimate.used, isam2.used)
     np.testing.assert_array_equal(estimate.landmarks.index, isam2.landmarks.index)
     np.testing.assert_allclose(estimate.world_T_imu, isam2.world_T_imu, rtol=0, atol=5e-5)
-
-
-@pytest.mark.parametrize("name", ["plain", "held", "prior"])
-def test_no_small_step_lowers_the_cost_of_the_four_rows(name: str) -> None:
-    problem = PROBLEMS[name]
-    assert_no_small_step_lowers_the_cost(problem, state_of(smoother.batch(problem)))
-
-
-@pytest.mark.parametrize("name", ["plain", "prior"])
-def test_the_covariances_are_the_dense_inverse_of_the_curvature(name: str) -> None:
-    problem = PROBLEMS[name]
-    estimate = smoother.batch(problem)
-    assert estimate.covariance is not None
-    assert estimate.landmarks.covariance is not None
-    dense, T = np.linalg.inv(information(problem, state_of(estimate))), problem.n_frames
-    for k, covariance in enumerate(estimate.covariance):
-        assert_near(covariance, dense[6 * k : 6 * k + 6, 6 * k : 6 * k + 6])
-    for row, covariance in enumerate(estimate.landmarks.covariance):
-        at = slice(6 * T + 3 * row, 6 * T + 3 * row + 3)
-        assert_near(covariance, dense[at, at])
-
-
-def assert_near(covariance: FloatArray, expected: FloatArray) -> None:
-    unit = 1.0 / np.sqrt(np.diag(expected))
-    scale = unit[:, None] * unit[None, :]
-    np.testing.assert_allclose(covariance * scale, expected * scale, rtol=0, atol=1e-3)
 
 
 def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:

@@ -1,5 +1,6 @@
 """The reference is the minimum of the problem's cost, its covariance the curvature's, and it says what it left out."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import gtsam
@@ -21,6 +22,7 @@ from ..builders.synthetic import Scene, drive, first_frames, matched, plain_prob
 from .test_factors import graph_of, near_truth, values_of
 
 SCENE = Scene().sequence()
+Solver = Callable[[Problem], Estimate]
 
 
 def batch(problem: Problem) -> State:
@@ -79,28 +81,33 @@ def test_ten_poses_are_where_batch_levenberg_marquardt_finds_them(name: str, tol
     np.testing.assert_array_less(np.abs(estimate.landmarks.position - expected.landmarks), tolerance * distance)
 
 
+@pytest.mark.parametrize("solve", [smoother.isam2, smoother.batch])
 @pytest.mark.parametrize("name", ["plain", "held", "prior"])
-def test_no_small_step_lowers_the_cost_of_the_four_rows(name: str) -> None:
+def test_no_small_step_lowers_the_cost_of_the_four_rows(solve: Solver, name: str) -> None:
     problem = PROBLEMS[name]
-    assert_no_small_step_lowers_the_cost(problem, state_of(smoother.isam2(problem)))
+    assert_no_small_step_lowers_the_cost(problem, state_of(solve(problem)))
 
 
+@pytest.mark.parametrize("solve", [smoother.isam2, smoother.batch])
 @pytest.mark.parametrize("name", ["plain", "prior"])
-def test_the_covariances_are_the_dense_inverse_of_the_curvature(name: str) -> None:
+def test_the_covariances_are_the_dense_inverse_of_the_curvature(solve: Solver, name: str) -> None:
+    """Our curvature has the slopes of the motion's logarithm, as GTSAM's has."""
     problem = PROBLEMS[name]
-    estimate = smoother.isam2(problem)
+    estimate = solve(problem)
     assert estimate.covariance is not None
-    dense = np.linalg.inv(information(problem, state_of(estimate)))
+    assert estimate.landmarks.covariance is not None
+    dense, T = np.linalg.inv(information(problem, state_of(estimate))), problem.n_frames
     for k, covariance in enumerate(estimate.covariance):
-        expected = dense[6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
-        unit = 1.0 / np.sqrt(np.diag(expected))
-        scale = unit[:, None] * unit[None, :]
-        # Our curvature has the slopes of the motion's logarithm, as GTSAM's has.
-        np.testing.assert_allclose(covariance * scale, expected * scale, rtol=0, atol=1e-3)
-    if estimate.landmarks.covariance is not None:
-        for row, covariance in enumerate(estimate.landmarks.covariance):
-            start = 6 * problem.n_frames + 3 * row
-            np.testing.assert_allclose(covariance, dense[start : start + 3, start : start + 3], rtol=1e-2)
+        assert_near(covariance, dense[6 * k : 6 * k + 6, 6 * k : 6 * k + 6])
+    for row, covariance in enumerate(estimate.landmarks.covariance):
+        at = slice(6 * T + 3 * row, 6 * T + 3 * row + 3)
+        assert_near(covariance, dense[at, at])
+
+
+def assert_near(covariance: FloatArray, expected: FloatArray) -> None:
+    unit = 1.0 / np.sqrt(np.diag(expected))
+    scale = unit[:, None] * unit[None, :]
+    np.testing.assert_allclose(covariance * scale, expected * scale, rtol=0, atol=1e-3)
 
 
 def truncated(problem: Problem, frames: int) -> Problem:
