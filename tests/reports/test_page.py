@@ -18,7 +18,8 @@ from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.metrics import MAIN, shown_in
+from fgbaseline.reports.results.metric import MAIN
+from fgbaseline.reports.results.metrics import shown_in
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
