@@ -65,7 +65,7 @@ def random_sequence(seed: int, n_frames: int, n_landmarks: int, truth: str) -> S
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32), st.integers(2, 9), st.integers(0, 7), st.sampled_from(["none", "poses", "landmarks"]))
-def test_what_is_written_comes_back_bit_by_bit(tmp_path_factory, seed, n_frames, n_landmarks, truth):
+def test_written_files_are_read_back_bit_by_bit(tmp_path_factory, seed, n_frames, n_landmarks, truth):
     sequence = random_sequence(seed, n_frames, n_landmarks, truth)
     path = tmp_path_factory.mktemp("npz") / "random.npz"
     write_npz(sequence, path)

@@ -92,7 +92,7 @@ BAD_TUM = {
 
 
 @pytest.mark.parametrize("case", BAD_TUM)
-def test_a_bad_tum_file_is_told_with_its_line(tmp_path, case):
+def test_a_bad_tum_file_is_refused_with_its_line(tmp_path, case):
     lines, sentence = BAD_TUM[case]
     path = tmp_path / "a.tum"
     path.write_text("\n".join(lines), encoding="utf-8")
@@ -137,7 +137,7 @@ def test_kitti_rotations_are_made_exact(tmp_path):
         ("1 0 0 5 0 1 0 5 0 0 1", "line 2: expected 12 numbers, got 11"),
     ],
 )
-def test_a_bad_kitti_file_is_told_with_its_line(tmp_path, line, sentence):
+def test_a_bad_kitti_file_is_refused_with_its_line(tmp_path, line, sentence):
     (tmp_path / "a.txt").write_text(f"1 0 0 5 0 1 0 5 0 0 1 5\n{line}\n")
     with pytest.raises(InputError, match=sentence):
         read_kitti(tmp_path / "a.txt")

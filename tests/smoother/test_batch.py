@@ -49,7 +49,7 @@ def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
     np.testing.assert_allclose(estimate.covariance[9], reorder_tangent(swept[pose_key(9)]), rtol=1e-6, atol=1e-12)
 
 
-def test_an_answer_that_is_given_is_not_found_again() -> None:
+def test_a_given_estimate_is_not_computed_again() -> None:
     problem = PROBLEMS["plain"]
     known = smoother.isam2(problem)
     calls: list[tuple[int, int]] = []
@@ -73,7 +73,7 @@ def biased(problem: Problem, rate: float) -> Problem:
     return replace(problem, increment=increment, increment_covariance=covariance)
 
 
-def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> None:
+def test_windowed_initialization_brings_a_bent_path_to_where_a_descent_converges() -> None:
     problem = biased(matched(drive(seconds=15.0, features_per_frame=40.0)), 0.15)
     truth = problem.sequence.truth
     assert truth is not None
@@ -88,7 +88,7 @@ def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> N
     assert "both starts end at the same cost" in kinds(estimate)
 
 
-def test_starts_that_end_apart_are_told_loudly_and_the_lower_cost_counts() -> None:
+def test_starts_that_end_at_different_minima_are_an_event_and_the_lower_cost_counts() -> None:
     problem = PROBLEMS["plain"]
     good = smoother.isam2(problem)
     # Behind the cameras no landmark pulls: a start from there stays there.
@@ -101,7 +101,7 @@ def test_starts_that_end_apart_are_told_loudly_and_the_lower_cost_counts() -> No
     np.testing.assert_allclose(estimate.world_T_imu, good.world_T_imu, rtol=0, atol=1e-5)
 
 
-def test_without_an_answer_of_isam2_there_is_one_start_and_batch_says_so() -> None:
+def test_without_isam2_batch_has_one_start_and_reports_it() -> None:
     problem = PROBLEMS["kernel"]
     failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
     estimate = smoother.batch(problem, given={"isam2": failed})
@@ -129,7 +129,7 @@ def test_started_at_isam2_alone_it_reaches_the_minimum_of_both_starts_unless_isa
     assert "one start only" in kinds(alone)
 
 
-def test_a_landmark_behind_the_cameras_is_given_up() -> None:
+def test_a_landmark_that_violates_cheirality_is_dropped() -> None:
     pixel = SCENE.observations.pixel.copy()
     flipped = SCENE.observations.landmark == 5
     pixel[flipped & (SCENE.observations.frame > 3)] = pixel[flipped & (SCENE.observations.frame > 3)][:, [2, 1, 0, 3]]
