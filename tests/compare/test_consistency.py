@@ -1,4 +1,4 @@
-"""NEES is 6 on average for errors drawn from the very covariance, and NaN where nothing can be said."""
+"""NEES is 6 on average for errors drawn from the very covariance, and NaN where it is undefined."""
 
 from dataclasses import replace
 
