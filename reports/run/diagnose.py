@@ -1,31 +1,19 @@
-"""`fgbaseline diagnose`: findings on the terminal, as JSON, as a folder with figures and as a file of repairs."""
+"""`fgbaseline diagnose`: findings on the terminal, as JSON, as a folder with figures and page, as a file of repairs."""
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
-import numpy as np
 
 from fgbaseline.data import Sequence
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.plural import plural
-from fgbaseline.diagnosis import (
-    Diagnosis,
-    diagnose,
-    diagnose_inertial,
-    findings_of,
-    inertial_findings,
-    inertial_sentences,
-    inertial_to_json,
-    not_identifiable,
-    repairs_text,
-    to_json,
-    track_statistics,
-)
+from fgbaseline.diagnosis import diagnose, repairs_text
 from fgbaseline.geometry import InputError
+
+from ..announced import announce
+from ..results.diagnosis import Found, found_by, found_of_inertial
 
 MARK = "diagnosis.json"
 """the file that marks a diagnosis's folder"""
@@ -36,82 +24,56 @@ UNWRAPPED = 120
 
 
 def print_diagnosis(
-    sequence: Sequence,
-    out: Path | None,
-    *,
-    as_json: bool,
-    repairs: Path | None,
-    force: bool,
+    sequence: Sequence, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool, opened: bool = False
 ) -> int:
     """Diagnoses a recording, writes and prints the findings, and returns the exit code."""
     if force and out is None and repairs is None:
         raise InputError("force: there is nothing to replace; add --out DIR or --write-repairs FILE")
+    if opened and out is None:
+        raise InputError("open: there is no page; add --out DIR")
     if out is not None:
         require_free(out, force=force, mark=MARK)
     if repairs is not None:
         _require_writable(repairs, force=force)
-    if sequence.imu is not None:
-        return _print_inertial(sequence, out, as_json=as_json, repairs=repairs, force=force)
-    diagnosis = diagnose(sequence)
-    tracks = track_statistics(diagnosis)
-    findings = findings_of(diagnosis, tracks)
-    text = _text(to_json(diagnosis, tracks, findings))
+        if sequence.imu is not None:
+            raise InputError("write-repairs: a recording with raw inertial samples has no repairs that can be set")
+    if sequence.imu is None:
+        diagnosis = diagnose(sequence)
+        found = found_by(diagnosis)
+        if repairs is not None:
+            with atomic_write(repairs) as file:
+                file.write(repairs_text(diagnosis).encode())
+    else:
+        found = found_of_inertial(sequence)
+    text = json.dumps(found.document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     if out is not None:
-        from fgbaseline.reports import figures
-
-        with atomic_folder(out, force=force, mark=MARK) as folder:
-            (folder / "figures").mkdir()
-            figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
-            (folder / MARK).write_text(text, encoding="utf-8")
-    if repairs is not None:
-        with atomic_write(repairs) as file:
-            file.write(repairs_text(diagnosis).encode())
+        _write(found, text, out, force=force)
     if as_json:
         click.echo(text, nl=False)
     else:
-        _print(diagnosis, findings)
-        if out is not None:
-            click.echo(f"\nThe diagnosis is in {out}")
+        _print(found)
         if repairs is not None:
             click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
-    if diagnosis.cannot_tell:
-        return UNDECIDED
-    return FINDINGS if findings else CLEAN
-
-
-def _print_inertial(sequence: Sequence, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool) -> int:
-    """The same of a recording with raw inertial samples, which has no repairs to write."""
-    if repairs is not None:
-        raise InputError("write-repairs: a recording with raw inertial samples has no repairs that can be set")
-    found = diagnose_inertial(sequence)
-    findings = inertial_findings(found)
-    text = _text(inertial_to_json(found, findings))
     if out is not None:
-        with atomic_folder(out, force=force, mark=MARK) as folder:
-            (folder / MARK).write_text(text, encoding="utf-8")
-    if as_json:
-        click.echo(text, nl=False)
-    else:
-        o = found.sequence.observations
-        click.echo(
-            f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(o), 'observation')} of "
-            f"{plural(len(np.unique(o.landmark)), 'track')}, {plural(len(sequence.imu or ()), 'inertial sample')}"
-        )
-        for remark in sequence.remarks:
-            click.echo(remark)
-        if found.cannot_tell:
-            click.echo(f"Nothing can be found out about its motion: {found.cannot_tell}.")
-        if findings:
-            _print_findings(findings)
-        elif not found.cannot_tell:
-            click.echo("Nothing wrong was found.")
-        for sentence in inertial_sentences(found):
-            click.echo(sentence)
-        if out is not None:
-            click.echo(f"\nThe evidence is in {out}")
-    if found.cannot_tell:
+        announce(out / "report.html", "diagnosis", opened=opened, printed=not as_json)
+    if found.undecided:
         return UNDECIDED
-    return FINDINGS if findings else CLEAN
+    return FINDINGS if found.findings else CLEAN
+
+
+def _write(found: Found, text: str, out: Path, *, force: bool) -> None:
+    from fgbaseline.reports import figures
+
+    from ..html.diagnosis_page import render
+
+    with atomic_folder(out, force=force, mark=MARK) as folder:
+        drawn = {}
+        if found.diagnosis is not None and found.tracks is not None:
+            drawn = figures.draw_diagnosis(found.diagnosis, found.tracks)
+            (folder / "figures").mkdir()
+            figures.save(drawn, folder / "figures")
+        (folder / "report.html").write_text(render(found, drawn), encoding="utf-8")
+        (folder / MARK).write_text(text, encoding="utf-8")
 
 
 def _require_writable(file: Path, *, force: bool) -> None:
@@ -123,49 +85,18 @@ def _require_writable(file: Path, *, force: bool) -> None:
         raise InputError(f"{file}: there is no folder {file.parent}; create it, or choose another folder")
 
 
-def _text(report: dict[str, Any]) -> str:
-    """Text of diagnosis.json, byte for byte the same for the same diagnosis."""
-    return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
-    sequence = diagnosis.sequence
-    click.echo(
-        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
-        f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
-    )
-    if diagnosis.cannot_tell:
-        click.echo(f"The velocities cannot be diagnosed: {diagnosis.cannot_tell}.")
-    if findings:
-        _print_findings(findings)
-    elif not diagnosis.cannot_tell:
-        click.echo("No fault detected.")
-    unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
-    if unknown:
+def _print(found: Found) -> None:
+    click.echo(f"{found.sequence.name}: {found.counts}")
+    if found.findings:
+        _print_findings(found.findings)
+    if found.undecided or not found.findings:
+        click.echo(found.verdict[0])
+    if found.not_identifiable:
         click.echo("\nNot identifiable in this recording:")
-        for sentence in unknown:
+        for sentence in found.not_identifiable:
             click.echo(f"- {sentence}")
-    if diagnosis.fit is not None:
-        click.echo(f"\n{_noise(diagnosis)}")
-
-
-def _noise(diagnosis: Diagnosis) -> str:
-    """Sentences on the estimated noise and its inflation."""
-    fit = diagnosis.fit
-    assert fit is not None
-    sigma, white = fit.sigmas, fit.white
-    text = (
-        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity over "
-        f"its interval, {sigma.pixel:.2f} px of a pixel row."
-    )
-    if fit.inflation.pixel > 1.0:
-        text += (
-            f" Pixel sigma: {white.pixel:.2f} px from frame to frame, inflated by {fit.inflation.pixel:.1f} for "
-            "time-correlated errors."
-        )
-    if fit.inflation.velocity > 1.0:
-        text += f" Velocity sigma: inflated by {fit.inflation.velocity:.1f} for time-correlated errors."
-    return text
+    for sentence in found.sentences:
+        click.echo(f"\n{sentence}")
 
 
 def _print_findings(findings: tuple[Finding, ...]) -> None:

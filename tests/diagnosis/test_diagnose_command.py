@@ -60,6 +60,11 @@ def test_findings_end_with_one_and_stand_in_the_table(files: dict[str, Path], tm
     assert np.allclose(report["gyro_bias"], [0.02, 0.0, 0.0], atol=0.002)
     for finding in report["findings"]:
         assert finding["after"] < finding["before"]
+    page = (tmp_path / "out/d/report.html").read_text()
+    assert "2 faults detected." in page
+    for finding in report["findings"]:
+        assert finding["sentence"] in page
+    assert page.count("<img ") == len(list((tmp_path / "out/d/figures").glob("*.png"))) >= 4
     again = fgbaseline("diagnose", files["biased"], "--out", "out/d", cwd=tmp_path)
     assert again.returncode == 2
     assert "--force" in again.stderr
