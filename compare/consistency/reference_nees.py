@@ -8,8 +8,8 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
 
+from ..statistics.chi_square import mahalanobis_squared
 from .covariance import CovarianceState, covariance_state, is_positive_definite
-from .nees import mahalanobis_squared
 
 NEGLIGIBLE = 1e-6
 """of the filter's own variance: below it the difference has no variance in a direction"""

@@ -29,6 +29,8 @@ class Found:
     sequence: Sequence
     counts: str
     """frames, observations and tracks, in words"""
+    measured: str
+    """what the motion is measured by"""
     document: dict[str, Any]
     """content of diagnosis.json"""
     findings: tuple[Finding, ...]
@@ -45,7 +47,7 @@ class Found:
     def verdict(self) -> list[str]:
         """Number of faults, or why it is unknown."""
         if self.undecided:
-            return [f"The recording cannot be diagnosed: {self.undecided}."]
+            return [f"The {self.measured} cannot be diagnosed: {self.undecided}."]
         return [f"{plural(len(self.findings), 'fault')} detected." if self.findings else "No fault detected."]
 
 
@@ -56,6 +58,7 @@ def found_by(diagnosis: Diagnosis) -> Found:
     return Found(
         sequence=diagnosis.sequence,
         counts=_counts(diagnosis.sequence),
+        measured="velocities",
         document=to_json(diagnosis, tracks, findings),
         findings=findings,
         undecided=diagnosis.cannot_tell,
@@ -73,6 +76,7 @@ def found_of_inertial(sequence: Sequence) -> Found:
     return Found(
         sequence=read,
         counts=f"{_counts(read)}, {plural(len(read.imu or ()), 'inertial sample')}",
+        measured="inertial samples",
         document=inertial_to_json(diagnosis, findings),
         findings=findings,
         undecided=diagnosis.cannot_tell,

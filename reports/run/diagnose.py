@@ -8,7 +8,7 @@ import click
 from fgbaseline.data import Sequence
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
-from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.formats.atomic_write import atomic_write, require_new
 from fgbaseline.diagnosis import diagnose, repairs_text
 from fgbaseline.geometry import InputError
 
@@ -41,7 +41,7 @@ def print_diagnosis(
         diagnosis = diagnose(sequence)
         found = found_by(diagnosis)
         if repairs is not None:
-            with atomic_write(repairs) as file:
+            with atomic_write(repairs, force=force) as file:
                 file.write(repairs_text(diagnosis).encode())
     else:
         found = found_of_inertial(sequence)
@@ -77,8 +77,7 @@ def _write(found: Found, text: str, out: Path, *, force: bool) -> None:
 
 
 def _require_writable(file: Path, *, force: bool) -> None:
-    if file.exists() and not force:
-        raise InputError(f"{file}: the file exists; choose another, or replace it with --force")
+    require_new(file, force=force)
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: this is not a file; give the name of one")
     if not file.parent.is_dir():
