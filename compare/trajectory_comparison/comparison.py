@@ -18,6 +18,7 @@ from fgbaseline.compare.trajectory_comparison.reported_covariance import Reporte
 from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.data import Sequence
 from fgbaseline.geometry import FloatArray
 
 
@@ -92,7 +93,7 @@ class Comparison:
     ranking: Ranking
     held_out: pd.DataFrame | None
     """see `compare.held_out_ranking`: the reference among them"""
-    sequence: str | None
+    sequence: Sequence | None
     """the recording whose observations are reprojected"""
 
     @property

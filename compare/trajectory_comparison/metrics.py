@@ -64,7 +64,7 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
             seed=settings.seed,
         ),
         held_out=held_out_of(entries.problem, entries.held, paths),
-        sequence=None if entries.problem is None else entries.problem.sequence.name,
+        sequence=None if entries.problem is None else entries.problem.sequence,
     )
 
 

@@ -7,7 +7,6 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fgbaseline.geometry import FloatArray
@@ -15,7 +14,10 @@ from fgbaseline.geometry import FloatArray
 from ..figures.bench import draw
 from ..figures.saving import encoded
 from ..figures.style import colors
-from ..html.environment import environment, picture
+from ..formatting import counted
+from ..html.environment import picture
+from ..html.page import Grid, Note, Page, Section, render_page
+from ..html.run_page import folded
 from ..phrases.bench import FIGURES, NEES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
@@ -33,6 +35,10 @@ OF_A_RUN = ("problem", "reference", "held_out", "estimators")
 TIMINGS = ("seconds", "frames_per_second")
 """keys of an estimator's summary that differ between two runs of one job"""
 COSTS_NOTE = "Time and memory are of this machine and in separate files."
+RANKINGS = (
+    '"Above the first" is the mean of the paired differences of the runs, with its 95 % interval. Where the interval '
+    "contains zero, these runs do not separate the two. An estimator with fewer answers ranks below those with more."
+)
 MOST_OPEN = 24
 """rows up to which a table is open from the start"""
 
@@ -72,31 +78,35 @@ def _csv(table: pd.DataFrame) -> bytes:
 
 def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
     """The page `report.html`, which opens offline; it links to the pages of the runs."""
-    palette = colors(results.estimators, results.reference)
-    return (
-        environment()
-        .get_template("bench.html")
-        .render(
-            name=name,
-            results=results,
-            spent=duration(results.seconds),
+    pictures = [
+        replace(picture(key, figure), caption=NEES if key.startswith("nees_") else FIGURES.get(key, ""))
+        for key, figure in figures.items()
+    ]
+    about = (
+        f"{', '.join(results.estimators)} on {counted(len(results.cases), 'case')}, "
+        f"{counted(len(results.planned), 'run')} that took {duration(results.seconds)} together."
+    )
+    table, runs = main_table(results, with_costs=True, caption=f"{TABLE} {COSTS_NOTE}"), runs_table(results, RUNS)
+    rankings = [folded(one, MOST_OPEN) for one in ranking_tables(results)]
+    return render_page(
+        Page(
+            kind="bench",
+            title=name,
+            about=about,
             verdict=sentences(results),
-            table=main_table(results, with_costs=True, caption=f"{TABLE} {COSTS_NOTE}"),
-            swatches={name: Markup(f'style="background: {color}"') for name, color in palette.items()},
-            figures=[
-                replace(picture(key, figure), caption=NEES if key.startswith("nees_") else FIGURES.get(key, ""))
-                for key, figure in figures.items()
+            table=Section("table", "Every case", [Grid(table)], "Table"),
+            sections=[
+                Section("figures", "Figures", pictures),
+                Section("rankings", "Rankings", [Note(RANKINGS), *rankings] if rankings else []),
+                Section("runs", "Every run", [folded(runs, MOST_OPEN)], "Runs"),
             ],
-            tables=list(ranking_tables(results)),
-            runs=runs_table(results, RUNS),
-            most_open=MOST_OPEN,
-            trees={"Versions": _part(results, "versions"), "Machine": _part(results, "machine")},
+            settings={
+                f"{title} of the runs": next((summary[part] for summary in results.summaries.values()), {})
+                for title, part in {"Versions": "versions", "Machine": "machine"}.items()
+            },
+            colors=colors(results.estimators, results.reference),
         )
     )
-
-
-def _part(results: Results, part: str) -> Mapping[str, Any]:
-    return next((summary[part] for summary in results.summaries.values()), {})
 
 
 def summarize(name: str, results: Results) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .options import BODY, PATH, UNITS, Formats, Numbers
+from .options import BODY, PATH, UNITS, Formats, NamedFile, Numbers, open_page
 
 XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
 
@@ -15,10 +15,11 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
     "\b\nAgainst a run, with reprojection of your own landmarks:\n"
     "fgbaseline compare out/drive mine.tum --sequence out/problem --landmarks mine.csv --out out/comparison"
 )
-@click.argument("reference")
-@click.argument("estimates", nargs=-1, metavar="[NAME=]ESTIMATE...")
+@click.argument("reference", type=NamedFile())
+@click.argument("estimates", nargs=-1, type=NamedFile(), metavar="[NAME=]ESTIMATE...")
 @click.option("--out", type=PATH, help="Folder for tables, figures and report.html.")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier comparison.")
+@open_page
 @click.option(
     "--align",
     type=click.Choice(["none", "first-pose", "yaw", "se3", "sim3"]),
@@ -84,6 +85,7 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
 @click.option(
     "--landmarks",
     multiple=True,
+    type=NamedFile(),
     metavar="[NAME=]FILE",
     help="Landmarks of an estimate: CSV with id,x,y,z, id being the index in --sequence; repeatable.",
 )
@@ -115,6 +117,7 @@ def compare(
     deltas: tuple[str, ...],
     out: Path | None,
     force: bool,
+    opened: bool,
     **options: Any,
 ) -> None:
     """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
@@ -127,14 +130,16 @@ def compare(
     from fgbaseline.data.formats.atomic_folder import require_free
     from fgbaseline.geometry import InputError
 
+    from ..announced import announce
     from ..comparison import compare as compare_files
     from ..results.comparison import MARK
     from ..tables import print_table
 
     if out is not None:
         require_free(out, force=force, mark=MARK)
-    elif force:
-        raise InputError("force: there is no folder to replace; add --out DIR")
+    elif force or opened:
+        option, what = ("force", "folder to replace") if force else ("open", "page")
+        raise InputError(f"{option}: there is no {what}; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
     page = None if out is None else report.write(out, force=force)
     first, *others = report.verdict
@@ -142,7 +147,7 @@ def compare(
     print_table(report.text_table, wrap_names=False)
     click.echo("\n".join([f"{report.caption}\n", *others]))
     if page is not None:
-        click.echo(f"\nThe report is in {page}")
+        announce(page, opened=opened)
 
 
 @click.command(
@@ -193,23 +198,27 @@ def check(
 @click.option("--out", type=PATH, help="Folder to write.  [default: DIR/paper]")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier call.")
 def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: bool) -> int:
-    """Draw the figures of a run's folder DIR again, for a paper in two columns.
+    """Draw the figures of a run or comparison, the folder DIR, again for a paper in two columns.
 
     They are one column wide, with letters of 7 points, embedded fonts, and lines that differ without color. They show
-    what the run wrote; nothing is computed again. captions.json has a caption for each.
+    what is in the folder; nothing is computed again. captions.json has a caption for each.
 
     Exits 0, or 2 on bad input.
     """
     from fgbaseline.data.formats.atomic_folder import atomic_folder
     from fgbaseline.data.plural import plural
 
-    from ..figures.run import draw_for_paper
+    from ..figures.comparison import draw_for_paper as draw_comparison
+    from ..figures.comparison_data import of_comparison_folder
+    from ..figures.run import draw_for_paper as draw_run
     from ..figures.run_data import of_folder
     from ..figures.saving import CAPTIONS, save, save_captions
     from ..figures.style import PAPER
+    from ..results.comparison import MARK as COMPARISON
 
     place = out or folder / "paper"
-    drawn = draw_for_paper(of_folder(folder))
+    is_comparison = (folder / COMPARISON).is_file()
+    drawn = draw_comparison(of_comparison_folder(folder)) if is_comparison else draw_run(of_folder(folder))
     with atomic_folder(place, force=force, mark=CAPTIONS) as building:
         save({name: figure for name, (figure, _) in drawn.items()}, building, formats, PAPER)
         save_captions({name: caption for name, (_, caption) in drawn.items()}, building)

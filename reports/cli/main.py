@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     gc.set_threshold(NEW_OBJECTS)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        code = group.main(arguments, standalone_mode=False)
+        code = group.main(arguments, standalone_mode=False, obj=sys.argv[1:] if arguments is None else arguments)
         sys.exit(code if isinstance(code, int) else 0)
     except (click.exceptions.Abort, KeyboardInterrupt):
         click.echo("fgbaseline: interrupted; no half-written file or folder is left", err=True)

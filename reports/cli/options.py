@@ -5,10 +5,21 @@ from math import isfinite
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
 PATH = click.Path(path_type=Path)
 UNITS = click.Choice(["s", "ms", "us", "ns"])
 BODY = click.Choice(["imu", "camera"])
+
+
+class NamedFile(click.ParamType[str]):
+    """`[NAME=]FILE` as text; a shell completes the file."""
+
+    name = "file"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Leaves the completion of a path to the shell."""
+        return [CompletionItem(incomplete, type="file")]
 
 
 class FeatureCount(click.ParamType[int | str]):
@@ -70,6 +81,7 @@ class Formats(click.ParamType[tuple[str, ...]]):
         return wanted
 
 
+open_page = click.option("--open", "opened", is_flag=True, help="Open the page in the browser.")
 preset = click.option(
     "--preset",
     type=click.Choice(["calibrated", "documented"]),

@@ -21,6 +21,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.argument("sequence", required=False, type=PATH)
 @click.option("--out", type=PATH, help="Folder to write.  [default: out/NAME]")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
+@options.open_page
 @options.preset
 @click.option(
     "--estimators",
@@ -37,6 +38,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--add",
     multiple=True,
+    type=options.NamedFile(),
     metavar="[NAME=]PATH",
     help="Trajectory file beside the estimators, aligned to the reference by yaw, or by SE(3) where the worlds are not "
     "level; repeatable.",
@@ -77,6 +79,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 def run(
     out: Path | None,
     force: bool,
+    opened: bool,
     estimators: str | None,
     user_estimators: tuple[str, ...],
     landmarks: str,
@@ -108,7 +111,7 @@ def run(
         time_unit=None if time_unit is None else TimeUnit(time_unit),
         **given,
     )
-    return run_and_report(settings, out, force=force, rerun_file=rerun_file)
+    return run_and_report(settings, out, force=force, rerun_file=rerun_file, opened=opened)
 
 
 @click.command(epilog="Example: fgbaseline estimators")
@@ -127,13 +130,14 @@ def estimators() -> None:
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")
 @click.argument("sequence", type=PATH)
-@click.option("--out", type=PATH, help="Folder for diagnosis.json and figures.")
+@click.option("--out", type=PATH, help="Folder for diagnosis.json, figures and page.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
 @options.imu
 @options.imu_calibration
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
+@options.open_page
 def diagnose(
     sequence: Path,
     out: Path | None,
@@ -143,6 +147,7 @@ def diagnose(
     imu_calibration: Path | None,
     time_unit: str | None,
     force: bool,
+    opened: bool,
 ) -> int:
     """Detect the faults of SEQUENCE and estimate its noise.
 
@@ -157,7 +162,7 @@ def diagnose(
 
     unit = None if time_unit is None else TimeUnit(time_unit)
     recording = read(sequence, time_unit=unit, imu=imu, imu_calibration=imu_calibration)
-    return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force)
+    return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force, opened=opened)
 
 
 @click.command(epilog="Example: fgbaseline export drive.npz --out out/problem")

@@ -83,14 +83,21 @@ class ComparisonReport(Comparison):
         from ..html.comparison_page import render
 
         maps = {name: result.map for name, result in self.results.items() if result.map is not None}
-        for name in ("series", "trajectories", "figures", *(["maps"] if maps else [])):
+        relative = {name: result.relative for name, result in self.results.items() if result.relative}
+        optional = {"maps": maps, "relative": relative}
+        for name in ("series", "trajectories", "figures", *(name for name, tables in optional.items() if tables)):
             (folder / name).mkdir()
         for name, landmarks in maps.items():
-            landmarks[["landmark", "distance", "seen", "depth"]].to_csv(folder / "maps" / f"{name}.csv", index=False)
+            columns = ["landmark", "distance", "seen", "depth", "sigmas"]
+            landmarks[columns].to_csv(folder / "maps" / f"{name}.csv", index=False)
+        for name, motions in relative.items():
+            joined = pd.concat(motions, names=["delta"]).reset_index(level="delta")
+            joined.to_csv(folder / "relative" / f"{name}.csv", index=False, float_format="%.9g")
         for name, result in self.results.items():
             _write_series(result, folder / "series" / f"{name}.csv")
-            aligned = result.matched.estimate
-            write_tum(folder / "trajectories" / f"{name}.tum", aligned.t, aligned.world_T_body)
+        paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
+        for path in paths:
+            write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
         self.table.to_csv(folder / "table.csv")
         self.metrics.to_csv(folder / "metrics.csv", index=False)
         figures = self.figures()

@@ -10,21 +10,30 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline import compare
-from fgbaseline.compare import Align, MatchedTrajectories
+from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
+from .comparison_data import ComparisonData, of_comparison
 from .evidence import maps_by_depth, three_sigma_of
 from .layout import lay_out
 from .over_time import TITLE_ROOM, columns, component_panels
-from .panels import Line, fit_log_or_linear
+from .panels import few_ticks, fit_log_or_linear
 from .paths import frame_top_view
 from .reprojection import distribution
-from .style import GRAY, SCREEN, TRUTH, WHITE, in_style, safe_text, stacked_panels, swatch, title_and_legend
-from .style import colors as colors_of
-from .style import line as line_of
+from .style import (
+    GRAY,
+    PAPER,
+    SCREEN,
+    TRUTH,
+    WHITE,
+    Style,
+    in_style,
+    safe_text,
+    stacked_panels,
+    swatch,
+    title_and_legend,
+)
 from .window import common_window
 
 if TYPE_CHECKING:
@@ -34,114 +43,114 @@ ASPECT = (0.35, 1.1)
 """height over width of the plan, at least and at most"""
 CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
 CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
-ALIGNED = {
-    Align.NONE: "not aligned",
-    Align.FIRST_POSE: "first poses aligned",
-    Align.YAW: "yaw and position aligned",
-    Align.SE3: "SE(3)-aligned",
-    Align.SIM3: "Sim(3)-aligned",
-}
 
 
 def draw(comparison: "Comparison") -> dict[str, Figure]:
     """Figures by name; those for which there is nothing to show are missing."""
-    each: tuple[Callable[[Comparison], Figure | None], ...] = (paths, errors, growth, relative, segments, reprojection)
+    data = of_comparison(comparison)
     with in_style():
-        drawn = {one.__name__: one(comparison) for one in each}
-        drawn["map"] = _maps(comparison)
-        drawn |= {f"three_sigma_{name}": _three_sigma(comparison, r) for name, r in comparison.results.items()}
-        figures = {name: figure for name, figure in drawn.items() if figure is not None}
-        for figure in figures.values():
-            lay_out(figure)
+        drawn = {name: draw_one(data) for name, (draw_one, _) in EACH.items()}
+        drawn["reprojection"] = _reprojection(comparison, data)
+        drawn |= {f"three_sigma_{n}": _three_sigma(data, r) for n, r in comparison.results.items()}
+        return _laid_out(drawn)
+
+
+def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
+    """Figures of a comparison for a paper in two columns: name -> figure and caption."""
+    words = {
+        "reference": data.reference,
+        "alignment": data.alignment,
+        "pairs": "all pairs" if data.all_pairs else "consecutive pairs",
+        "lengths": "KITTI's lengths" if data.official else "lengths fitted to the path, not KITTI's",
+    }
+    with in_style(PAPER):
+        figures = _laid_out({name: draw_one(data, PAPER) for name, (draw_one, _) in EACH.items()})
+    return {name: (figure, EACH[name][1].format(**words)) for name, figure in figures.items()}
+
+
+def _laid_out(drawn: Mapping[str, Figure | None]) -> dict[str, Figure]:
+    figures = {name: figure for name, figure in drawn.items() if figure is not None}
+    for figure in figures.values():
+        lay_out(figure)
     return figures
 
 
-def colors(comparison: "Comparison") -> dict[str, str]:
-    """Color of each trajectory by name; the reference is black."""
-    return colors_of([comparison.reference.name, *comparison.results], comparison.reference.name)
-
-
-def paths(comparison: "Comparison") -> Figure:
+def paths(data: ComparisonData, style: Style = SCREEN) -> Figure:
     """All aligned paths over the reference's, from above."""
-    view, labels = _view(comparison.up)
-    start = comparison.reference.trajectory.position[0]
-    reference = view.plane(comparison.reference.trajectory.position - start)
-    every = {n: view.plane(r.matched.estimate.position - start) for n, r in comparison.results.items()}
-    box = common_window(every.values(), reference).shaped(ASPECT, 1e-3)
+    flat, line = {name: path[:, :2] for name, path in data.paths.items()}, data.line(style)
+    box = common_window([flat[name] for name in data.names], flat[data.reference]).shaped(ASPECT, 1e-3)
     width, height = box.high - box.low
-    figure = Figure(figsize=(SCREEN.width, (SCREEN.width - 0.7) * height / width + 1.4))
+    figure = Figure(figsize=(style.width, (style.width - 0.6) * height / width + (1.4 if style.titled else 0.75)))
     axes = figure.subplots()
-    color, line = colors(comparison), _lines(comparison)
-    handles = axes.plot(*reference.T, **line(comparison.reference.name))
-    axes.plot(*reference[-1:].T, "s", color=color[comparison.reference.name], markersize=5)
-    for name, path in every.items():
-        handles += axes.plot(*path.T, **line(name))
-        axes.plot(*path[-1:].T, "s", color=color[name], markersize=5, zorder=4)
-    handles += axes.plot(*reference[:1].T, "o", label="start of the reference", markersize=8, **WHITE)
-    handles.append(swatch(GRAY, "end"))
-    frame_top_view(axes, box, *labels)
-    title_and_legend(figure, f"Paths from above, {_alignment(comparison)}", handles)
+    handles: list[Any] = []
+    for name in (data.reference, *data.names):
+        handles += axes.plot(*flat[name].T, **line(name))
+        if style.titled:
+            axes.plot(*flat[name][-1:].T, "s", color=data.colors[name], markersize=5, zorder=4)
+    start = flat[data.reference][:1]
+    handles += axes.plot(*start.T, "o", label="start of the reference", markersize=8 if style.titled else 4, **WHITE)
+    handles += [swatch(GRAY, "end")] if style.titled else []
+    frame_top_view(axes, box, *(f"{name} from the start, m" for name in data.axes[:2]))
+    title_and_legend(figure, f"Paths from above, {data.alignment}", handles, style)
     return figure
 
 
-def errors(comparison: "Comparison") -> Figure:
-    """Distance, angle and the three components of the difference from the reference, over time."""
-    reference, results = comparison.reference, comparison.results
-    t = {n: np.asarray(r.matched.reference.t - reference.trajectory.t[0]) for n, r in results.items()}
-    figure, axes, handles = component_panels(_departures(comparison), t, _lines(comparison))
-    axes[-1].set_xlabel("time, s" if reference.trajectory.stamped else "frame")
-    rivals = [r for r in comparison.ranked if not r.entry.by_product] or comparison.ranked
-    ranking = comparison.ranking
-    nearest = [f"{safe_text(r.name)} {ranking.rmse(r.name):.3g} m" for r in rivals if r.name in ranking.at]
+def errors(data: ComparisonData, style: Style = SCREEN) -> Figure:
+    """Distance and angle, on the screen also the components, of the difference from the reference over time."""
+    figure, axes, handles = component_panels(data.series, data.t, data.line(style), style)
+    axes[-1].set_xlabel("time, s" if data.stamped else "frame")
+    nearest = [f"{safe_text(name)} {rmse:.3g} m" for name, rmse in data.rmse.items()]
     each = ", ".join(nearest) if sum(map(len, nearest)) < TITLE_ROOM else f"nearest {nearest[0]}"
-    title_and_legend(figure, f"Difference from {safe_text(reference.name)} (RMSE: {each})", handles)
+    title = f"Difference from {safe_text(data.reference)}" + (f" (RMSE: {each})" if nearest else "")
+    title_and_legend(figure, title, handles, style)
     return figure
 
 
-def growth(comparison: "Comparison") -> Figure:
+def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
     """Distance and heading over the length of the path."""
-    tables, line = _departures(comparison), _lines(comparison)
-    has_heading = any(np.isfinite(table["heading_deg"]).any() for table in tables.values())
-    figure, axes = stacked_panels(4.6 if has_heading else 2.7, rows=1 + has_heading)
+    line = data.line(style)
+    has_heading = any(np.isfinite(table["heading_deg"]).any() for table in data.series.values())
+    height = (0.8 + 1.9 * (1 + has_heading)) if style.titled else style.room + 0.95 * (1 + has_heading)
+    figure, axes = stacked_panels(height, 1 + has_heading, style)
     handles: list[Any] = []
     for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
-        for name, table in tables.items():
+        for name, table in data.series.items():
             handles += panel.plot(table["travelled"], table[column].to_numpy(dtype=np.float64), **line(name))
     axes[0].set_ylabel("distance, m")
-    fit_log_or_linear(axes[0], columns(tables, "position"))
+    fit_log_or_linear(axes[0], columns(data.series, "position"))
+    if not style.titled and axes[0].get_yscale() == "log":
+        few_ticks(axes[0])
     if has_heading:
         axes[1].set_ylabel("heading, °")
         axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
     axes[-1].set_xlabel("length of the reference's path so far, m")
-    title_and_legend(figure, f"How the difference grows along the path, {_alignment(comparison)}", handles)
+    title_and_legend(figure, f"How the difference grows along the path, {data.alignment}", handles, style)
     return figure
 
 
-def relative(comparison: "Comparison") -> Figure | None:
+def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     """Errors of the motion over each delta, as boxes; None where the paths are too short for all."""
-    deltas = [d for d in comparison.deltas if any(d in r.relative for r in comparison.results.values())]
-    if not deltas:
+    if not data.relative:
         return None
-    n = len(comparison.results)
-    figure = Figure(figsize=(SCREEN.width, 0.9 + len(deltas) * (0.75 + 0.27 * n)))
-    panels = figure.subplots(len(deltas), 2, squeeze=False, sharey=True)
-    for row, delta in zip(panels, deltas, strict=True):
-        motions = {name: r.relative[delta] for name, r in comparison.results.items() if delta in r.relative}
+    n, rows, inch = len(data.names), len(data.relative), (1.0 if style.titled else 0.6)
+    figure = Figure(figsize=(style.width, 0.9 * inch + rows * inch * (0.75 + 0.27 * n)))
+    panels = figure.subplots(rows, 2, squeeze=False, sharey=True)
+    for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            _boxes(comparison, panel, motions, column)
+            _boxes(data, panel, motions, column)
             panel.set_xlabel(f"over {delta}: {'translation' if unit == 'm' else 'rotation'}, {unit}")
             panel.set_xlim(left=0.0)
-    pairs = "all pairs" if comparison.settings.all_pairs else "consecutive pairs"
-    title_and_legend(figure, f"Errors of the motion between {pairs} of poses")
+    pairs = "all pairs" if data.all_pairs else "consecutive pairs"
+    title_and_legend(figure, f"Errors of the motion between {pairs} of poses", style=style)
     return figure
 
 
-def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, pd.DataFrame], column: str) -> None:
-    color, names = colors(comparison), list(comparison.results)
+def _boxes(data: ComparisonData, panel: Axes, motions: Mapping[str, pd.DataFrame], column: str) -> None:
+    color = data.colors
     for name, table in motions.items():
         panel.boxplot(
             [table[column].dropna().to_numpy()],
-            positions=[names.index(name)],
+            positions=[data.names.index(name)],
             orientation="horizontal",
             widths=0.55,
             whis=(5, 95),
@@ -152,87 +161,69 @@ def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, pd.DataF
             whiskerprops={"color": color[name]},
             capprops={"color": color[name]},
         )
-    panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
-    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set_yticks(range(len(data.names)), [safe_text(name) for name in data.names])
+    panel.set_ylim(len(data.names) - 0.5, -0.5)
     panel.grid(axis="y", visible=False)
 
 
-def segments(comparison: "Comparison") -> Figure | None:
+def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     """KITTI's segment errors by the length of the segments; None where none has two lengths."""
-    known = {n: r.segments for n, r in comparison.results.items() if r.segments is not None}
-    if not any(len(found.by_length) > 1 for found in known.values()):
+    if not any(len(table) > 1 for table in data.segments.values()):
         return None  # the table says as much
-    figure = Figure(figsize=(SCREEN.width, 3.4))
+    figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.8))
     panels = figure.subplots(1, 2)
-    line = _lines(comparison)
+    line = data.line(style, max(map(len, data.segments.values())))
     handles: list[Any] = []
     columns_shown = {"translation_percent": "translation, %", "rotation_deg_per_m": "rotation, °/m"}
     for panel, (column, title) in zip(panels, columns_shown.items(), strict=True):
-        for name, found in known.items():
-            look = {**line(name), "marker": "o", "markersize": 4}
-            handles += panel.plot(found.by_length.index, found.by_length[column], **look)
+        for name, table in data.segments.items():
+            look = {"marker": "o", "markersize": 4} if style.titled else {}
+            handles += panel.plot(table.index, table[column], **{**line(name), **look})
         panel.set_ylabel(title)
         panel.set_xlabel("length of the segments, m")
         panel.set_ylim(bottom=0.0)
-    official = all(found.official for found in known.values())
-    which = "KITTI's lengths" if official else "lengths fitted to the path, not KITTI's"
-    title_and_legend(figure, f"Segment errors ({which})", handles)
+    which = "KITTI's lengths" if data.official else "lengths fitted to the path, not KITTI's"
+    title_and_legend(figure, f"Segment errors ({which})", handles, style)
     return figure
 
 
-def reprojection(comparison: "Comparison") -> Figure | None:
+def map_difference(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
+    """Median distance of landmarks from the reference's by depth; None where none is shared."""
+    if not data.by_depth:
+        return None
+    return maps_by_depth(data.by_depth, data.line(style, max(map(len, data.by_depth.values()))), data.reference, style)
+
+
+Drawing = Callable[..., Figure | None]
+EACH: Mapping[str, tuple[Drawing, str]] = {
+    "paths": (paths, "Paths from above, {alignment} to {reference}."),
+    "errors": (errors, "Position and rotation difference from {reference} over time, {alignment}."),
+    "growth": (growth, "Difference from {reference} over the length of its path, {alignment}."),
+    "relative": (relative, "Errors of the motion between {pairs} of poses; boxes hold the middle half, whiskers 90 %."),
+    "segments": (segments, "Segment errors ({lengths})."),
+    "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
+}
+"""name -> figure, which may be None, and its caption in a paper"""
+
+
+def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | None:
     """Share of the observations that each path explains to within so many pixels; None without observations."""
-    every = {comparison.reference.name: comparison.reference_pixels}
-    every |= {name: result.pixels for name, result in comparison.results.items()}
-    known = {name: p for name, p in every.items() if p is not None and p.along is not None and len(p.along)}
+    known = {name: p for name, p in comparison.pixels.items() if p.along is not None and len(p.along)}
     if not known:
         return None
     along = {name: p.along["error"] for name, p in known.items() if p.along is not None}
     own = {name: p.own["error"] for name, p in known.items() if p.own is not None and len(p.own)}
     labels = ["triangulated along the path", *(["its own landmarks"] if own else [])]
-    return distribution(along, own, _lines(comparison), labels)
+    return distribution(along, own, data.line(), labels)
 
 
-def _maps(comparison: "Comparison") -> Figure | None:
-    maps = {name: r.map for name, r in comparison.results.items() if r.map is not None}
-    tables = {name: compare.map_by_depth(m) for name, m in maps.items()}
-    return maps_by_depth(tables, _lines(comparison), comparison.reference.name)
-
-
-def _three_sigma(comparison: "Comparison", result: "Result") -> Figure | None:
+def _three_sigma(data: ComparisonData, result: "Result") -> Figure | None:
     reported = result.reported_covariance
     if reported is None or not np.isfinite(reported.nees).any():
         return None
-    t = np.asarray(result.matched.reference.t - comparison.reference.trajectory.t[0])
-    return three_sigma_of(result.name, t, reported.error, reported.covariance, _lines(comparison)(result.name))
-
-
-def _departures(comparison: "Comparison") -> dict[str, pd.DataFrame]:
-    return {name: result.departure for name, result in comparison.results.items()}
-
-
-def _lines(comparison: "Comparison") -> Line:
-    color, reference = colors(comparison), comparison.reference.name
-    return lambda name: line_of(name, color[name], reference)
-
-
-def _alignment(comparison: "Comparison") -> str:
-    return ALIGNED[next(iter(comparison.results.values())).matched.alignment.kind]
-
-
-def _view(up: FloatArray) -> tuple[TopView, tuple[str, str]]:
-    """Plan, and the names of its axes: the world's own where up is one of them."""
-    ahead = next(axis - (axis @ up) * up for axis in np.eye(3) if abs(axis @ up) < 0.7)
-    ahead = ahead / np.linalg.norm(ahead)
-    left = np.cross(up, ahead)
-    return TopView(ahead, left, up), (f"{_named(ahead)}, m", f"{_named(left)}, m")
-
-
-def _named(direction: FloatArray) -> str:
-    """World's axis that a direction is, or is nearest to once made level."""
-    k = int(np.argmax(np.abs(direction)))
-    sign = "" if direction[k] > 0 else "\N{MINUS SIGN}"
-    return f"{sign}{'xyz'[k]}" + ("" if abs(direction[k]) > 1 - 1e-9 else ", level") + " from the start"
+    return three_sigma_of(
+        result.name, data.t[result.name], reported.error, reported.covariance, data.line()(result.name)
+    )
 
 
 def draw_failed_check(

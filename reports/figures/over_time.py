@@ -110,13 +110,17 @@ def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
 
 
 def component_panels(
-    tables: Mapping[str, pd.DataFrame], t: Mapping[str, FloatArray], line: Line
+    tables: Mapping[str, pd.DataFrame], t: Mapping[str, FloatArray], line: Line, style: Style = SCREEN
 ) -> tuple[Figure, list[Axes], list[Any]]:
-    """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles."""
-    every = {column: columns(tables, column) for column in COMPONENTS}
+    """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles.
+
+    On paper distance and angle alone.
+    """
+    every = {c: columns(tables, c) for c in COMPONENTS if style.titled or c not in SIGNED}
     shown = {c: series for c, series in every.items() if any(np.isfinite(v).any() for v in series.values())} or every
-    ratios = [1.7, *[1.0] * (len(shown) - 1)]
-    figure, axes = stacked_panels(8.6 * sum(ratios) / 5.7, len(shown), height_ratios=ratios)
+    ratios = [1.7 if style.titled else 1.0, *[1.0] * (len(shown) - 1)]
+    height = 8.6 * sum(ratios) / 5.7 if style.titled else style.room + 0.95 * sum(ratios)
+    figure, axes = stacked_panels(height, len(shown), style, height_ratios=ratios)
     handles: list[Any] = []
     for panel, (column, series) in zip(axes, shown.items(), strict=True):
         for name, values in series.items():
@@ -126,6 +130,8 @@ def component_panels(
             panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
         else:
             fit_log_or_linear(panel, series)
+            if not style.titled and panel.get_yscale() == "log":
+                few_ticks(panel)
     return figure, axes, handles
 
 

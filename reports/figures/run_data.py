@@ -158,7 +158,7 @@ def of_folder(folder: Path) -> RunData:
     """Data of the run that left a folder. Raises InputError, naming the file, where it is none or lacks a file."""
     files = RunFolder(folder)
     if not (folder / SUMMARY).is_file():
-        raise InputError(f"{folder}: this folder has no {SUMMARY}; give the folder that fgbaseline run wrote")
+        raise InputError(f"{folder}: it has no {SUMMARY}; give the folder that fgbaseline run or compare wrote")
     summary = files.summary
     with reading(folder / SUMMARY):
         try:

@@ -1,20 +1,22 @@
-"""Page of a comparison, which opens offline."""
+"""Page of a comparison."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
-from ..figures.style import colors
+from ..figures.comparison_data import of_comparison
+from ..formatting import counted, number
 from ..phrases.comparison import verdict
-from ..phrases.evidence import FIRST
 from ..results.comparison import Summary
 from ..tables import Row
 from ..tables.comparison import comparison_table
-from .environment import environment, picture
+from .comparison_plots import comparison_plots
+from .environment import picture
+from .page import Folded, Grid, Live, Page, Section, render_page
+from .run_page import figure_blocks, still_figures, trust
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
@@ -30,33 +32,64 @@ CAPTIONS: Mapping[str, str] = {
     "reprojection": "Solid with landmarks triangulated along each path, dotted with the landmarks of the estimate.",
 }
 """captions by the beginning of a figure's name"""
+STILLS = ("paths", "errors")
+"""figures that show what the interactive plots show"""
 
 
 def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
-    """`report.html`. All text that comes from files is escaped."""
-    reference, estimates = summary.reference, summary.estimates
+    """`report.html` of a comparison."""
+    reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary, mark_reference=True)
-    palette = colors([reference.name, *estimates], reference.name)
-    titles = {name: f"{name} (reference)" if name == reference.name else name for name in palette}
+    pictures = {name: replace(picture(name, figure), caption=_caption(name)) for name, figure in figures.items()}
     notes = {f"Missing figures of {name}": estimate.notes for name, estimate in estimates.items()}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
-    return (
-        environment()
-        .get_template("comparison.html")
-        .render(
-            summary=summary,
-            verdict=verdict(comparison),
-            first=FIRST,
-            table=replace(
-                table,
-                name="figure",
-                caption=f"{table.caption} Best of a row in bold.",
-                rows=tuple(_with_intervals_below(row) for row in table.rows),
-            ),
-            swatches={titles[n]: Markup('style="background: {}"').format(color) for n, color in palette.items()},
-            pictures=[replace(picture(n, f), caption=_caption(n)) for n, f in figures.items()],
-            trees={**notes, "Files": sources, "Settings": summary.settings, "Versions": summary.versions},
+    bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
+    beyond = [p for name, p in pictures.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
+    stills = figure_blocks(pictures, STILLS)
+    grid = Grid(
+        replace(
+            table,
+            name="figure",
+            caption=f"{table.caption} Best of a row in bold.",
+            rows=tuple(_with_intervals_below(row) for row in table.rows),
         )
+    )
+    behind = None if reference.trust is None else trust(reference.name, reference.trust, reference.reasons)
+    folded = [Folded("Errors between three sigmas, for each estimate", bands)] if bands else []
+    return render_page(
+        Page(
+            kind="comparison",
+            title=f"{', '.join(estimates)} against {reference.name}",
+            about=_about(summary),
+            verdict=verdict(comparison),
+            table=Section("table", "Every estimate", [grid], "Table"),
+            sections=[
+                Section("behind", "What stands behind the numbers", [behind] if behind is not None else [], "Findings"),
+                Section(
+                    "over-time",
+                    "Over time",
+                    [Live("charts"), *figure_blocks(pictures, ["growth"])],
+                ),
+                Section(
+                    "evidence", "Relative errors, segments, pixels and map", [*beyond, *folded], "Beyond the paths"
+                ),
+                Section("stills", "Still figures", [still_figures(stills)] if stills else []),
+            ],
+            settings={**notes, "Files": sources, "Settings": summary.settings},
+            colors=data.colors,
+            plots=comparison_plots(comparison, data),
+            still_paths=pictures.get("paths"),
+        )
+    )
+
+
+def _about(summary: Summary) -> str:
+    reference = summary.reference
+    lasting = "" if reference.duration_s is None else f" in {number(reference.duration_s)} s"
+    pixels = "" if summary.sequence is None else f" Reprojection is of the observations of {summary.sequence}."
+    return (
+        f"The reference has {counted(reference.poses, 'pose')}{lasting} along {number(reference.path_m)} m.{pixels} "
+        "Charts and paths are interpolated between the poses of an estimate."
     )
 
 

@@ -5,7 +5,7 @@ from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Any
+from typing import Any, ClassVar
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
@@ -15,6 +15,7 @@ from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..formatting import counted, number
 from ..results.metric import TERMS
+from ..results.provenance import creation
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""
@@ -50,8 +51,9 @@ CAPTIONS: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure ready for an `img`."""
+    """A still figure ready for an `img`: a block of a page."""
 
+    shape: ClassVar[str] = "figure"
     name: str
     source: str
     """a data URI"""
@@ -86,6 +88,7 @@ def environment() -> Environment:
     )
     jinja.filters |= {"number": number, "counted": counted, "flattened": flattened, "anchor": anchor}
     jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
+    jinja.globals |= {"classes": {}, "creation": creation}
     return jinja
 
 

@@ -82,48 +82,48 @@ def charts(run: Run) -> list[dict[str, Any]]:
     `lines` has (T,) values by the number of the estimator in the run, as text.
     """
     drawn = [*_errors(run), *_pixels(run), *_consistency(run), *_cost(run)]
-    return [chart for chart in drawn if chart is not None]
+    return [one for one in drawn if one is not None]
 
 
 def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
     away, group = f"from {run.reference}", "Divergence and errors"
-    yield _chart(group, "divergence", f"Divergence {away}, unaligned", "m", _column(run, "divergence", "position"))
-    yield _chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
-    yield _chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
-    yield _chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
+    yield chart(group, "divergence", f"Divergence {away}, unaligned", "m", _column(run, "divergence", "position"))
+    yield chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
+    yield chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
+    yield chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
     without = "difference from ground truth; all start at the true pose"
-    yield _chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
-    yield _chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
+    yield chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
+    yield chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
     view, truth = TopView.of(run.problem), run.problem.sequence.truth
     heights = {r.name: view.height(r.estimate.world_T_imu[:, :3, 3]) for r in run.answered}
     along = {} if truth is None else {TRUTH_LINE: view.height(truth.world_T_imu[:, :3, 3])}
-    yield _chart(group, "height", "Height above the start", "m", {**_numbered(run, heights), **along})
+    yield chart(group, "height", "Height above the start", "m", {**_numbered(run, heights), **along})
 
 
 def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
     medians = {r.name: _by_frame(run, r) for r in run.answered if len(r.reprojection)}
     title = "Median reprojection error by frame"
     hint = "over all observations of the landmarks that an estimator has"
-    yield _chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
+    yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
 
 
 def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     group, expected = "Consistency", "the band holds 95 % of the frames of a consistent estimator"
     of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
     pose = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": expected}
-    yield _chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
+    yield chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
     title = f"Reference NEES, to {run.reference}"
-    yield _chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
+    yield chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
     band = _innovation_band(run)
     nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
     innovations = "NIS per row"
-    yield _chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
+    yield chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
     for part in ("position", "rotation"):
         tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
         ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
         title, hint = f"Sigma ratio of {part}, to {run.reference}", "expected above 1 for a filter"
-        yield _chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
+        yield chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
 
 
 def _innovation_band(run: Run) -> tuple[float, ...] | None:
@@ -142,10 +142,10 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
     spent = {name: ms for name, ms in spent.items() if ms.any()}
     interval = 1e3 * float(np.median(run.problem.sequence.dt))
     hint = "below the thin line an estimator runs in real time"
-    yield _chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), log=True, middle=interval, hint=hint)
+    yield chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), log=True, middle=interval, hint=hint)
 
 
-def _chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
+def chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
     """A chart; None where no line has a value."""
     known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
     if not known:
@@ -193,6 +193,10 @@ def page_data(run: Run) -> dict[str, Any]:
     truth = sequence.truth
     return {
         "frames": sequence.n_frames,
+        "step": "frame",
+        "stamped": True,
+        "start": "common start",
+        "axes": ["ahead", "left", "up"],
         "t": floats(sequence.t - sequence.t[0]),
         "reference": run.reference,
         "estimators": [_estimator(run, r, axes) for r in run.results.values()],

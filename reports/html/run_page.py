@@ -1,104 +1,146 @@
-"""Fills the page of a run."""
+"""Page of a run."""
 
-from base64 import b64encode
-from collections.abc import Mapping
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
-from itertools import groupby
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 
 from ..figures import EncodedFigure
-from ..figures.style import TRUTH, colors, on_dark
-from ..phrases.evidence import FIRST
+from ..figures.style import colors
+from ..formatting import counted, number
 from ..phrases.run import verdict
+from ..tables import Table
 from ..tables import run as tables
-from .environment import asset, environment, picture
-from .plot_data import TRUTH_LINE, embedded_json, page_data
+from .environment import Picture, picture
+from .page import Block, Folded, Grid, Live, Note, Page, Section, Sentences, render_page
+from .plot_data import page_data
 
 EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
 """figures that stand beside the interactive charts, because they show what these do not"""
-SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
-"""the page's script in the order of its dependencies"""
 
 
 def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
-    """`report.html`: one file that needs no other and makes no request.
+    """`report.html` of a run.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
-    `figures.draw_and_write(run)` gave. All text that comes from files is escaped.
+    `figures.draw_and_write(run)` gave.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
-    data = page_data(run)
-    numbered = list(enumerate(data["charts"]))
-    keys = {name: str(i) for i, name in enumerate(run.results)}
-    estimators = summary.get("estimators", {})
-    shown = [(keys[result.name], result.name) for result in run.answered]
-    if run.problem.sequence.truth is not None:
-        shown.append((TRUTH_LINE, "truth"))
-    return (
-        environment()
-        .get_template("run.html")
-        .render(
-            css=Markup(asset("report.css") + asset("explore.css")),
-            color_rules=_color_rules(run, keys),
-            script=script(),
-            policy=policy(),
-            data=embedded_json(data),
-            groups=[(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
-            bookmarks=data["bookmarks"],
-            frames_seen=data["observations"] is not None,
-            classes={name: f"estimator-{key}" for name, key in keys.items()},
-            shown=shown,
-            run=run,
-            summary=summary,
-            sequence=summary.get("sequence", {}),
-            problem=summary.get("problem", {}),
+    plots = page_data(run) if run.answered or run.problem.sequence.truth is not None else None
+    sequence, problem = summary["sequence"], summary["problem"]
+    table = Grid(tables.main_table(run, summary["estimators"]))
+    remarks = [*sequence["remarks"], *problem["remarks"]]
+    recording = {key: sequence[key] for key in ("name", "source", "form")}
+    return render_page(
+        Page(
+            kind="report",
+            title=run.problem.sequence.name,
+            about=_about(run, sequence, problem),
             verdict=verdict(run),
-            first=FIRST,
-            criteria=tables.trust_table(run.trust.criteria),
-            trust_in_reference=run.trust.verdict.name.lower(),
-            table=tables.main_table(run, estimators),
-            evidence=tables.evidence_table(run, estimators),
-            long_tables=tables.long_tables(run),
-            components=tables.components_table(estimators),
-            findings=tables.findings_table(run.problem.findings),
-            excluded=tables.exclusions_table(summary),
-            events=tables.events_tables(run),
-            pictures=pictures,
-            bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
-            stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))],
+            table=Section("table", "Every estimator", [table, *_notes(run)], "Table"),
+            sections=_sections(run, summary, pictures, plots),
+            record=[Note("Remarks on the recording and the problem", is_heading=True), Sentences(remarks, "remarks")]
+            if remarks
+            else [],
+            settings={"Recording": recording, "Settings": summary["settings"]},
+            colors=colors(run.results, run.reference),
+            plots=plots,
+            still_paths=pictures.get("paths_overlaid"),
         )
     )
 
 
-@cache
-def script() -> Markup:
-    """The page's own script, as it stands between its tags."""
-    folder = files("fgbaseline.reports.html").joinpath("browser")
-    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
+def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) -> str:
+    length = sequence["path_length_m"]
+    spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m"])]
+    return (
+        f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
+        f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}. "
+        f"Problem: {problem['preset']}, {counted(problem['features'], 'feature')}."
+    )
 
 
-def policy() -> Markup:
-    """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
-    digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
-    allowed = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
-    return Markup(allowed)  # nosec: it is our own
+def _notes(run: Run) -> list[Block]:
+    return [Note(f"{name}: {caption}.") for name, caption in run.added.items()]
 
 
-def _color_rules(run: Run, keys: Mapping[str, str]) -> Markup:
-    """`.estimator-KEY` sets `--estimator`, the color of an estimator on light and on dark ground."""
-    light = {keys[name]: color for name, color in colors(run.results, run.reference).items()} | {"truth": TRUTH}
-    rules = [
-        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
-        for ground in (light, {key: on_dark(color) for key, color in light.items()})
+def _sections(
+    run: Run, summary: Mapping[str, Any], pictures: Mapping[str, Picture], plots: Mapping[str, Any] | None
+) -> list[Section]:
+    """The sections below table and paths; those without blocks are left out."""
+    estimators = summary["estimators"]
+    evidence, components = tables.evidence_table(run, estimators), tables.components_table(estimators)
+    excluded, events = tables.exclusions_table(summary), tables.events_tables(run)
+    bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
+    stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
+    beyond: list[Block] = [
+        Grid(evidence),
+        *figure_blocks(pictures, ["held_out"]),
+        *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
+        *figure_blocks(pictures, ["reprojection_classes", "map_difference"]),
+        *(folded(table) for table in tables.long_tables(run)),
     ]
-    return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")
+    live = plots is not None
+    seen = plots is not None and plots["observations"] is not None
+    out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
+    return [
+        Section("behind", "What stands behind the numbers", _behind(run), "Findings"),
+        Section("over-time", "Over time", [Live("charts"), *figure_blocks(pictures, CHART_FIGURES)] if live else []),
+        Section(
+            "one-frame", "One frame in the images", [Live("frame")] if seen else [], "One frame", needs_script=True
+        ),
+        Section(
+            "evidence",
+            "Beyond the paths: held-out tracks, consistency, residuals, map",
+            beyond if evidence.columns else [],
+            "Beyond the paths",
+        ),
+        Section("components", "Reprojection errors by component", [Grid(components, "")] if components.rows else []),
+        Section("left-out", "What was left out, and why", out, "Left out"),
+        Section("stills", "Still figures", [still_figures(stills)] if stills else []),
+    ]
+
+
+def _behind(run: Run) -> list[Block]:
+    """Trust in the reference with its criteria, and the diagnosis with its findings and repairs."""
+    blocks: list[Block] = []
+    if run.reference is not None:
+        blocks.append(trust(run.reference, run.trust.verdict.name.lower(), run.trust.reasons, run.trust.criteria))
+    problem = run.problem
+    findings = tables.findings_table(problem.findings)
+    if not (problem.diagnosed or findings.rows or problem.repairs):
+        return blocks
+    found = counted(len(findings.rows), "fault") + " detected" if findings.rows else "no fault detected"
+    inner: list[Block] = [Grid(findings, "plain findings")] if findings.rows else []
+    if problem.repairs:
+        repairs = [f"{repair[0].upper()}{repair[1:]}." for repair in problem.repairs]
+        inner += [Note("Repairs, the same for all estimators", is_heading=True), Sentences(repairs, "repairs")]
+    title = f"The recording: {found if problem.diagnosed or findings.rows else 'it could not be diagnosed'}"
+    return [*blocks, Folded(title, inner, "diagnosis", is_open=bool(findings.rows))]
+
+
+def trust(name: str, verdict_on_it: str, reasons: Iterable[str], criteria: Iterable[Any] = ()) -> Folded:
+    """Trust in a reference: its reasons and its criteria, folded away."""
+    limits = tables.trust_table(criteria)
+    blocks: list[Block] = [Sentences(list(reasons), "reasons")]
+    blocks += [Grid(limits, "plain criteria")] if limits.rows else []
+    return Folded(f"Reference: {name}", blocks, f"trust {verdict_on_it}", badge=verdict_on_it)
+
+
+def folded(table: Table, most_open: int = 0) -> Folded:
+    """A table under its title, open where it has at most so many rows."""
+    return Folded(table.title, [Grid(table, "plain")], is_open=len(table.rows) <= most_open)
+
+
+def still_figures(stills: list[Block]) -> Folded:
+    """Figures that the interactive plots stand for on the screen."""
+    return Folded(f"{len(stills)} figures as they stand in the folder figures/", stills, "stills")
+
+
+def figure_blocks(pictures: Mapping[str, Picture], names: Iterable[str]) -> list[Block]:
+    """The figures of these names that were drawn."""
+    return [pictures[name] for name in names if name in pictures]

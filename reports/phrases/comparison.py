@@ -169,9 +169,9 @@ def _reported_covariances(comparison: Comparison) -> list[str]:
 
 def _outside_recording(comparison: Comparison) -> list[str]:
     names = [name for name, pixels in comparison.pixels.items() if pixels.frames == 0]
-    if not names:
+    if comparison.sequence is None or not names:
         return []
-    return [f"No pose of {listed(names)} is at a frame of {comparison.sequence}: their time stamps differ."]
+    return [f"No pose of {listed(names)} is at a frame of {comparison.sequence.name}: their time stamps differ."]
 
 
 def _reprojection(comparison: Comparison) -> list[str]:

@@ -1,9 +1,7 @@
 """Figures of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
 import math
-import platform
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -17,9 +15,9 @@ from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
 from .comparison import Summary
+from .provenance import versions
 from .statistics import INFINITE, finite, nulls
 
-LIBRARIES = ("fgbaseline", "numpy", "pandas", "scipy")
 INTERVAL = ["value", "low", "high"]
 WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 
@@ -33,9 +31,9 @@ def summarize(comparison: Comparison, caption: str) -> Summary:
                 "reference": _reference(comparison),
                 "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
                 "up": {"direction": comparison.up.tolist(), "source": comparison.up_from},
-                "sequence": comparison.sequence,
+                "sequence": None if comparison.sequence is None else comparison.sequence.name,
                 "settings": comparison.settings.record(),
-                "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+                "versions": versions(),
             }
         )
     )

@@ -130,14 +130,16 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
-    """The files of a run beside its summary; each method raises InputError where its file is missing or damaged."""
+    """The files of a run or comparison; each method raises InputError where its file is missing or damaged."""
 
     folder: Path
+    mark: str = SUMMARY
+    """name of the file with its figures"""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """`summary.json` as it is."""
-        path = self.folder / SUMMARY
+        """`summary.json` or `comparison.json` as it is."""
+        path = self.folder / self.mark
         with reading(path):
             return _document(path)
 
@@ -163,9 +165,9 @@ class RunFolder:
             raise InputError(f"{path}: the file is missing, or has no column t; run it again")
         return table
 
-    def table(self, name: str) -> "pd.DataFrame | None":
-        """A long table; None where the run has none of that name."""
-        return _csv(self.folder / "tables" / f"{name}.csv")
+    def table(self, name: str, within: str = "tables") -> "pd.DataFrame | None":
+        """A long table; None where there is none of that name."""
+        return _csv(self.folder / within / f"{name}.csv")
 
 
 def _csv(path: Path) -> "pd.DataFrame | None":

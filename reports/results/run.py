@@ -2,10 +2,7 @@
 
 import json
 import math
-import os
-import platform
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -18,11 +15,11 @@ from fgbaseline.geometry import FloatArray
 
 from .estimator import EstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
+from .provenance import machine, versions
 from .statistics import Number, Part, PoseSigma, finite
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
-LIBRARIES = ("fgbaseline", "gtsam", "numpy", "pandas", "scipy", "matplotlib")
 
 
 class SequenceSummary(Part):
@@ -171,8 +168,8 @@ def summarize(run: Run) -> Summary:
                 "estimators": {name: summarize_estimator(run, result) for name, result in run.results.items()},
                 "added": dict(run.added),
                 "settings": dict(run.settings),
-                "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
-                "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count() or 0},
+                "versions": versions(),
+                "machine": machine(),
             }
         )
     )

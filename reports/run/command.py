@@ -10,6 +10,7 @@ from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
 
+from ..announced import announce
 from .problem import (
     MARK,
     RunSettings,
@@ -26,7 +27,9 @@ UNWRAPPED = 120
 """columns of the table where no terminal says how many there are"""
 
 
-def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
+def run(
+    settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None, opened: bool = False
+) -> int:
     """Runs the estimators, writes the folder, prints the main results; returns 1 where an estimator failed, else 0."""
     check_estimators(settings.estimators, settings.functions)
     sequence = read_sequence(settings)
@@ -88,7 +91,7 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
     print_table(terminal_table(as_dict(summary)["estimators"], summary.reference.name), width=UNWRAPPED)
     for sentence in [*verdict(solved), *(f"{name}: {text}." for name, text in solved.added.items())]:
         click.echo(sentence)
-    click.echo(f"\nThe report is in {place / 'report.html'}")
+    announce(place / "report.html", opened=opened)
     return 0 if len(solved.answered) == len(solved.results) else FAILED
 
 

@@ -18,7 +18,8 @@ from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.run import Summary, summarize
 from fgbaseline.reports.run.problem import MARK
-from fgbaseline.reports.tables.run import metrics_table
+from fgbaseline.reports.tables import latex, markdown
+from fgbaseline.reports.tables.run import main_table, main_values, metrics_table
 
 TRUTH_FILE = "truth.tum"
 
@@ -52,6 +53,11 @@ def write_numbers(run: Run, folder: Path) -> Summary:
         write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
     _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
+    estimators = as_dict(summary)["estimators"]
+    main_values(estimators).to_csv(folder / "table.csv")
+    table = main_table(run, estimators).transposed("figure")
+    (folder / "table.md").write_text(markdown(table), encoding="utf-8")
+    (folder / "table.tex").write_text(latex(table), encoding="utf-8")
     text = json.dumps(as_dict(summary), indent=2, allow_nan=False)
     (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
     return summary

@@ -61,6 +61,15 @@ def main_table(run: Run, estimators: Estimators) -> Table:
     return replace(table, caption=caption)
 
 
+def main_values(estimators: Estimators) -> pd.DataFrame:
+    """`table.csv`: one row per estimator, its status and the main figures that any of them has."""
+    results = {name: e for name, e in estimators.items() if e["status"] != "failed"}
+    values = {m.full_title: {name: m.value(e).value for name, e in results.items()} for m in shown_in(MAIN)}
+    table = pd.DataFrame(values, index=pd.Index(estimators, name="estimator")).dropna(axis="columns", how="all")
+    table.insert(0, "status", [e["status"] for e in estimators.values()])
+    return table
+
+
 def evidence_table(run: Run, estimators: Estimators) -> Table:
     """Held-out tracks, consistency, residuals and map of every estimator that gave an answer."""
     table = _table(run, estimators, shown_in(EVIDENCE))

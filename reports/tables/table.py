@@ -103,10 +103,11 @@ class Table:
         return ((group, list(rows)) for group, rows in groupby(self.rows, key=lambda row: row.group))
 
     def transposed(self, name: str = "") -> "Table":
-        """A row for each column, under the titles of their groups, and a column for each row."""
-        columns = tuple(Column(f"{row.name} (reference)" if row.reference else row.name) for row in self.rows)
+        """A row for each column, under the titles of their groups, and a column for each row that has cells."""
+        filled = [row for row in self.rows if row.cells]
+        columns = tuple(Column(_name(row)) for row in filled)
         rows = tuple(
-            Row(column.heading, tuple(row.cells[i] for row in self.rows), group=column.group, term=column.term)
+            Row(column.heading, tuple(row.cells[i] for row in filled), group=column.group, term=column.term)
             for i, column in enumerate(self.columns)
         )
         return replace(self, columns=columns, rows=rows, name=name)

@@ -61,6 +61,11 @@ def test_findings_exit_with_one_and_are_in_the_table(files: dict[str, Path], tmp
     assert np.allclose(report["gyro_bias"], [0.02, 0.0, 0.0], atol=0.002)
     for finding in report["findings"]:
         assert finding["after"] < finding["before"]
+    page = (tmp_path / "out/d/report.html").read_text()
+    assert "2 faults detected." in page
+    for finding in report["findings"]:
+        assert finding["sentence"] in page
+    assert page.count("<img ") == len(list((tmp_path / "out/d/figures").glob("*.png"))) >= 4
     again = fgbaseline("diagnose", files["biased"], "--out", "out/d", cwd=tmp_path)
     assert again.returncode == 2
     assert "--force" in again.stderr
@@ -94,7 +99,7 @@ def test_recordings_of_both_kinds_get_the_same_sentences(files: dict[str, Path],
         finished = fgbaseline("diagnose", files[name], "--out", name, cwd=tmp_path)
         assert finished.returncode == 2, finished.stderr
         assert f"The {measured} cannot be diagnosed: " in finished.stdout
-        assert finished.stdout.endswith(f"\n\nThe diagnosis is in {name}\n")
+        assert finished.stdout.endswith(f"\n\nThe diagnosis is in {name}/report.html\n")
     refused = fgbaseline("diagnose", files["blind samples"], "--write-repairs", "repairs.toml", cwd=tmp_path)
     assert refused.returncode == 2
     assert "raw inertial samples has no repairs" in refused.stderr

@@ -85,7 +85,12 @@ def test_the_figures_of_the_table_are_evos(files: Path) -> None:
     ape.process_data((reference, theirs))
     rpe.process_data((reference, theirs))
     row = result.table.loc["far"]
-    assert row["ATE: RMSE, m"] == pytest.approx(ape.get_statistic(metrics.StatisticsType.rmse), rel=1e-9)
+    summary = result.summary.estimates["far"].translation.model_dump()
+    titles = {"rmse": "RMSE", "std": "standard deviation", **{name: name for name in ("mean", "median", "min", "max")}}
+    for name, title in titles.items():
+        evos = pytest.approx(ape.get_statistic(metrics.StatisticsType(name)), rel=1e-9)
+        assert row[f"ATE: {title}, m"] == evos
+        assert (summary[name] if name in ("min", "max") else summary[name]["value"]) == evos
     assert row["relative error (RPE) over 5 frames: RMSE, m"] == pytest.approx(
         rpe.get_statistic(metrics.StatisticsType.rmse), rel=1e-9
     )
@@ -276,13 +281,14 @@ def test_reported_covariances_are_evaluated_with_and_without_alignment(files: Pa
     assert any(s.startswith("The covariances of mine are not evaluated: poses were inter") for s in between.verdict)
 
 
-def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path) -> None:
+def test_a_folder_holds_everything_and_keeps_to_its_schema(files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     result = compare(files / "truth.tum", files / "near.csv", f"<b>&|%_$={files / 'far.npz'}")
     report = result.write(files / "out")
     written = {path.name for path in (files / "out").iterdir()}
     assert written == {
-        "comparison.json", "figures", "metrics.csv", "report.html", "series", "table.csv", "table.md", "table.tex",
-        "trajectories",
+        "comparison.json", "figures", "metrics.csv", "relative", "report.html", "series", "table.csv", "table.md",
+        "table.tex", "trajectories",
     }  # fmt: skip
     summary = json.loads((files / "out" / "comparison.json").read_text())
     jsonschema.validate(summary, json.loads(json_schema()))

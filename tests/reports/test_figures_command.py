@@ -3,19 +3,33 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fgbaseline.data import Status
 from fgbaseline.geometry import InputError
 from fgbaseline.reports import figures
 from fgbaseline.reports.cli import main
+from fgbaseline.reports.figures.comparison_data import of_comparison, of_comparison_folder
 from fgbaseline.reports.figures.style import PAPER
 from fgbaseline.reports.run.folder import write_run
 
+from ..builders.empty_figures import figures_left_out
 from ..builders.runs import answer, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
+from .test_page_comparison import six
+
+NEAR: dict[str, Any] = {
+    "check_dtype": False,
+    "check_index_type": False,
+    "check_names": False,
+    "atol": 1e-7,
+    "rtol": 1e-6,
+}
+"""as near as nine digits of a CSV file bring a table"""
 
 
 @pytest.fixture(scope="module")
@@ -98,10 +112,68 @@ def test_figures_without_data_are_not_drawn(tmp_path: Path, monkeypatch: pytest.
     assert set(figures.draw_for_paper(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
 
 
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a comparison, without the comparison's own figures."""
+    place = tmp_path_factory.mktemp("compared") / "six"
+    with pytest.MonkeyPatch.context() as patch:
+        figures_left_out(patch)
+        six().write(place)
+    return place
+
+
+def test_a_comparison_is_drawn_from_its_folder_as_from_memory(
+    compared: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    read, had = of_comparison_folder(compared), of_comparison(six())
+    assert (read.reference, read.names, read.alignment, read.axes) == (
+        had.reference,
+        had.names,
+        had.alignment,
+        had.axes,
+    )
+    assert list(read.rmse) == list(had.rmse)
+    assert read.rmse == pytest.approx(had.rmse)
+    for name, path in had.paths.items():
+        np.testing.assert_allclose(read.paths[name], path, atol=1e-7)
+    for name, table in had.series.items():
+        np.testing.assert_allclose(read.t[name], had.t[name], atol=1e-6)
+        pd.testing.assert_frame_equal(read.series[name][list(table.columns)[1:]], table.iloc[:, 1:], **NEAR)
+    assert read.relative.keys() == had.relative.keys()
+    for delta, motions in had.relative.items():
+        for name, table in motions.items():
+            columns = ["translation", "rotation_deg"]
+            there = read.relative[delta][name][columns].reset_index(drop=True)
+            pd.testing.assert_frame_equal(there, table[columns].reset_index(drop=True), **NEAR)
+    for name, table in had.segments.items():
+        pd.testing.assert_frame_equal(read.segments[name], table, **NEAR)
+    code, said = call(capsys, "figures", compared, "--format", "svg", "--out", compared / "paper")
+    assert (code, said) == (0, f"5 figures as svg in {compared / 'paper'}\n")
+    captions = json.loads((compared / "paper/captions.json").read_text())
+    assert list(captions) == ["paths", "errors", "growth", "relative", "segments"]
+    assert "SE(3)-aligned" in captions["paths"]
+    width = re.search(r'width="([\d.]+)pt"', (compared / "paper/errors.svg").read_text())
+    assert width is not None
+    assert float(width[1]) == pytest.approx(72 * PAPER.width)
+
+
+def test_a_damaged_comparison_is_told_by_its_file(compared: Path, tmp_path: Path) -> None:
+    summary = json.loads((compared / "comparison.json").read_text())
+    del summary["up"]
+    (tmp_path / "comparison.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match=r"comparison\.json: it is not that of a comparison"):
+        of_comparison_folder(tmp_path)
+    (tmp_path / "comparison.json").write_text((compared / "comparison.json").read_text())
+    with pytest.raises(InputError, match=r"truth\.tum: there is no such file"):
+        of_comparison_folder(tmp_path)
+
+
 def test_bad_input_is_refused_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, said = call(capsys, "figures", tmp_path)
     assert code == 2
-    assert re.fullmatch(r"fgbaseline: .*has no summary.json; give the folder that fgbaseline run wrote\n", said)
+    assert re.fullmatch(
+        r"fgbaseline: .*has no summary.json; give the folder that fgbaseline run or compare wrote\n", said
+    )
     code, said = call(capsys, "figures", folder, "--format", "eps")
     assert code == 2
     assert "choose from pdf, svg and png" in said

@@ -23,6 +23,7 @@ from fgbaseline.reports.html.run_page import render
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene
 from ..builders.synthetic import plain_problem
+from .test_page_comparison import page_of, six
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 SCRIPT = "<script>alert(1)</script>"
@@ -282,6 +283,53 @@ def test_figures_folded_away_are_there_when_unfolded_or_printed(chromium: Any, a
         page_.context.close()
 
 
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Address of the page of a comparison of six estimates, one of them of positions only."""
+    file = tmp_path_factory.mktemp("compared") / "report.html"
+    file.write_text(page_of(six()), encoding="utf-8")
+    return file.as_uri()
+
+
+def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: str) -> None:
+    opened = Opened(chromium, compared)
+    assert opened.count("#path-view .line") == 7
+    assert opened.count(".chart svg") == 7
+    clock = opened.text("#clock")
+    assert clock.startswith("moment ")
+    assert clock.endswith("\u00a0s")
+    opened.page.click('button[data-frame]:has-text("wandering")')
+    assert opened.text("#clock") != clock
+    cursor = opened.attribute(".chart .cursor", "x1")
+    opened.set_frame(10)
+    assert opened.attribute(".chart .cursor", "x1") != cursor
+    assert opened.text("#clock") == "moment 10 · 1.0\u00a0s"
+    assert opened.count("#path-view .here.estimator-4") == 0  # late, which has no pose yet
+    flat = opened.attribute("#path-view .line.estimator-1", "d")
+    opened.page.click('[data-do="solid"]')
+    assert opened.attribute("#path-view .line.estimator-1", "d") != flat
+    opened.page.click('[data-do="in"]')
+    opened.page.click('[data-do="reset"]')
+    rotation = '.chart:has(svg[aria-label^="Rotation"])'
+    assert opened.count(f"{rotation} .line.estimator-6") == 0  # positions only
+    assert opened.count(f"{rotation} .line.estimator-1") == 1
+    opened.page.uncheck('#estimators-shown input[value="1"]')
+    assert opened.count("#path-view .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
+    opened.page.click("summary:has-text('in numbers')")
+    row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
+    at_ten = six().results["steady"].departure["position"].iloc[10]
+    assert row[2] == f"{at_ten:#.3g}"
+    assert (opened.said, opened.asked) == ([], [compared])
+    opened.page.context.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_comparison_fits_a_phone(chromium: Any, compared: str, scheme: str) -> None:
+    opened = Opened(chromium, compared, width=390, height=740, scheme=scheme)
+    assert opened.page.evaluate("document.documentElement.scrollWidth") == 390
+    opened.page.context.close()
+
+
 def test_a_run_with_little_data_is_drawn_without_warnings(chromium: Any, tmp_path: Path) -> None:
     problem = plain_problem(scene(truth=None))
     alone = answer(problem, "dead-reckoning", covariance=None, seconds=np.empty(0), landmarks=Landmarks.none())
@@ -291,8 +339,7 @@ def test_a_run_with_little_data_is_drawn_without_warnings(chromium: Any, tmp_pat
     file = tmp_path / "report.html"
     file.write_text(render(run, as_dict(run), {}), encoding="utf-8")
     opened = Opened(chromium, file.as_uri())
-    opened.page.click('[data-do="ellipses"]')
-    opened.page.click('[data-do="landmarks"]')
+    assert opened.count('[data-do="ellipses"]') == opened.count('[data-do="landmarks"]') == 0
     opened.page.click('[data-do="solid"]')
     opened.set_frame(30)
     assert opened.said == []

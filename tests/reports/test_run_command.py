@@ -79,7 +79,7 @@ def test_the_command_exits_zero_and_prints_the_place_of_the_report(finished: Fin
 def test_the_folder_holds_the_documented_files_and_nothing_else(finished: Finished) -> None:
     figures = {path.stem for path in (finished.out / "figures").iterdir()}
     assert len(figures) >= 6
-    expected = {"summary.json", "metrics.csv", "report.html", "truth.tum"}
+    expected = {"summary.json", "metrics.csv", "report.html", "truth.tum", "table.csv", "table.md", "table.tex"}
     expected |= {"trajectories", "landmarks", "series", "figures"}
     expected |= {f"trajectories/{name}.tum" for name in ESTIMATORS}
     expected |= {f"landmarks/{name}.csv" for name in ESTIMATORS}

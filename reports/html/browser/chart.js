@@ -34,7 +34,7 @@ class TimeChart {
     this.svg.addEventListener("pointermove", event => {
       const at = frame(event);
       if (event.pointerType === "mouse" && event.buttons === 1) goTo(at);
-      showHint(event, [[`frame ${at}, ${timeOf(at)}`, null], ...this.shown().map(([key, line]) =>
+      showHint(event, [[momentOf(at), null], ...this.shown().map(([key, line]) =>
         [`${trajectories.get(key).name} ${quantity(line[at], this.chart.unit)}`, key])]);
     });
     this.svg.addEventListener("pointerleave", hideHint);
@@ -103,7 +103,7 @@ class TimeChart {
     }
     for (const value of ticks(0, seconds[run.frames - 1], Math.max(2, this.width / 90))) {
       parts.push(svg("text", { class: "tick", x: this.x(value), y: height - 7, "text-anchor": "middle" },
-        String(Number(value.toPrecision(6))) + (value === 0 ? "\u00a0s" : "")));
+        String(Number(value.toPrecision(6))) + (value === 0 && run.stamped ? "\u00a0s" : "")));
     }
     if (this.chart.middle !== null) parts.push(across(this.chart.middle, "middle"));
     const lines = this.shown().sort(([a], [b]) => isReference(b) - isReference(a));

@@ -1,4 +1,4 @@
-// The run as the page holds it: base64 of little-endian arrays, see run_data.py.
+// The data that the page holds: base64 of little-endian arrays, see plot_data.py. A comparison has paths and charts only.
 const run = JSON.parse(document.getElementById("run").textContent);
 
 function bytes(text) {
@@ -17,16 +17,17 @@ const TRUTH = "truth";
 const trajectories = new Map();
 run.estimators.forEach((estimator, i) => {
   if (!estimator.answered) return;
-  const index = integers(estimator.landmarks);
+  const known = (text, read) => (text ? read(text) : null);
+  const index = known(estimator.landmarks, integers) || [];
   trajectories.set(String(i), {
     key: String(i),
     name: estimator.name,
     path: floats(estimator.path),
-    cameras: floats(estimator.cameras),
-    covariance: estimator.covariance && floats(estimator.covariance),
-    points: floats(estimator.points),
+    cameras: known(estimator.cameras, floats),
+    covariance: known(estimator.covariance, floats),
+    points: known(estimator.points, floats),
     row: new Map(Array.from(index, (landmark, row) => [landmark, row])),
-    used: estimator.used && bytes(estimator.used),
+    used: known(estimator.used, bytes),
   });
 });
 if (run.truth) trajectories.set(TRUTH, { key: TRUTH, name: "truth", path: floats(run.truth) });

@@ -37,6 +37,7 @@ function quantity(value, unit = "") {
 }
 
 const timeOf = frame => seconds[frame].toFixed(1) + "\u00a0s";
+const momentOf = (frame, mark = ", ") => `${run.step} ${frame}` + (run.stamped ? mark + timeOf(frame) : "");
 
 // Round values between two ends, about so many of them.
 function ticks(low, high, about) {

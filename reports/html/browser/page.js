@@ -4,8 +4,8 @@ const clock = document.getElementById("clock");
 
 function showFrame() {
   slider.value = String(chosen.frame);
-  slider.setAttribute("aria-valuetext", `frame ${chosen.frame}, ${timeOf(chosen.frame)}`);
-  clock.textContent = `frame ${chosen.frame} · ${timeOf(chosen.frame)}`;
+  slider.setAttribute("aria-valuetext", momentOf(chosen.frame));
+  clock.textContent = momentOf(chosen.frame, " · ");
 }
 slider.addEventListener("input", () => goTo(Number(slider.value)));
 onFrame.push(showFrame);

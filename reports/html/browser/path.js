@@ -173,7 +173,7 @@ class PathView {
   // Where ahead, left and up point.
   triad() {
     const [x, y] = [this.width - 66, this.height - 44];
-    return ["ahead", "left", "up"].flatMap((name, i) => {
+    return run.axes.flatMap((name, i) => {
       const [dx, dy] = [26 * this.right[i], -26 * this.up[i]];
       return [
         svg("path", { class: "ruler", d: `M${x} ${y}l${dx.toFixed(1)} ${dy.toFixed(1)}` }),
@@ -222,7 +222,7 @@ class PathView {
       const line = chart && chart.lines.get(trajectory.key);
       return line ? [[`${quantity(line[frame], "m")} from ${name === "error" ? "the truth" : run.reference}`, null]] : [];
     });
-    return showHint(event, [[trajectory.name, trajectory.key], [`frame ${frame}, ${timeOf(frame)}`, null], ...errors]);
+    return showHint(event, [[trajectory.name, trajectory.key], [momentOf(frame), null], ...errors]);
   }
 
   change(how) {

@@ -1,0 +1,159 @@
+"""Data of the plots on a comparison's page, in the form of a run's (see `plot_data`)."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fgbaseline.compare import reprojection_by
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.geometry import FloatArray
+
+from ..figures.comparison_data import ComparisonData
+from ..figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS
+from .plot_data import chart, floats, integers
+
+MOMENTS = 4000
+"""of the slider, at most"""
+REFERENCE_MOMENTS = 1000
+"""poses of the reference among them, at most, where no estimate has a pair"""
+GAP = 10.0
+"""usual intervals of an estimate without a pose, from which on its line is broken"""
+
+
+def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, Any]:
+    """Everything at the moments of the pairs of poses, between which an estimate is interpolated as a line is drawn."""
+    own = np.asarray(comparison.reference.trajectory.t - comparison.reference.trajectory.t[0])
+    t = _moments(data, own)
+    lines = {data.reference: _at(t, own, data.paths[data.reference])}
+    lines |= {name: _at(t, data.t[name], data.paths[name]) for name in data.names}
+    entries: dict[str, tuple[Entry, Result | None]] = {data.reference: (comparison.reference, None)}
+    entries |= {name: (result.entry, result) for name, result in comparison.results.items()}
+    start = comparison.reference.trajectory.position[0]
+    charts = [*_differences(data, t), *_heights(lines), *_consistency(comparison, data, t), *_pixels(comparison, t)]
+    return {
+        "frames": len(t),
+        "step": "moment" if data.stamped else "frame",
+        "stamped": data.stamped,
+        "start": "start of the reference",
+        "axes": list(data.axes),
+        "t": floats(t),
+        "reference": data.reference,
+        "estimators": [_estimator(data, *of, lines[name], t, start) for name, of in entries.items()],
+        "truth": None,
+        "camera": None,
+        "observations": None,
+        "reasons": {},
+        "charts": [one for one in charts if one is not None],
+        "bookmarks": _bookmarks(comparison, data, t),
+    }
+
+
+def _moments(data: ComparisonData, own: FloatArray) -> FloatArray:
+    """Times of all pairs and of some of the reference's poses; evenly thinned where they are too many."""
+    some = own[:: -(-len(own) // REFERENCE_MOMENTS)]
+    t = np.unique(np.concatenate([some, own[-1:], *data.t.values()]))
+    return np.asarray(t[:: -(-len(t) // MOMENTS)])
+
+
+def _at(t: FloatArray, known: FloatArray, values: ArrayLike) -> FloatArray:
+    """Values (n,) or (n, d) of rising times `known` (n,) at times t: linear between neighbors, NaN across gaps."""
+    every = np.asarray(values, dtype=np.float64)
+    after = np.clip(np.searchsorted(known, t), 0, len(known) - 1)
+    before = np.where(known[after] == t, after, np.maximum(after - 1, 0))
+    span = known[after] - known[before]
+    usual = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    inside = (t >= known[0]) & (t <= known[-1]) & (span <= GAP * usual)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(span > 0, (t - known[before]) / span, 0.0)
+    share, inside = (part.reshape(-1, *[1] * (every.ndim - 1)) for part in (share, inside))
+    return np.where(inside, every[before] + share * np.where(share > 0, every[after] - every[before], 0.0), np.nan)
+
+
+def _estimator(
+    data: ComparisonData, entry: Entry, result: Result | None, path: FloatArray, t: FloatArray, start: FloatArray
+) -> dict[str, Any]:
+    """A trajectory: path, position covariances and landmarks, as far as they came with it."""
+    view = data.view
+    about: dict[str, Any] = {"name": entry.name, "answered": True, "path": floats(path)}
+    about |= {"cameras": None, "covariance": None, "landmarks": None, "points": None, "used": None}
+    if result is not None and result.reported_covariance is not None:
+        body = np.stack([view.ahead, view.left, view.up]) @ result.matched.estimate.rotation
+        P = body @ result.reported_covariance.covariance[:, :3, :3] @ np.swapaxes(body, 1, 2)
+        row, column = np.triu_indices(3)
+        about["covariance"] = floats(_at(t, data.t[entry.name], P[:, row, column]))
+    if entry.landmarks is not None and len(entry.landmarks):
+        points = entry.landmarks.position
+        if result is not None:
+            motion = result.matched.alignment
+            points = motion.scale * points @ motion.rotation.T + motion.translation
+        about["landmarks"] = integers(entry.landmarks.index)
+        about["points"] = floats(view.scene(points - start))
+    return about
+
+
+Charts = Iterable[dict[str, Any] | None]
+
+
+def _differences(data: ComparisonData, t: FloatArray) -> Charts:
+    of, how = data.reference, data.alignment
+    wanted = {
+        "position": ("divergence", f"Distance from {of}, {how}", "m"),
+        "rotation_deg": ("rotation", f"Rotation from {of}, {how}", "°"),
+        "along": ("along", f"Ahead of {of}", "m"),
+        "across": ("across", f"To the left of {of}", "m"),
+        "up": ("above", f"Above {of}", "m"),
+        "heading_deg": ("heading", f"Heading from {of}, to the left", "°"),
+    }
+    for column, (name, title, unit) in wanted.items():
+        lines = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
+        yield chart("Differences", name, title, unit, _numbered(data, lines))
+
+
+def _heights(lines: Mapping[str, FloatArray]) -> Charts:
+    heights = {str(i): path[:, 2] for i, path in enumerate(lines.values())}
+    yield chart("Differences", "height", "Height above the reference's start", "m", heights)
+
+
+def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) -> Charts:
+    reported = {n: r.reported_covariance for n, r in comparison.results.items()}
+    lines = {n: _at(t, data.t[n], of.nees) for n, of in reported.items() if of is not None}
+    hint = "the band holds 95 % of the poses of a consistent estimator"
+    look = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": hint}
+    yield chart("Consistency", "nees", "NEES", "", _numbered(data, lines), **look)
+
+
+def _pixels(comparison: Comparison, t: FloatArray) -> Charts:
+    """Median error of each frame, with landmarks triangulated along the path."""
+    sequence = comparison.sequence
+    if sequence is None:
+        return
+    stamps = sequence.t - comparison.reference.trajectory.t[0]
+    names = [comparison.reference.name, *comparison.results]
+    lines = {}
+    for name, pixels in comparison.pixels.items():
+        if pixels.along is not None and len(pixels.along):
+            median = reprojection_by(pixels.along, "frame")["median"].reindex(range(sequence.n_frames))
+            lines[str(names.index(name))] = _at(t, stamps, median)
+    hint = "with landmarks triangulated along each path"
+    yield chart("Pixels", "reprojection", "Median reprojection error by frame", "px", lines, log=True, hint=hint)
+
+
+def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> list[dict[str, Any]]:
+    """Moments of the first poses beyond the threshold, and of the largest errors where there is none."""
+    found = []
+    for name, result in comparison.results.items():
+        position = result.departure["position"].to_numpy()
+        first = result.passing is not None
+        k = result.passing.frame if result.passing is not None else int(np.nanargmax(position))
+        far = result.bound if first else position[k]
+        text = f"{name} {'first' if first else 'farthest,'} {far:.3g} m from {data.reference}"
+        found.append({"frame": int(np.argmin(np.abs(t - data.t[name][k]))), "text": text})
+    return found
+
+
+def _numbered(data: ComparisonData, lines: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Lines by the number of their trajectory: 0 is the reference."""
+    return {str(1 + data.names.index(name)): values for name, values in lines.items()}

@@ -1,0 +1,40 @@
+"""Page of a diagnosis."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from matplotlib.figure import Figure
+
+from ..results.diagnosis import Found
+from ..tables.run import findings_table
+from .environment import picture
+from .page import Grid, Page, Section, Sentences, render_page
+
+CAPTIONS: Mapping[str, str] = {
+    "angular_rates": "About each axis of imu_T_cam, moving averages. The repaired rates follow visual odometry.",
+    "conventions": "Each candidate is a convention of axes and signs; the most likely one is chosen.",
+    "delay": "Agreement of the recorded rates with the cameras at each shift in time; the delay has the best.",
+    "velocity_residuals": "Residuals of the velocities over the estimated noise, beside a normal distribution.",
+    "tracks": "Features of each frame, and the share of its matches that contradict the motion.",
+}
+
+
+def render(found: Found, figures: Mapping[str, Figure]) -> str:
+    """`report.html` of a diagnosis."""
+    sequence, table = found.sequence, findings_table(found.findings)
+    pictures = [replace(picture(name, one), caption=CAPTIONS.get(name, "")) for name, one in figures.items()]
+    unknown = [Sentences(found.not_identifiable, "unknown")] if found.not_identifiable else []
+    return render_page(
+        Page(
+            kind="diagnosis",
+            title=sequence.name,
+            about=f"{found.counts}.",
+            verdict=[*found.verdict, *found.sentences],
+            table=Section("table", "Faults", [Grid(table, "plain findings")] if table.rows else []),
+            sections=[
+                Section("unknown", "Not identifiable in this recording", unknown, "Not identifiable"),
+                Section("figures", "Figures", pictures),
+            ],
+            settings={"Recording": {"name": sequence.name, "source": sequence.source, "form": sequence.form}},
+        )
+    )

@@ -1,0 +1,165 @@
+"""Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from itertools import groupby
+from typing import Any, ClassVar
+
+from markupsafe import Markup
+
+from ..figures.style import on_dark
+from ..phrases.evidence import FIRST
+from ..tables import Table
+from .environment import NO_SCRIPT, Picture, asset, environment
+from .plot_data import TRUTH_LINE, embedded_json
+
+SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
+"""the page's script in the order of its dependencies"""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table; `style` is main, plain or empty."""
+
+    shape: ClassVar[str] = "grid"
+    table: Table
+    style: str = "main"
+
+
+@dataclass(frozen=True, slots=True)
+class Sentences:
+    """A list; what is beyond the first `most` is folded away."""
+
+    shape: ClassVar[str] = "sentences"
+    texts: Sequence[str]
+    style: str = "verdict"
+    most: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A paragraph in small letters, or a heading within a section."""
+
+    shape: ClassVar[str] = "note"
+    text: str
+    is_heading: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Interactive plots: `charts` over time, or the images of `frame`."""
+
+    shape: ClassVar[str] = "live"
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Folded:
+    """Blocks under a title that folds them away, with a word (`badge`) beside it."""
+
+    shape: ClassVar[str] = "folded"
+    title: str
+    blocks: "Sequence[Block]"
+    style: str = ""
+    badge: str = ""
+    is_open: bool = False
+
+
+Block = Grid | Sentences | Note | Picture | Live | Folded
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Blocks under a heading; left out where there are none."""
+
+    id: str
+    title: str
+    blocks: Sequence[Block]
+    short: str = ""
+    """title among the links at the top"""
+    needs_script: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Content of a page. Verdict and table come first, paths beside them, then the sections."""
+
+    kind: str
+    """what it reports: report, comparison, diagnosis, bench"""
+    title: str
+    about: str
+    """a sentence or two below the title"""
+    verdict: Sequence[str]
+    table: Section
+    sections: Sequence[Section]
+    record: Sequence[Block] = ()
+    """blocks above the settings"""
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """title -> settings, versions and the like, at the end"""
+    colors: Mapping[str, str] = field(default_factory=dict)
+    """of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
+    plots: Mapping[str, Any] | None = None
+    """see `plot_data`"""
+    still_paths: Picture | None = None
+    """in place of the paths where no script runs"""
+
+
+def render_page(page: Page) -> str:
+    """HTML of a page: one file that needs no other and makes no request. All text that comes from files is escaped."""
+    plots, keys = page.plots, {name: str(i) for i, name in enumerate(page.colors)}
+    styles = asset("report.css") + ("" if plots is None else asset("explore.css"))
+    sections = [section for section in (page.table, *page.sections) if section.blocks]
+    return (
+        environment()
+        .get_template("page.html")
+        .render(
+            page=page,
+            most=FIRST,
+            sections=sections,
+            css=Markup(styles),
+            color_rules=_color_rules({keys[name]: color for name, color in page.colors.items()}),
+            classes={name: f"estimator-{key}" for name, key in keys.items()},
+            policy=Markup(NO_SCRIPT) if plots is None else policy(),
+            **({} if plots is None else _interactive(plots)),
+        )
+    )
+
+
+def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
+    """What the template needs of the plots besides their data."""
+    numbered = list(enumerate(plots["charts"]))
+    shown = [(str(i), one["name"]) for i, one in enumerate(plots["estimators"]) if one["answered"]]
+    return {
+        "script": script(),
+        "data": embedded_json(plots),
+        "groups": [(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
+        "has": {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")},
+        "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
+    }
+
+
+@cache
+def script() -> Markup:
+    """The page's own script, as it stands between its tags."""
+    folder = files("fgbaseline.reports.html").joinpath("browser")
+    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
+
+
+def policy() -> Markup:
+    """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
+    digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
+    return Markup(f"{NO_SCRIPT}; script-src 'sha256-{digest}'")  # nosec: it is our own
+
+
+def _color_rules(colors: Mapping[str, str]) -> Markup:
+    """`.estimator-KEY` sets `--estimator`, the color of a key on light and on dark ground."""
+    rules = [
+        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
+        for ground in (colors, {key: on_dark(color) for key, color in colors.items()})
+    ]
+    return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")  # nosec: our own
