@@ -1,10 +1,6 @@
 """Fills the page of a run."""
 
-from base64 import b64encode
 from collections.abc import Mapping
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
@@ -14,19 +10,23 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.estimate_comparison import Run
 
 from ..figures import EncodedFigure
-from ..figures.style import TRUTH, colors, on_dark
+from ..figures.style import TRUTH, colors
 from ..phrases.evidence import FIRST
 from ..phrases.run import verdict
 from ..tables import run as tables
 from .environment import asset, environment, picture
+from .explore import line_rules, policy, script
 from .plot_data import TRUTH_LINE, embedded_json, page_data
 
-EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
-"""beginnings of the names of the figures that stand beside the evidence"""
-CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
-"""figures that stand beside the interactive charts, because they show what these do not"""
-SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
-"""the page's script in the order of its dependencies"""
+SHOWN_FIGURES = (
+    "reprojection_distribution",
+    "held_out",
+    "three_sigma_",
+    "reprojection_classes",
+    "image_regions",
+    "map_difference",
+)
+"""beginnings of the names of the figures that show what no interactive chart does; the others are folded away"""
 
 
 def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
@@ -48,7 +48,9 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
         .get_template("run.html")
         .render(
             css=Markup(asset("report.css") + asset("explore.css")),
-            color_rules=_color_rules(run, keys),
+            line_rules=line_rules(
+                {**colors(run.results, run.reference), TRUTH_LINE: TRUTH}, {**keys, TRUTH_LINE: TRUTH_LINE}
+            ),
             script=script(),
             policy=policy(),
             data=embedded_json(data),
@@ -74,31 +76,6 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             events=tables.events_tables(run),
             pictures=pictures,
             bands=[p for name, p in pictures.items() if name.startswith("three_sigma_")],
-            stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))],
+            stills=[p for name, p in pictures.items() if not name.startswith(SHOWN_FIGURES)],
         )
     )
-
-
-@cache
-def script() -> Markup:
-    """The page's own script, as it stands between its tags."""
-    folder = files("fgbaseline.reports.html").joinpath("browser")
-    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
-
-
-def policy() -> Markup:
-    """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
-    digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
-    allowed = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
-    return Markup(allowed)  # nosec: it is our own
-
-
-def _color_rules(run: Run, keys: Mapping[str, str]) -> Markup:
-    """`.estimator-KEY` sets `--estimator`, the color of an estimator on light and on dark ground."""
-    light = {keys[name]: color for name, color in colors(run.results, run.reference).items()} | {"truth": TRUTH}
-    rules = [
-        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
-        for ground in (light, {key: on_dark(color) for key, color in light.items()})
-    ]
-    return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")

@@ -25,6 +25,28 @@ function polyline(n, place) {
   return d;
 }
 
+// Frames of a line between two ends that show all of it in so many pixels: all, or the extremes of each piece.
+function thinned(line, [first, last], pixels) {
+  const n = last - first + 1;
+  const pieces = Math.max(1, Math.floor(pixels));
+  if (n <= 2 * pieces) return Array.from({ length: n }, (_, i) => first + i);
+  const frames = [];
+  for (let piece = 0; piece < pieces; piece++) {
+    const from = first + Math.floor(piece * n / pieces);
+    const until = first + Math.floor((piece + 1) * n / pieces);
+    let [low, high] = [from, from];
+    for (let k = from; k < until; k++) {
+      if (!Number.isFinite(line[k])) continue;
+      if (!(line[k] >= line[low])) low = k;
+      if (!(line[k] <= line[high])) high = k;
+    }
+    frames.push(...new Set([low, high].sort((a, b) => a - b)));
+  }
+  return frames;
+}
+
+const lineClass = key => `line estimator-${key}${isReference(key) ? " reference" : ""}`;
+
 function quantity(value, unit = "") {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
