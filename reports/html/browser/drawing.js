@@ -13,14 +13,15 @@ const press = (button, on) => button.setAttribute("aria-pressed", String(on));
 // Far outside a picture, numbers only make the file longer.
 const bounded = value => Math.max(-1e5, Math.min(1e5, value)).toFixed(1);
 
-// A line through n places, broken where `place` gives none.
+// A line through n places, broken where `place` gives none; places less than half a pixel on are left out.
 function polyline(n, place) {
   let d = "";
-  let pen = "M";
+  let from = null;
   for (let i = 0; i < n; i++) {
     const at = place(i);
-    if (at) d += `${pen}${bounded(at[0])} ${bounded(at[1])}`;
-    pen = at ? "L" : "M";
+    if (at && from && Math.abs(at[0] - from[0]) + Math.abs(at[1] - from[1]) < 0.5) continue;
+    if (at) d += `${from ? "L" : "M"}${bounded(at[0])} ${bounded(at[1])}`;
+    from = at;
   }
   return d;
 }
