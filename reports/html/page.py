@@ -1,24 +1,18 @@
 """Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
 
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
 from itertools import groupby
 from typing import Any, ClassVar
 
 from markupsafe import Markup
 
-from ..figures.style import on_dark
+from ..figures.style import TRUTH
 from ..phrases.evidence import FIRST
 from ..tables import Table
 from .environment import NO_SCRIPT, Picture, asset, environment
+from .explore import line_rules, policy, script
 from .plot_data import TRUTH_LINE, embedded_json
-
-SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
-"""the page's script in the order of its dependencies"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +115,7 @@ def render_page(page: Page) -> str:
             most=FIRST,
             sections=sections,
             css=Markup(styles),
-            color_rules=_color_rules({keys[name]: color for name, color in page.colors.items()}),
+            line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={name: f"estimator-{key}" for name, key in keys.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
             **({} if plots is None else _interactive(plots)),
@@ -140,26 +134,3 @@ def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
         "has": {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")},
         "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
     }
-
-
-@cache
-def script() -> Markup:
-    """The page's own script, as it stands between its tags."""
-    folder = files("fgbaseline.reports.html").joinpath("browser")
-    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
-
-
-def policy() -> Markup:
-    """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
-    digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
-    return Markup(f"{NO_SCRIPT}; script-src 'sha256-{digest}'")  # nosec: it is our own
-
-
-def _color_rules(colors: Mapping[str, str]) -> Markup:
-    """`.estimator-KEY` sets `--estimator`, the color of a key on light and on dark ground."""
-    rules = [
-        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
-        for ground in (colors, {key: on_dark(color) for key, color in colors.items()})
-    ]
-    return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")  # nosec: our own

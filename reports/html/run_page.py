@@ -17,10 +17,10 @@ from .environment import Picture, picture
 from .page import Block, Folded, Grid, Live, Note, Page, Section, Sentences, render_page
 from .plot_data import page_data
 
-EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
+EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "image_regions", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
-CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
-"""figures that stand beside the interactive charts, because they show what these do not"""
+CHART_FIGURES = ("reprojection_distribution",)
+"""figures that stand beside the interactive charts, because they show what these do not; the others are folded away"""
 
 
 def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
@@ -81,7 +81,7 @@ def _sections(
         Grid(evidence),
         *figure_blocks(pictures, ["held_out"]),
         *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
-        *figure_blocks(pictures, ["reprojection_classes", "map_difference"]),
+        *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
         *(folded(table) for table in tables.long_tables(run)),
     ]
     live = plots is not None
