@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from math import nan
 from typing import Protocol
 
 import numpy as np
@@ -140,8 +141,8 @@ class Estimate:
     """reason of a status other than ok, one sentence"""
     seconds: FloatArray = field(default_factory=lambda: np.empty(0))
     """(T,) time spent on each frame, s"""
-    seconds_total: float = 0.0
-    """total time including set-up and covariances, s"""
+    seconds_total: float = nan
+    """total time including set-up and covariances, s; NaN where it is not stated: a run then measures the call"""
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
     """NIS of a filter that records it"""

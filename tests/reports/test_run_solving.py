@@ -1,5 +1,6 @@
 """Whatever an estimator does, the others go on, and its row says what happened."""
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,6 +15,7 @@ from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
 
+from ..builders.runs import as_dict
 from ..builders.synthetic import Scene, plain_problem
 
 PROBLEM = plain_problem(Scene().sequence())
@@ -150,6 +152,29 @@ def test_what_one_run_gives_along_is_not_solved_again(installed: dict[str, Any])
 
     installed["both"] = both
     assert solve_all(PROBLEM, ["both", "other"])["other"].reason == "given along"
+
+
+@pytest.mark.parametrize("stated", [np.nan, 0.0])
+def test_an_answer_without_seconds_and_its_by_product_have_the_time_of_the_call(
+    installed: dict[str, Any], stated: float
+) -> None:
+    def slow(problem: Problem, progress: Progress | None) -> Estimate:
+        time.sleep(0.05)
+        answer = replace(ekf.dead_reckoning(problem), seconds_total=stated)
+        return replace(answer, by_products={"other": answer})
+
+    installed["slow"] = slow
+    start = time.perf_counter()
+    answers = solve_all(PROBLEM, ["slow", "other"])
+    took = time.perf_counter() - start
+    assert 0.05 <= answers["slow"].seconds_total == answers["other"].seconds_total <= took
+    results = as_dict(compare_all(PROBLEM, answers, {}))["estimators"]
+    assert results["slow"]["seconds"] == answers["slow"].seconds_total
+
+
+def test_an_answer_that_states_its_seconds_keeps_them(installed: dict[str, Any]) -> None:
+    installed["stated"] = with_changes(seconds_total=1.5)
+    assert solve_all(PROBLEM, ["stated"])["stated"].seconds_total == 1.5
 
 
 def test_an_estimator_that_failed_on_the_way_does_not_narrow_what_all_used(installed: dict[str, Any]) -> None:
