@@ -6,13 +6,14 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, strapdown
 
+from ..display import Displayed
 from ..imu import ImuNoise, ImuSamples
 from ..observations import IntArray
 from .imu_gaps import interval_densities
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class InertialStart:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class InertialStart(Displayed):
     """Velocity and biases at frame 0 with the covariance of the whole state; the pose is the problem's initial pose."""
 
     velocity: FloatArray
@@ -28,8 +29,8 @@ class InertialStart:
     """how it was found, one sentence"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ImuIntervals:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ImuIntervals(Displayed):
     """Samples cut at the frames: P pieces of constant angular velocity and specific force, in order.
 
     A piece lies between neighboring instants of samples and frames and holds the mean of the two interpolated values,
