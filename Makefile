@@ -1,7 +1,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PACKAGES := geometry data diagnosis ekf smoother compare reports
+PACKAGES := package geometry data diagnosis ekf smoother compare reports
 OUT ?= out/simulated
 
 # What `$(call installed,...)` is given goes to uv, which takes 20 seconds where pip takes 100. Where uv cannot (a mirror
@@ -80,7 +80,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 types: install
-	$(BIN)/mypy $(foreach p,$(PACKAGES),-p fgbaseline.$(p))
+	$(BIN)/mypy -p fgbaseline
 
 arrows: install
 	$(BIN)/lint-imports

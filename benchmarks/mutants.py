@@ -20,7 +20,7 @@ import click
 from scipy.stats import beta
 
 from . import page
-from .rooms import ROOMS
+from .rooms import ROOMS, TOP
 
 PLACE = Path("out/mutants")
 PAGE = Path("docs/mutants.md")
@@ -40,6 +40,7 @@ class Mutant:
 
 def copied() -> None:
     """The tree as it is installed, with its tests; what an earlier run has found is kept for what did not change."""
+    shutil.copytree(TOP, PLACE / "fgbaseline", dirs_exist_ok=True)
     for room in ROOMS:
         shutil.copytree(room, PLACE / "fgbaseline" / room, dirs_exist_ok=True)
     for folder in ("tests", "docs", "suites"):

@@ -1,15 +1,24 @@
 """Estimate of one problem: trajectory, landmarks, covariances, status and events."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Protocol
+from math import nan
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
+from .display import Displayed
+from .frames import axis_columns, path_length, plot_path, pose_columns, table
 from .observations import BoolArray, IntArray
+from .plural import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 
 class Progress(Protocol):
@@ -76,8 +85,8 @@ class Event:
     landmark: int | None = None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Landmarks:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Landmarks(Displayed):
     """m estimated landmarks, in the world frame."""
 
     index: IntArray
@@ -95,9 +104,13 @@ class Landmarks:
     def __len__(self) -> int:
         return len(self.index)
 
+    def to_frame(self) -> "pd.DataFrame":
+        """Table of x, y, z (m) with a row for each landmark, by its index in the sequence."""
+        return table({"landmark": self.index, **axis_columns("", self.position)}, "").set_index("landmark")
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Innovations:
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Innovations(Displayed):
     """Normalized innovation squared (NIS) of a filter, by frame.
 
     Covers all observations offered to the pose update, before kernel and gate: rejected ones count too.
@@ -115,8 +128,8 @@ class Innovations:
         return Innovations(np.full(n_frames, np.nan), np.zeros(n_frames, dtype=np.int64))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class GyroBias:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class GyroBias(Displayed):
     """Gyroscope bias (reading at rest) as estimated at each frame, in IMU axes."""
 
     mean: FloatArray
@@ -125,8 +138,8 @@ class GyroBias:
     """(T, 3, 3)"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Estimate:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Estimate(Displayed):
     """Answer of one estimator to one problem, with T frames and n observations in its sequence."""
 
     name: str
@@ -142,8 +155,8 @@ class Estimate:
     """reason of a status other than ok, one sentence"""
     seconds: FloatArray = field(default_factory=lambda: np.empty(0))
     """(T,) time spent on each frame, s"""
-    seconds_total: float = 0.0
-    """total time including set-up and covariances, s"""
+    seconds_total: float = nan
+    """total time including set-up and covariances, s; NaN where it is not stated: a run then measures the call"""
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
     """NIS of a filter that records it"""
@@ -160,6 +173,44 @@ class Estimate:
     perturbation of the pose, additive otherwise; its first 6 x 6 block is `covariance`"""
     by_products: Mapping[str, "Estimate"] = field(default_factory=dict)
     """further estimates of the same run at no cost, by their registered names"""
+
+    def _heading(self) -> str:
+        return f"Estimate {self.name}: {self.status}" + (f", {self.reason}" if self.reason else "")
+
+    def _facts(self) -> Mapping[str, str]:
+        known = np.isfinite(self.world_T_imu).all(axis=(1, 2))
+        length = path_length(self.world_T_imu[:, :3, 3])
+        facts = {
+            "poses": f"{known.sum():,} of {plural(len(known), 'frame')}, path {length:.1f} m",
+            "covariance": "of every pose" if self.covariance is not None else "none",
+            "landmarks": f"{len(self.landmarks):,}; {plural(int(self.used.sum()), 'observation')} used",
+            "time": "not measured" if np.isnan(self.seconds_total) else f"{self.seconds_total:.3g} s",
+        }
+        kinds = Counter(str(event.kind) for event in self.events).most_common()
+        return facts | ({"events": ", ".join(f"{n:,} x {kind}" for kind, n in kinds)} if kinds else {})
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with a row for each frame: x, y, z (m), qx, qy, qz, qw of `world_T_imu`, and its other quantities.
+
+        sx, sy, sz are the 1-sigma of the position in world axes, m; vx, vy, vz the velocity, m/s; then seconds and NIS.
+        Each stands there where the estimate has it.
+        """
+        columns: dict[str, object] = {**pose_columns(self.world_T_imu)}
+        if self.covariance is not None:
+            R = self.world_T_imu[:, :3, :3]
+            variance = np.einsum("nij,njk,nik->ni", R, self.covariance[:, :3, :3], R)
+            columns |= axis_columns("s", np.sqrt(np.where(variance >= 0.0, variance, np.nan)))
+        if self.velocity is not None:
+            columns |= axis_columns("v", self.velocity)
+        if len(self.seconds):
+            columns["seconds"] = self.seconds
+        if self.innovations is not None:
+            columns["nis"] = self.innovations.nis
+        return table(columns, "frame")
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """Draws the path in the two world axes along which it extends farthest, or in those of `axes`."""
+        return plot_path(self.world_T_imu[:, :3, 3], self.name, axes)
 
     def transformed(self, motion: FloatArray) -> "Estimate":
         """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""

@@ -4,14 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .display import Displayed
 from .observations import IntArray, Observations
 
 MIN_PIECE = 6
 """observations of a piece of a track: three on each half"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class HeldOut:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class HeldOut(Displayed):
     """n observations of tracks removed from a sequence for validation."""
 
     observations: Observations

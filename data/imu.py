@@ -6,6 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from .display import Displayed
 from .value_range import measurable
 
 STANDARD_GRAVITY = 9.81
@@ -47,8 +48,8 @@ ASSUMED_NOISE = ImuNoise(1e-3, 1e-5, 2e-2, 1e-3)
 """of a MEMS unit of medium grade, in vibration: stands in where a recording does not state its noise"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ImuSamples:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ImuSamples(Displayed):
     """M raw samples in the IMU's frame, in the clock of the frames. Raises InputError where they cannot be used."""
 
     t: FloatArray

@@ -2,18 +2,25 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FgbaselineError, FloatArray
 
+from .display import Displayed
+from .frames import table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Observations:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Observations(Displayed):
     """n stereo observations, sorted by frame and within a frame by landmark; the arrays are read-only."""
 
     frame: IntArray
@@ -58,6 +65,11 @@ class Observations:
     def none() -> "Observations":
         """Empty set of observations."""
         return Observations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 4)))
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with the columns frame, landmark, uL, vL, uR, vR (px), a row for each observation."""
+        pixels = dict(zip(("uL", "vL", "uR", "vR"), self.pixel.T, strict=True))
+        return table({"frame": self.frame, "landmark": self.landmark, **pixels}, "observation")
 
     def select(self, chosen: BoolArray | IntArray) -> "Observations":
         """Observations where `chosen` (n,) is true, or with the increasing indices `chosen`."""

@@ -1,21 +1,30 @@
 """Recording: velocities, stereo tracks, calibration and, where known, ground truth."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
 
+from .display import Displayed
 from .finding import Finding
+from .frames import axis_columns, path_length, plot_over_time, pose_columns, table
 from .imu import ImuSamples
 from .observations import BoolArray, Observations
+from .plural import plural
 from .value_range import LARGEST, measurable
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 ROTATION_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Truth:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Truth(Displayed):
     """Known poses (and landmarks) in the world frame: the IMU's frame at frame 0.
 
     With raw inertial samples it is any world with its origin near frame 0; a problem brings it to its own.
@@ -78,8 +87,8 @@ class Truth:
         )
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Sequence:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Sequence(Displayed):
     """A recording of T frames, as the recorder wrote it: stereo tracks with body velocities or raw inertial samples."""
 
     name: str
@@ -142,6 +151,53 @@ class Sequence:
             return np.array([0.0, 0.0, 1.0])
         assert self.up_imu is not None
         return self.up_imu
+
+    def _heading(self) -> str:
+        return f"Sequence {self.name} ({self.source or self.form})"
+
+    def _facts(self) -> Mapping[str, str]:
+        seen = plural(len(np.unique(self.observations.landmark)), "track")
+        facts = {
+            "frames": f"{self.n_frames:,} in {self.t[-1] - self.t[0]:.1f} s",
+            "observations": f"{len(self.observations):,} of {seen}",
+            "motion": "body velocities",
+            "truth": "none",
+        }
+        if self.imu is not None:
+            facts["motion"] = f"{plural(len(self.imu), 'inertial sample')} at {1.0 / self.imu.period:.0f} Hz"
+        if self.truth is not None:
+            length = path_length(self.truth.world_T_imu[:, :3, 3])
+            facts["truth"] = f"{self.truth.known.sum():,} frames, path {length:.1f} m ({self.truth.source})"
+        camera = self.camera
+        facts["camera"] = f"{camera.fu:.1f} x {camera.fv:.1f} px, baseline {camera.baseline:.3f} m"
+        return facts | {f"remark {i}": text for i, text in enumerate(self.remarks, 1)}
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with a row for each frame: t (s), velocities, number of observations, true pose where it is known.
+
+        vx, vy, vz (m/s) and wx, wy, wz (rad/s) are body velocities; a recording with raw inertial samples has none.
+        The true pose is x, y, z (m), qx, qy, qz, qw of `world_T_imu`.
+        """
+        columns: dict[str, object] = {"t": self.t}
+        if self.imu is None:
+            columns |= {**axis_columns("v", self.linear_velocity), **axis_columns("w", self.angular_velocity)}
+        columns["observations"] = np.bincount(self.observations.frame, minlength=self.n_frames)
+        return table(columns | ({} if self.truth is None else pose_columns(self.truth.world_T_imu)), "frame")
+
+    def plot(self) -> "Figure":
+        """Draws speed (or specific force), turn rate and number of observations over time."""
+        t, v, w, label = self.t, self.linear_velocity, self.angular_velocity, "speed, m/s"
+        if self.imu is not None:
+            t, v, w = self.imu.t, self.imu.specific_force, self.imu.angular_velocity
+            label = "specific force, m/s²"
+        counts = np.bincount(self.observations.frame, minlength=self.n_frames).astype(np.float64)
+        start = self.t[0]
+        panels = {
+            label: {"": (t - start, np.linalg.norm(v, axis=1))},
+            "turn rate, °/s": {"": (t - start, np.rad2deg(np.linalg.norm(w, axis=1)))},
+            "observations": {"": (self.t - start, counts)},
+        }
+        return plot_over_time(panels, self.name)
 
     def with_truth(self, truth: Truth) -> "Sequence":
         """Recording with its ground truth replaced."""

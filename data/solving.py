@@ -32,9 +32,9 @@ def solve_all(
 ) -> dict[str, Estimate]:
     """Estimate of each named estimator, in the order of the names; a failure gives a failed estimate.
 
-    `functions` are estimators that are not registered, by name. An estimate without `seconds_total` gets the time that
-    the call took. A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a parameter `given`
-    (`batch` starts from the answer of `isam2`) receives the earlier estimates by name.
+    `functions` are estimators that are not registered, by name. An estimate or by-product without `seconds_total` gets
+    the time that the call took. A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a
+    parameter `given` (`batch` starts from the answer of `isam2`) receives the earlier estimates by name.
     """
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
@@ -46,15 +46,21 @@ def solve_all(
         try:
             with watch(name) as progress:
                 solver = (functions or {}).get(name) or find_estimator(name)
-                estimate = checked(_solved(solver, problem, progress, given | answers), name, problem)
-                if estimate.seconds_total == 0.0:
-                    estimate = replace(estimate, seconds_total=time.perf_counter() - start)
-                given |= {other: checked(e, other, problem) for other, e in estimate.by_products.items()}
+                start = time.perf_counter()  # without its import
+                answer = _solved(solver, problem, progress, given | answers)
+                spent = time.perf_counter() - start
+                estimate = _timed(checked(answer, name, problem), spent)
+                given |= {other: _timed(checked(e, other, problem), spent) for other, e in estimate.by_products.items()}
         except Exception as error:  # a filter of another package may raise anything
             estimate = Estimate.failed(name, describe(error), problem.n_frames, len(problem.excluded))
             estimate = replace(estimate, seconds_total=time.perf_counter() - start)
         answers[name] = estimate
     return answers
+
+
+def _timed(estimate: Estimate, seconds: float) -> Estimate:
+    """The estimate, with `seconds` as its total where it states none above 0."""
+    return estimate if estimate.seconds_total > 0.0 else replace(estimate, seconds_total=seconds)
 
 
 def _solved(

@@ -1,13 +1,20 @@
 """Trajectory from any source: time stamps and poses of one body in one world."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import InitVar, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from .display import Displayed
+from .frames import path_length, plot_path, pose_columns, table
 from .observations import BoolArray, IntArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 ROTATION_TOLERANCE = 1e-6
 """largest orthogonality error of a rotation matrix in a file"""
@@ -17,8 +24,8 @@ EXACT = 1e-12
 """orthogonality error within rounding: such rotations are not changed"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Trajectory:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Trajectory(Displayed):
     """T >= 1 poses of a body, sorted by time.
 
     Its arrays are read-only copies. Rotations that are not exact are replaced by the nearest rotation.
@@ -62,6 +69,24 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def _heading(self) -> str:
+        return f"Trajectory {self.name}" + (f" ({self.source})" if self.source else "")
+
+    def _facts(self) -> Mapping[str, str]:
+        span = f" from {self.t[0]:.10g} to {self.t[-1]:.10g} s" if self.stamped else ", without stamps"
+        return {
+            "poses": f"{len(self):,}{span}" + ("" if self.oriented else ", positions only"),
+            "path": f"{path_length(self.position):.1f} m",
+        }
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table of t (s), x, y, z (m), qx, qy, qz, qw, with a row for each pose."""
+        return table({"t": self.t, **pose_columns(self.world_T_body)}, "pose")
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """Draws the path in the two world axes along which it extends farthest, or in those of `axes`."""
+        return plot_path(self.position, self.name, axes)
 
     @property
     def position(self) -> FloatArray:

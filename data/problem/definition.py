@@ -1,17 +1,26 @@
 """Estimation problem: everything that determines the optimum, independent of the estimator."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 
+from ..display import Displayed
 from ..finding import Finding
+from ..frames import plot_over_time
 from ..observations import BoolArray, IntArray, Observations
+from ..plural import percent, plural
 from ..sequence import Sequence
 from .inertial import ImuIntervals, InertialStart
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 
 class Excluded(IntEnum):
@@ -61,8 +70,8 @@ class NoiseSettings:
     """rad/s, of the rate held over an interval"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class LandmarkPrior:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class LandmarkPrior(Displayed):
     """An independent Gaussian prior on every chosen landmark, in the world frame."""
 
     mean: FloatArray
@@ -71,8 +80,8 @@ class LandmarkPrior:
     """(3, 3) m^2, the same for all"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Problem:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Problem(Displayed):
     """A state estimation problem over T frames: world_T_imu of every frame and the positions of m landmarks.
 
     With raw inertial data each frame also has a velocity and biases: `imu` takes the place of the increments, `start`
@@ -143,6 +152,38 @@ class Problem:
         """Mask (n,) of the sequence's observations that are used."""
         mask: BoolArray = self.excluded == Excluded.NO
         return mask
+
+    def _heading(self) -> str:
+        return f"Problem {self.preset} of {self.sequence.name}"
+
+    def _facts(self) -> Mapping[str, str]:
+        n, used = len(self.excluded), int(self.mask.sum())
+        kernel = "no kernel" if self.kernel is None else f"Huber kernel at {self.kernel.threshold:g} sigma"
+        noise = "estimated" if self.diagnosed else "assumed"
+        inflated = f" (inflated {self.pixel_inflation:.1f} times)" if self.pixel_inflation > 1.0 else ""
+        landmarks = plural(len(self.features), "landmark")
+        return {
+            "frames": f"{self.n_frames:,}",
+            "observations": f"{used:,} of {n:,} ({percent(used / max(n, 1))}), {landmarks}",
+            "noise": f"pixel sigma {self.pixel_variance**0.5:.3g} px{inflated}, {kernel}; {noise}",
+            "repairs": "; ".join(text.rstrip(".") for text in self.repairs) or "none",
+            **{f"remark {i}": text for i, text in enumerate(self.remarks, 1)},
+        }
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with a row for each observation of the sequence: see `Observations.to_frame`, and why it is excluded.
+
+        `excluded` is empty for the observations that are used.
+        """
+        words = np.array(["" if e is Excluded.NO else e.name.lower().replace("_", " ") for e in Excluded])
+        return self.sequence.observations.to_frame().assign(excluded=words[self.excluded])
+
+    def plot(self) -> "Figure":
+        """Draws the numbers of observations in each frame, all and used, over time."""
+        t, frame = self.sequence.t - self.sequence.t[0], self.sequence.observations.frame
+        counts = {"all": frame, "used": frame[self.mask]}
+        lines = {name: (t, np.bincount(of, minlength=self.n_frames).astype(np.float64)) for name, of in counts.items()}
+        return plot_over_time({"observations": lines}, self._heading())
 
     def observations(self) -> Observations:
         """Observations that are used, with landmark indices of the sequence."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, strapdown
 
+from ..display import Displayed
 from ..imu import ImuNoise, ImuSamples
 from ..observations import IntArray
 from .imu_gaps import interval_densities
@@ -16,8 +17,8 @@ HELD_VARIANCE = 1e-9
 """of the largest variance in a block of the start's covariance: what is no more than this is rounding"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class InertialStart:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class InertialStart(Displayed):
     """Velocity and biases at frame 0 with the covariance of the whole state; the pose is the problem's initial pose."""
 
     velocity: FloatArray
@@ -50,8 +51,8 @@ class InertialStart:
         return np.concatenate(columns, axis=1)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ImuIntervals:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ImuIntervals(Displayed):
     """Samples cut at the frames: P pieces of constant angular velocity and specific force, in order.
 
     A piece lies between neighboring instants of samples and frames and holds the mean of the two interpolated values,

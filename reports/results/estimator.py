@@ -27,7 +27,7 @@ from .evidence import (
     evidence_notes,
     summarize_evidence,
 )
-from .metrics import MEASURED, measured, with_measured
+from .metrics import MEASURED, NOT_MEASURED, measured, with_measured
 from .statistics import INFINITE, Divergence, Number, Part, PoseSigma, Reprojection, Spread, nulls
 
 
@@ -66,7 +66,7 @@ class EstimatorSummary(Part):
 
     status: Literal["ok", "recovered", "failed"]
     reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
-    seconds: Annotated[Number, Field(description="computation time of the estimate, s; null of a trajectory file")]
+    seconds: Annotated[Number, Field(description="computation time, s; null where it was not measured, as of a file")]
     reprojection: Annotated[Reprojection, Field(description="over all observations of its landmarks")]
     reprojection_used: Annotated[Reprojection, Field(description="over the observations it used")]
     reprojection_common: Annotated[Reprojection, Field(description="over the observations that every estimator used")]
@@ -117,7 +117,7 @@ def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
     values = {
         "status": str(estimate.status),
         "reason": estimate.reason,
-        "seconds": estimate.seconds_total,
+        "seconds": estimate.seconds_total if estimate.seconds_total > 0.0 else math.nan,
         "reprojection": compare.reprojection_summary(table),
         "reprojection_used": compare.reprojection_summary(table[table["used"]]),
         "reprojection_common": compare.reprojection_summary(table[common[table["observation"]]]),
@@ -154,6 +154,7 @@ def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict
         "reprojection_used": None if estimate.used.any() else "it uses no observations",
         "reprojection_common": "it has none of the observations that every estimator used",
         "components": None if len(estimate.landmarks) else "it estimated no landmarks",
+        "seconds": NOT_MEASURED,
         "divergence": "there is no reference to diverge from" if result.divergence is None else None,
         "divergence.final": "it or the reference did not reach the last frame",
         "divergence.rotation_final_deg": "it or the reference did not reach the last frame",

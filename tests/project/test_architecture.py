@@ -3,13 +3,10 @@
 import grimp
 import pytest
 
-from .test_packaging import ROOMS
-
 
 @pytest.fixture(scope="module")
 def graph() -> grimp.ImportGraph:
-    first, *others = (f"fgbaseline.{room}" for room in ROOMS)
-    return grimp.build_graph(first, *others, cache_dir=None)
+    return grimp.build_graph("fgbaseline", cache_dir=None)
 
 
 def cycles(graph: grimp.ImportGraph) -> set[frozenset[str]]:
@@ -40,6 +37,8 @@ def cycles(graph: grimp.ImportGraph) -> set[frozenset[str]]:
 
 
 def test_no_module_imports_one_that_imports_it(graph: grimp.ImportGraph) -> None:
+    assert len(graph.modules) > 300
+    assert graph.find_modules_directly_imported_by("fgbaseline")  # so a room that imports it would be in a cycle
     assert not cycles(graph)
 
 

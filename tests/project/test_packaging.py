@@ -15,6 +15,8 @@ from ..builders.commands import environment
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports")
+TOP = "package"
+"""the folder of the package itself, beside its rooms"""
 DESCRIBED = ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in")
 
 
@@ -42,9 +44,9 @@ def run(*command: str | Path, cwd: Path, **env: str) -> str:
 
 
 def files_of_ours() -> Iterator[str]:
-    """Every file of the rooms that belongs into a release, from the root."""
-    for room in ROOMS:
-        for path in (ROOT / room).rglob("*"):
+    """Every file of ours that belongs into a release, from the root."""
+    for folder in (TOP, *ROOMS):
+        for path in (ROOT / folder).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts:
                 yield path.relative_to(ROOT).as_posix()
 
@@ -53,7 +55,7 @@ def files_of_ours() -> Iterator[str]:
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Both, built from a copy, so that what earlier builds left in the working tree cannot help or harm."""
     source = tmp_path_factory.mktemp("source")
-    for folder in (*ROOMS, "tests"):
+    for folder in (TOP, *ROOMS, "tests"):
         shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
     for file in DESCRIBED:
         shutil.copy(ROOT / file, source / file)
@@ -68,8 +70,8 @@ def test_the_wheel_holds_our_packages_and_nothing_at_the_top(built: Built) -> No
         (top_level,) = (name for name in names if name.endswith("top_level.txt"))
         assert archive.read(top_level).decode().split() == ["fgbaseline"]
     described = {name for name in names if name.partition("/")[0].endswith(".dist-info")}
-    assert names - described == {f"fgbaseline/{name}" for name in files_of_ours()}
-    assert {f"fgbaseline/{room}/py.typed" for room in ROOMS} <= names
+    assert names - described == {f"fgbaseline/{name.removeprefix(f'{TOP}/')}" for name in files_of_ours()}
+    assert "fgbaseline/py.typed" in names
     assert any(name.endswith("licenses/LICENSE") for name in described)
 
 
@@ -148,7 +150,7 @@ def use_beside_the_users_own_modules(env: Environment, folder: Path, *, with_a_r
         assert (folder / name).read_text() == USERS_OWN
     top = {path.name for path in env.packages.iterdir()}
     assert "fgbaseline" in top
-    assert not top & {*ROOMS, "tests", "docs", "benchmarks"}
+    assert not top & {TOP, *ROOMS, "tests", "docs", "benchmarks"}
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Whatever an estimator does, the others go on, and its row says what happened."""
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
 from fgbaseline.reports.run.solution import batch_is_added, solve
 
+from ..builders.runs import as_dict
 from ..builders.synthetic import Scene, plain_problem
 
 PROBLEM = plain_problem(Scene().sequence())
@@ -151,6 +153,29 @@ def test_by_products_of_a_run_are_not_solved_again(installed: dict[str, Any]) ->
 
     installed["both"] = both
     assert solve_all(PROBLEM, ["both", "other"])["other"].reason == "given along"
+
+
+@pytest.mark.parametrize("stated", [np.nan, 0.0])
+def test_an_answer_without_seconds_and_its_by_product_have_the_time_of_the_call(
+    installed: dict[str, Any], stated: float
+) -> None:
+    def slow(problem: Problem, progress: Progress | None) -> Estimate:
+        time.sleep(0.05)
+        answer = replace(ekf.dead_reckoning(problem), seconds_total=stated)
+        return replace(answer, by_products={"other": answer})
+
+    installed["slow"] = slow
+    start = time.perf_counter()
+    answers = solve_all(PROBLEM, ["slow", "other"])
+    took = time.perf_counter() - start
+    assert 0.05 <= answers["slow"].seconds_total == answers["other"].seconds_total <= took
+    results = as_dict(compare_all(PROBLEM, answers, {}))["estimators"]
+    assert results["slow"]["seconds"] == answers["slow"].seconds_total
+
+
+def test_an_answer_that_states_its_seconds_keeps_them(installed: dict[str, Any]) -> None:
+    installed["stated"] = with_changes(seconds_total=1.5)
+    assert solve_all(PROBLEM, ["stated"])["stated"].seconds_total == 1.5
 
 
 def test_an_estimator_that_failed_midway_does_not_narrow_the_common_observations(installed: dict[str, Any]) -> None:
