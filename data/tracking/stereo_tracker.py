@@ -66,23 +66,23 @@ class StereoTracker:
         `rotation` (3, 3), new_R_previous of the left camera, predicts where points move, with the translation of the
         step before; without it both are those of the step before.
         """
-        if self._left is not None and len(self.tracks.number):
-            self.tracks = self._tracked(left, right, rotation)
-        else:
+        if self._left is None:
             self.tracks = Tracks.none()
+        elif len(self.tracks.number):
+            self.tracks = self._tracked(self._left, left, right, rotation)
         self.tracks = self._with_new_corners(left, right)
         self._left = left
         return self.tracks
 
-    def _tracked(self, left: Image, right: Image, rotation: FloatArray | None) -> Tracks:
+    def _tracked(self, before: Image, left: Image, right: Image, rotation: FloatArray | None) -> Tracks:
         old, limit = self.tracks, self.settings.forward_backward
         motion = self._motion.copy()
         if rotation is not None:
             motion[:3, :3] = rotation
         points = self.camera.triangulate(old.pixel)
         predicted = self._projected(motion, points, old.pixel)
-        new, found = self._flow(self._left, left, old.pixel[:, :2], predicted[:, :2])
-        back, returned = self._flow(left, self._left, new, old.pixel[:, :2])
+        new, found = self._flow(before, left, old.pixel[:, :2], predicted[:, :2])
+        back, returned = self._flow(left, before, new, old.pixel[:, :2])
         found &= returned & (np.linalg.norm(back - old.pixel[:, :2], axis=1) < limit) & _inside(new, left)
         old, points, new, predicted = old.select(found), points[found], new[found], predicted[found]
         offset = predicted[:, 2:] - predicted[:, :2]
@@ -127,9 +127,7 @@ class StereoTracker:
         pixel[ahead] = self.camera.project(moved[ahead])
         return pixel
 
-    def _flow(
-        self, first: Image | None, second: Image, points: FloatArray, guess: FloatArray
-    ) -> tuple[FloatArray, BoolArray]:
+    def _flow(self, first: Image, second: Image, points: FloatArray, guess: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Points (n, 2) of the second image, and which were found, of points (n, 2) of the first."""
         cv2, n = self._cv2, len(points)
         if n == 0:
