@@ -10,6 +10,10 @@ from .findings.json_report import to_json
 from .findings.track_statistics import TrackStatistics, track_statistics
 from .findings.velocity_findings import findings_of, not_identifiable
 from .held_out import hold_out
+from .inertial.findings import inertial_findings
+from .inertial.json_report import inertial_sentences, inertial_to_json
+from .inertial.pipeline import diagnose_inertial
+from .inertial.result import InertialDiagnosis
 from .repair_overrides.settings import Repairs, read_repairs
 from .repair_overrides.template import repairs_text
 from .repairs.repaired_sequence import Repaired, repair
@@ -18,6 +22,7 @@ from .tracks.unusable import unusable
 __all__ = [
     "Calibration",
     "Diagnosis",
+    "InertialDiagnosis",
     "NoiseSettings",
     "Repaired",
     "Repairs",
@@ -25,8 +30,12 @@ __all__ = [
     "Units",
     "calibrated",
     "diagnose",
+    "diagnose_inertial",
     "findings_of",
     "hold_out",
+    "inertial_findings",
+    "inertial_sentences",
+    "inertial_to_json",
     "known_units",
     "not_identifiable",
     "read_repairs",

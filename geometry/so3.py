@@ -135,6 +135,16 @@ def turn_about(axis: ArrayLike, rotation: ArrayLike) -> FloatArray:
     return np.asarray(np.arctan2(antisymmetric @ a, cosine))
 
 
+def rotation_to_z(vector: ArrayLike) -> FloatArray:
+    """Smallest rotation (3, 3) that takes the direction of a vector (3,) to +z; about x where that is -z."""
+    up = np.asarray(vector, dtype=np.float64)
+    x, y, z = up / np.linalg.norm(up)
+    sine = float(np.hypot(x, y))
+    if sine < 1e-12:
+        return np.diag([1.0, 1.0, 1.0] if z > 0.0 else [1.0, -1.0, -1.0])
+    return exp_so3(np.arctan2(sine, z) / sine * np.array([y, -x, 0.0]))
+
+
 def rotation_defect(matrix: ArrayLike) -> FloatArray:
     """How far matrices (..., 3, 3) are from proper rotations: the largest entry of |R^T R - I| and |det R - 1|."""
     # Columns apart: ten times as fast as stacked products, determinants and reductions over axes of three.

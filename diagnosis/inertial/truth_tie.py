@@ -10,8 +10,6 @@ import numpy as np
 from fgbaseline.data.sequence import Truth
 from fgbaseline.geometry import FloatArray, so3
 
-from ..inertial_start.linear_alignment import smallest_rotation
-
 UPRIGHT = np.deg2rad(3.0)
 """rad between the z axis of a file's world and the measured up, within which z is taken for up"""
 TIED = 20
@@ -25,7 +23,7 @@ def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tupl
         return truth, "the ground truth has no pose in any frame of the problem"
     up, how = _up(truth, path, known)
     level = np.eye(4)
-    level[:3, :3] = smallest_rotation(up)
+    level[:3, :3] = so3.rotation_to_z(up)
     moved = truth.moved(level)
     count = 1 if known[0] == 0 else min(TIED, max(3, round(frames_per_second)), len(known))
     at = known[:count]

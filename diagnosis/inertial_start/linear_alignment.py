@@ -24,7 +24,7 @@ FLOOR = 1e-3
 def aligned(imu: ImuIntervals, frames: IntArray, seen: RelativePoses) -> States:
     """Initial states of keyframes at `frames` (n,), in a world whose z axis points up; `seen` joins neighbors.
 
-    Position and heading of the first are those of `smallest_rotation`.
+    Position and heading of the first are those of `so3.rotation_to_z`.
     """
     n = len(frames)
     known = np.zeros(n - 1, dtype=np.bool_)
@@ -40,21 +40,11 @@ def aligned(imu: ImuIntervals, frames: IntArray, seen: RelativePoses) -> States:
     for i in range(n - 1):
         R[i + 1] = R[i] @ rotation[i]
     position, velocity, gravity = _gravity_and_velocities(imu, motions, R, seen)
-    world_R = smallest_rotation(-gravity)
+    world_R = so3.rotation_to_z(-gravity)
     pose = identity.copy()
     pose[:, :3, :3] = world_R @ R
     pose[:, :3, 3] = position @ world_R.T
     return States(pose, velocity @ world_R.T, biases, none)
-
-
-def smallest_rotation(up: FloatArray) -> FloatArray:
-    """(3, 3) the smallest rotation that takes `up` (3,) to +z; about x where it is upside down."""
-    u = up / np.linalg.norm(up)
-    axis = np.cross(u, [0.0, 0.0, 1.0])
-    sine, cosine = float(np.linalg.norm(axis)), float(u[2])
-    if sine < 1e-12:
-        axis, sine = np.array([1.0, 0.0, 0.0]), 1.0
-    return so3.exp_so3(axis / sine * np.arctan2(float(np.hypot(u[0], u[1])), cosine))
 
 
 def gyroscope_bias(imu: ImuIntervals, frames: IntArray, rotation: FloatArray, known: BoolArray) -> FloatArray:

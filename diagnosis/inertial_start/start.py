@@ -12,11 +12,11 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem.inertial import ImuIntervals, InertialStart
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.geometry import FloatArray, strapdown
+from fgbaseline.geometry import FloatArray, so3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
 from .least_squares import Solution, solved
-from .linear_alignment import aligned, smallest_rotation
+from .linear_alignment import aligned
 from .standing import keyframes_of, standing_frames, stands
 from .states import RelativePoses, States
 from .track_terms import keyframe_tracks
@@ -80,7 +80,7 @@ def _standing_states(imu: ImuIntervals, frames: IntArray) -> States:
     n, at = len(frames), slice(int(imu.starts[frames[0]]), int(imu.starts[frames[-1]]))
     share = imu.dt[at] / imu.dt[at].sum()
     pose = np.tile(np.eye(4), (n, 1, 1))
-    pose[:, :3, :3] = smallest_rotation(share @ imu.specific_force[at])
+    pose[:, :3, :3] = so3.rotation_to_z(share @ imu.specific_force[at])
     none = np.zeros((n, 3))
     return States(pose, none, np.tile(share @ imu.angular_velocity[at], (n, 1)), none)
 
@@ -89,7 +89,7 @@ def _start(solution: Solution, source: str, standing: float) -> Start:
     """The first state in the world in which its rotation is the smallest one."""
     first = solution.states.pose[0]
     turn = np.eye(4)
-    turn[:3, :3] = smallest_rotation(first[2, :3]) @ first[:3, :3].T
+    turn[:3, :3] = so3.rotation_to_z(first[2, :3]) @ first[:3, :3].T
     states = solution.states.moved(turn)
     axes = np.eye(strapdown.STATE)
     axes[strapdown.VELOCITY, strapdown.VELOCITY] = turn[:3, :3]

@@ -16,10 +16,19 @@ from . import options
     type=click.Path(path_type=Path),
     help="TOML file to write what was found to, for run --repairs, to be edited by hand.",
 )
+@options.imu
+@options.imu_calibration
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 def command(
-    sequence: Path, out: Path | None, as_json: bool, write_repairs: Path | None, time_unit: str | None, force: bool
+    sequence: Path,
+    out: Path | None,
+    as_json: bool,
+    write_repairs: Path | None,
+    imu: Path | None,
+    imu_calibration: Path | None,
+    time_unit: str | None,
+    force: bool,
 ) -> int:
     """Find what is wrong with SEQUENCE: units, axes, bias, delay, scale, extrinsic, tracks; and how large its noise is.
 
@@ -27,8 +36,9 @@ def command(
 
     Exits 0 when the recording is clean, 1 with findings, 2 when it cannot tell, and on bad input.
     """
-    from fgbaseline.data import TimeUnit
+    from fgbaseline.data import TimeUnit, read
     from fgbaseline.reports.run.diagnose import print_diagnosis
 
     unit = None if time_unit is None else TimeUnit(time_unit)
-    return print_diagnosis(sequence, out, as_json=as_json, repairs=write_repairs, force=force, time_unit=unit)
+    recording = read(sequence, time_unit=unit, imu=imu, imu_calibration=imu_calibration)
+    return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force)

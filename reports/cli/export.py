@@ -14,6 +14,8 @@ from . import options
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
 @options.preset
 @options.features
+@options.imu
+@options.imu_calibration
 @click.option(
     "--as-recorded", is_flag=True, help="No diagnosis: take the recording as it is, with assumed noise (calibrated)."
 )

@@ -1,5 +1,7 @@
 """Options that several commands have, and their types."""
 
+from pathlib import Path
+
 import click
 
 
@@ -32,6 +34,18 @@ features = click.option(
     "--features",
     type=FeatureCount(),
     help="How many landmarks, those seen most often.  [default: all; 1000 for the documented preset]",
+)
+imu = click.option(
+    "--imu",
+    type=click.Path(path_type=Path),
+    metavar="CSV",
+    help="Raw inertial samples in EuRoC's form, in place of the velocities of SEQUENCE.",
+)
+imu_calibration = click.option(
+    "--imu-calibration",
+    type=click.Path(path_type=Path),
+    metavar="YAML",
+    help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
 )
 time_unit = click.option(
     "--time-unit",

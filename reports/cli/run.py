@@ -35,6 +35,8 @@ DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
     is_flag=True,
     help="No diagnosis: the recording as it is, velocity k moving frame k to k + 1, with assumed noise (calibrated).",
 )
+@options.imu
+@options.imu_calibration
 @options.time_unit
 @click.option(
     "--repairs",

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import numpy as np
 
-from fgbaseline.data import TimeUnit, read
+from fgbaseline.data import Sequence
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.formats.atomic_write import atomic_write
@@ -15,7 +15,11 @@ from fgbaseline.data.plural import plural
 from fgbaseline.diagnosis import (
     Diagnosis,
     diagnose,
+    diagnose_inertial,
     findings_of,
+    inertial_findings,
+    inertial_sentences,
+    inertial_to_json,
     not_identifiable,
     repairs_text,
     to_json,
@@ -31,13 +35,12 @@ UNWRAPPED = 120
 
 
 def print_diagnosis(
-    path: Path,
+    sequence: Sequence,
     out: Path | None,
     *,
     as_json: bool,
     repairs: Path | None,
     force: bool,
-    time_unit: TimeUnit | None = None,
 ) -> int:
     """Diagnoses a recording, writes and prints the findings; gives the exit code."""
     if force and out is None and repairs is None:
@@ -46,7 +49,9 @@ def print_diagnosis(
         require_free(out, force=force, mark=MARK)
     if repairs is not None:
         _require_writable(repairs, force=force)
-    diagnosis = diagnose(read(path, time_unit=time_unit))
+    if sequence.imu is not None:
+        return _print_inertial(sequence, out, as_json=as_json, repairs=repairs, force=force)
+    diagnosis = diagnose(sequence)
     tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
     text = _text(to_json(diagnosis, tracks, findings))
@@ -69,6 +74,41 @@ def print_diagnosis(
         if repairs is not None:
             click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
     if diagnosis.cannot_tell:
+        return CANNOT_TELL
+    return FINDINGS if findings else CLEAN
+
+
+def _print_inertial(sequence: Sequence, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool) -> int:
+    """The same of a recording with raw inertial samples, which has no repairs to write."""
+    if repairs is not None:
+        raise InputError("write-repairs: a recording with raw inertial samples has no repairs that can be set")
+    found = diagnose_inertial(sequence)
+    findings = inertial_findings(found)
+    text = _text(inertial_to_json(found, findings))
+    if out is not None:
+        with atomic_folder(out, force=force, mark=MARK) as folder:
+            (folder / MARK).write_text(text, encoding="utf-8")
+    if as_json:
+        click.echo(text, nl=False)
+    else:
+        o = found.sequence.observations
+        click.echo(
+            f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(o), 'observation')} of "
+            f"{plural(len(np.unique(o.landmark)), 'track')}, {plural(len(sequence.imu or ()), 'inertial sample')}"
+        )
+        for remark in sequence.remarks:
+            click.echo(remark)
+        if found.cannot_tell:
+            click.echo(f"Nothing can be found out about its motion: {found.cannot_tell}.")
+        if findings:
+            _print_findings(findings)
+        elif not found.cannot_tell:
+            click.echo("Nothing wrong was found.")
+        for sentence in inertial_sentences(found):
+            click.echo(sentence)
+        if out is not None:
+            click.echo(f"\nThe evidence is in {out}")
+    if found.cannot_tell:
         return CANNOT_TELL
     return FINDINGS if findings else CLEAN
 

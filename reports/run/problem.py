@@ -54,6 +54,10 @@ class RunSettings:
     """of the recording's stamps; None to find it out"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
+    imu: Path | None = None
+    """CSV of raw inertial samples, in place of the recording's velocities"""
+    imu_calibration: Path | None = None
+    """YAML of their noise"""
     repairs: Path | None = None
     """TOML file of what is set by hand in place of what the diagnosis finds"""
 
@@ -72,6 +76,11 @@ class RunSettings:
             "time_unit": None if self.time_unit is None else str(self.time_unit),
             "held_out": self.held_out,
             "repairs": None if self.repairs is None else str(self.repairs),
+            **{
+                name: str(path)
+                for name, path in (("imu", self.imu), ("imu_calibration", self.imu_calibration))
+                if path is not None
+            },
         }
 
 
@@ -105,6 +114,8 @@ def read_sequence(settings: RunSettings) -> Sequence:
             )
         if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
+        if settings.imu is not None or settings.imu_calibration is not None:
+            raise InputError("imu: the simulated drive has its own motion; give a SEQUENCE with --imu")
         from fgbaseline.data.simulate import Simulation, simulate
 
         return simulate(Simulation(seed=settings.seed))
@@ -114,7 +125,14 @@ def read_sequence(settings: RunSettings) -> Sequence:
         )
     if settings.truth is None and settings.truth_frame is not None:
         raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
-    return read(settings.sequence, settings.truth, settings.truth_frame, settings.time_unit)
+    return read(
+        settings.sequence,
+        settings.truth,
+        settings.truth_frame,
+        settings.time_unit,
+        settings.imu,
+        settings.imu_calibration,
+    )
 
 
 def split(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:
@@ -129,7 +147,7 @@ def pose_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) 
         raise InputError(f"repairs: {why} takes the recording as it is; leave out --repairs, or that")
     if len(sequence.observations) and (reason := unusable(sequence)):
         raise InputError(f"{sequence.source}: features: {reason}")
-    if settings.as_recorded or settings.preset == "documented":
+    if sequence.imu is None and (settings.as_recorded or settings.preset == "documented"):
         _require_units(sequence)
     repairs = None if settings.repairs is None else read_repairs(settings.repairs)
     features = None if settings.features == "all" else settings.features

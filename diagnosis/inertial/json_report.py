@@ -1,0 +1,98 @@
+"""A diagnosis of raw inertial data as JSON, and its figures in sentences."""
+
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from fgbaseline.data.finding import Finding
+
+from ..findings.json_report import SCHEMA
+from ..findings.phrases import vector
+from .findings import inertial_findings
+from .result import InertialDiagnosis
+
+
+def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | None = None) -> dict[str, Any]:
+    """The contents of `diagnosis.json`: numbers, texts, lists and dicts, None where the cameras determine nothing."""
+    findings = inertial_findings(found) if findings is None else findings
+    sequence, imu = found.sequence, found.sequence.imu
+    assert imu is not None
+    return {
+        "schema": SCHEMA,
+        "version": version("fgbaseline"),
+        "sequence": {
+            "name": sequence.name,
+            "frames": sequence.n_frames,
+            "duration_s": float(sequence.t[-1] - sequence.t[0]),
+            "observations": len(sequence.observations),
+            "tracks": len(np.unique(sequence.observations.landmark)),
+        },
+        "imu": {
+            "samples": len(imu),
+            "period_s": imu.period,
+            "noise": imu.noise.densities.tolist(),
+            "gravity": imu.gravity,
+        },
+        "cannot_tell": found.cannot_tell or None,
+        "findings": [asdict(finding) for finding in findings],
+        "start": _start(found),
+        "sensors": _sensors(found),
+        "sigma": {"pixel": None if found.fit is None else found.fit.sigmas.pixel},
+    }
+
+
+def _start(found: InertialDiagnosis) -> dict[str, Any] | None:
+    start = found.start
+    if start is None:
+        return None
+    return {
+        "source": start.state.source,
+        "standing_s": start.standing,
+        "up_imu": start.pose[2, :3].tolist(),
+        "velocity": start.state.velocity.tolist(),
+        "gyroscope_bias": start.state.gyroscope_bias.tolist(),
+        "accelerometer_bias": start.state.accelerometer_bias.tolist(),
+        "std": np.sqrt(np.diag(start.state.covariance)).tolist(),
+    }
+
+
+def _sensors(found: InertialDiagnosis) -> dict[str, Any] | None:
+    checks = found.sensors
+    if checks is None or not checks.determined:
+        return None
+    return {
+        "gyro_bias": checks.gyroscope_bias[0].tolist(),
+        "gyro_bias_std": checks.gyroscope_bias[1].tolist(),
+        "misalignment_deg": np.rad2deg(checks.misalignment[0]).tolist(),
+        "misalignment_std_deg": np.rad2deg(checks.misalignment[1]).tolist(),
+        "time_offset_s": checks.time_offset[0],
+        "time_offset_std_s": checks.time_offset[1],
+        "gyro_scale": checks.gyroscope_scale[0],
+        "gyro_scale_std": checks.gyroscope_scale[1],
+        "accelerometer_bias": checks.accelerometer_bias.tolist(),
+        "gravity_measured": checks.gravity[0],
+        "rest": None if checks.rest is None else checks.rest._asdict(),
+    }
+
+
+def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
+    """Start, sensors and pixel noise, one sentence each."""
+    said = []
+    if found.start is not None:
+        state, deviation = found.start.state, np.sqrt(np.diag(found.start.state.covariance))
+        said.append(
+            f"Start ({state.source}): velocity {vector(state.velocity, 3)} m/s, one standard error "
+            f"{vector(deviation[6:9], 3)}; tilt known to {np.rad2deg(np.linalg.norm(deviation[3:6])):.2f}°."
+        )
+    checks = found.sensors
+    if checks is not None and checks.determined:
+        said.append(
+            f"Gyroscope against the cameras: bias {vector(checks.gyroscope_bias[0], 4)} rad/s, offset "
+            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {checks.gyroscope_scale[0]:.3f}; accelerometer: bias "
+            f"{vector(checks.accelerometer_bias, 3)} m/s^2, gravity {checks.gravity[0]:.3f} m/s^2."
+        )
+    if found.fit is not None:
+        said.append(f"Noise (one sigma): {found.pixel:.2f} px of a pixel row.")
+    return tuple(said)
