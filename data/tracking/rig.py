@@ -1,6 +1,6 @@
 """Stereo rig: camera models with distortion, extrinsics, and the rectification of its images (OpenCV)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -43,6 +43,10 @@ class CameraModel:
         """Camera matrix (3, 3)."""
         fu, fv, cu, cv = self.intrinsics
         return np.array([[fu, 0.0, cu], [0.0, fv, cv], [0.0, 0.0, 1.0]])
+
+    def on(self, imu_T_body: FloatArray) -> "CameraModel":
+        """The camera on an IMU, its pose being given on a body; `imu_T_body` (4, 4)."""
+        return replace(self, imu_T_cam=imu_T_body @ self.imu_T_cam)
 
 
 class Rectified(NamedTuple):

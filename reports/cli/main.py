@@ -12,6 +12,7 @@ import click
 
 COMMANDS = {
     "run": "run",
+    "track": "track",
     "compare": "compare",
     "diagnose": "diagnose",
     "export": "export",

@@ -37,6 +37,7 @@ DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
 )
 @options.imu
 @options.imu_calibration
+@options.images
 @options.time_unit
 @click.option(
     "--repairs",
@@ -71,9 +72,14 @@ def command(
     landmarks: str,
     time_unit: str | None,
     rerun_file: Path | None,
+    topics: str | None,
+    settings: Path | None,
     **given: Any,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
+
+    SEQUENCE is a recording of tracks, or a folder or ROS bag of stereo images: they are tracked, and the tracks stay in
+    tracks.npz in the folder of the run.
 
     Without SEQUENCE: on a simulated drive of a minute through a town, with known truth.
 
@@ -84,10 +90,12 @@ def command(
     from fgbaseline.reports.cli.run_output import report
     from fgbaseline.reports.run.problem import RunSettings
 
-    settings = RunSettings(
+    chosen = RunSettings(
         estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
+        topics=options.topic_names(topics),
+        tracker=settings,
         **given,
     )
-    return report(settings, out, force=force, rerun_file=rerun_file)
+    return report(chosen, out, force=force, rerun_file=rerun_file)

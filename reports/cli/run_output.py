@@ -4,11 +4,14 @@ from pathlib import Path
 
 import click
 
+from fgbaseline.data.formats import write_npz
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import cores, shared
 from fgbaseline.data.plural import plural
+from fgbaseline.data.tracking import has_images
 from fgbaseline.reports.run.problem import (
     MARK,
+    TRACKS,
     RunSettings,
     check_estimators,
     load_estimators,
@@ -66,6 +69,8 @@ def report(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: 
     progress.say("writing the report")
     with atomic_folder(place, force=force, mark=MARK) as folder:
         summary = write_run(run, folder, cores())
+        if settings.sequence is not None and has_images(settings.sequence):
+            write_npz(sequence, folder / TRACKS, flat=True)
         if rerun_file is not None:
             from fgbaseline.reports.run.rerun import write_rerun
 
