@@ -33,10 +33,8 @@ def read_bag_trajectory(path: Path, topic: str, name: str | None) -> TrajectoryF
     with open_bag_file(path) as bag:
         kind = _type(bag, topic)
         if kind == "nav_msgs/Path":
-            last = None
-            for _, _, last in bag.messages((topic,)):
-                pass
-            poses = [] if last is None else list(last.poses)
+            paths = [message.poses for _, _, message in bag.messages((topic,))]
+            poses = list(paths[-1]) if paths else []
             stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in poses]
             rows = [_numbers(pose.pose) for pose in poses]
             covariances: list[FloatArray] = []

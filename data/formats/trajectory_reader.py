@@ -90,7 +90,7 @@ def read_extrinsic(path: FilePath) -> FloatArray:
 def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
 ) -> TrajectoryFile:
-    """What a trajectory file or a topic of a bag (`run.bag:/odom`) holds and leaves open. Raises as `read_trajectory`."""
+    """What a file, or a topic of a bag (`run.bag:/odom`), holds and leaves open. Raises as `read_trajectory`."""
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
     if (in_bag := split_topic(path)) is not None:
