@@ -162,7 +162,7 @@ def test_kitti_raw(recordings: Callable[[str], Path]) -> None:
     assert sequence.truth is not None
     steps = np.diff(sequence.truth.world_T_imu[:, :3, 3], axis=0)
     predicted = np.einsum("tij,tj->ti", sequence.truth.world_T_imu[:-1, :3, :3], sequence.linear_velocity[:-1])
-    np.testing.assert_allclose(steps, predicted * sequence.dt[:, None], atol=0.05)
+    np.testing.assert_allclose(steps, predicted * sequence.dt[:, None], atol=0.015)
     assert abs(sequence.imu_T_cam[0, 3] - 1.08) < 0.02  # the camera is 1.08 m ahead of the unit
 
 

@@ -33,6 +33,8 @@ NUMBERS = 30
 VELOCITY, RATE = slice(6, 8), slice(17, 20)
 """north and east, m/s; angular rates about the body's axes, rad/s"""
 UPWARD = 10
+Motion = tuple[FloatArray, FloatArray, FloatArray]
+"""linear and angular velocity (T, 3) in the body, poses (T, 4, 4)"""
 
 
 def open_kitti_raw(folder: Path) -> ImageRecording:
@@ -61,6 +63,11 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
     cameras = rectified_cameras(P0, P1, size_of(files[0][0]), np.eye(4) if imu_T_cam is None else imu_T_cam)
     oxts = _oxts(drive / "oxts" / "data", frames)
     motion = None if oxts is None or imu_T_cam is None else _motion(oxts)
+    if motion is not None and (drive / "oxts" / "timestamps.txt").is_file():
+        recorded = _stamps(drive / "oxts" / "timestamps.txt")
+        if len(recorded) <= frames[-1]:
+            raise InputError(f"{shown(drive)}: oxts/timestamps.txt has {len(recorded)} stamps, too few")
+        motion = _at_images(motion, (stamps[frames] - recorded[frames]).astype(np.float64) * 1e-9)
     if motion is not None:
         remarks.append(ONE_UNIT)
     return ImageRecording(
@@ -157,7 +164,7 @@ def _oxts(folder: Path, frames: IntArray) -> FloatArray | None:
     return np.array(lines)
 
 
-def _motion(oxts: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _motion(oxts: FloatArray) -> Motion:
     """Linear and angular velocity (T, 3) in the body, and poses (T, 4, 4) in east, north, up (Mercator)."""
     latitude, longitude, altitude, roll, pitch, yaw = oxts[:, :6].T
     zero, one = np.zeros_like(roll), np.ones_like(roll)
@@ -178,3 +185,11 @@ def _motion(oxts: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     north, east = oxts[:, VELOCITY].T
     velocity = np.stack([east, north, oxts[:, UPWARD]], axis=1)
     return np.einsum("tji,tj->ti", poses[:, :3, :3], velocity), oxts[:, RATE].copy(), poses
+
+
+def _at_images(
+    motion: tuple[FloatArray, FloatArray, FloatArray], later: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The motion at images that are `later` (T,), s, than the lines of the unit: some milliseconds."""
+    linear, angular, poses = motion
+    return linear, angular, poses @ se3.exp(np.hstack([linear, angular]) * later[:, None])
