@@ -77,8 +77,8 @@ class ImuSamples:
         if not (np.isfinite(self.t).all() and rising.all()):
             k = int(np.argmin(rising))
             raise InputError(
-                f"imu_time_stamps: stamps must rise, but sample {k + 1} ({self.t[k + 1]!r} s) is not after sample {k} "
-                f"({self.t[k]!r} s)"
+                f"imu_time_stamps: stamps must rise, but sample {k + 1} ({float(self.t[k + 1])!r} s) is not after "
+                f"sample {k} ({float(self.t[k])!r} s)"
             )
         if not (np.isfinite(self.gravity) and self.gravity > 0.0):
             raise InputError(f"gravity: expected a positive magnitude in m/s^2, got {self.gravity!r}")

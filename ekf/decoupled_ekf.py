@@ -6,18 +6,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
-from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import LandmarkMode, Problem
 from fgbaseline.geometry import FloatArray, se3
 
 from .landmark_mapping import map_landmarks
 from .landmark_update import IndependentLandmarks
+from .motion_model import BodyHistory, motion_model, predicted_history
 from .nis import decoupled_nis, three_row_nis
 from .pose_update import (
     PoseInnovation,
     pose_innovation,
     pose_posterior,
-    predicted_covariance,
     printed_covariance,
 )
 
@@ -29,7 +28,8 @@ eigenvalue: eps times the condition against one over the condition."""
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
     """Documented filter: pose and landmarks with separate covariances.
 
-    At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9), update the pose with
+    At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9) or the inertial samples
+    since frame k-1, update the pose (with inertial samples the velocity and the biases as well) with
     the landmarks as they stand (13), update the landmarks with the updated pose (11, 12; skipped where the problem's
     reading holds them at the mapping's). Frames where the covariance as printed is no longer positive definite (a
     numerically singular innovation covariance) become events, and the status is then `recovered`.
@@ -49,26 +49,25 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
     if in_turn:
         blocks = IndependentLandmarks(problem, problem.measurement)
     else:
-        blocks, _ = map_landmarks(problem, dead_reckoned_path(problem.increment, problem.initial_pose))
+        blocks, _ = map_landmarks(problem, predicted_history(problem).pose)
     measurement, cam_T_imu = problem.measurement, se3.affine_inverse(problem.sequence.imu_T_cam)
-    steps = se3.exp(problem.increment)
-    poses = np.full((T, 4, 4), np.nan)
-    covariances = np.full((T, 6, 6), np.nan)
+    model = motion_model(problem)
+    history = BodyHistory(T, model.start)
     seconds = np.zeros(T)
     events: list[Event] = []
     innovations = Innovations.none(T)
-    pose, covariance = problem.initial_pose, problem.initial_covariance
+    body, covariance = model.start, model.covariance
     failure = ""
     for k, seen in enumerate(o.by_frame(T)):
         frame_start = time.perf_counter()
         row, pixel = rows[seen], o.pixel[seen]
         weight = np.ones(len(row))
         if k > 0:
-            pose = pose @ steps[k - 1]
-            covariance = predicted_covariance(covariance, steps[k - 1], problem.increment_covariance[k - 1])
+            prediction = model.predict(k - 1, body)
+            body, covariance = prediction.body, prediction.covariance(covariance)
             known = blocks.known[row]
             if known.any():
-                innovation = pose_innovation(measurement, cam_T_imu, pose, blocks.mean[row[known]], pixel[known])
+                innovation = pose_innovation(measurement, cam_T_imu, body.pose, blocks.mean[row[known]], pixel[known])
                 innovations.degrees[k] = 3 * len(innovation.residual)
                 if measurement.kernel is not None:
                     weight[known] = measurement.kernel.weight(innovation.nis_per_observation(covariance))
@@ -83,27 +82,25 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
                     if np.all(weight[known] == 1.0)
                     else decoupled_nis(innovation, predicted)
                 )
-                pose, covariance = pose @ se3.exp_one(posterior.correction), posterior.covariance
+                body, covariance = body.corrected(posterior.correction), posterior.covariance
                 if posterior.innovation_condition > SUSPECT_CONDITION:
                     lost = _printed_form_failure(predicted, innovation, weight[known])
                     if lost:
                         events.append(_singular_event(k, posterior.innovation_condition, lost))
-        if not (np.isfinite(pose).all() and np.isfinite(covariance).all()):
+        if not (np.isfinite(body.pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
             break
         if in_turn and len(row):
-            blocks.update(pose, row, pixel, weight)
-        poses[k], covariances[k] = pose, covariance
+            blocks.update(body.pose, row, pixel, weight)
+        history.record(k, body, covariance)
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
     status, reason = _status(failure, events, T)
-    taken = np.isfinite(poses[o.frame, 0, 0])
+    taken = np.isfinite(history.pose[o.frame, 0, 0])
     known = blocks.known & np.isfinite(blocks.mean).all(axis=1)
     return Estimate(
         name="ekf",
-        world_T_imu=poses,
-        covariance=covariances,
         landmarks=Landmarks(problem.features[known], blocks.mean[known], blocks.covariance()[known]),
         used=problem.scatter_mask(taken),
         status=status,
@@ -112,6 +109,7 @@ def _run(problem: Problem, progress: Progress | None) -> Estimate:
         seconds_total=time.perf_counter() - start,
         events=tuple(events),
         innovations=innovations,
+        **history.fields(),
     )
 
 

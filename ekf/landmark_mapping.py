@@ -5,28 +5,26 @@ import time
 import numpy as np
 
 from fgbaseline.data.estimate import Estimate, Landmarks, Progress
-from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from .dead_reckoning import propagated_covariance
 from .landmark_update import IndependentLandmarks
+from .motion_model import predicted_history
 
 
 def landmark_mapping(problem: Problem, progress: Progress | None = None) -> Estimate:
     """Landmarks after one pass over all frames, along the dead-reckoned path taken as known."""
     start = time.perf_counter()
-    world_T_imu = dead_reckoned_path(problem.increment, problem.initial_pose)
-    blocks, seconds = map_landmarks(problem, world_T_imu, progress)
+    history = predicted_history(problem)
+    blocks, seconds = map_landmarks(problem, history.pose, progress)
     known = blocks.known
     return Estimate(
         name="landmark-mapping",
-        world_T_imu=world_T_imu,
-        covariance=propagated_covariance(problem),
         landmarks=Landmarks(problem.features[known], blocks.mean[known], blocks.covariance()[known]),
         used=problem.mask,
         seconds=seconds,
         seconds_total=time.perf_counter() - start,
+        **history.fields(),
     )
 
 

@@ -1,12 +1,17 @@
-"""Pose prediction (equation 9) and measurement update (equation 13) with known landmarks."""
+"""Measurement update of the pose with known landmarks (equation 13).
+
+A body state with further components after the pose has the Jacobian of the pose, padded with zeros.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
-from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, StereoMeasurement
 from fgbaseline.geometry.measurement import predict, squared_norm
+
+from .motion_model import POSE
 
 
 class PoseInnovation(NamedTuple):
@@ -20,9 +25,9 @@ class PoseInnovation(NamedTuple):
     """(r,) of each row, px^2"""
 
     def nis_per_observation(self, covariance: FloatArray) -> FloatArray:
-        """NIS (n,) of each observation alone, r^T (H Sigma H^T + V)^-1 r, for three rows and a Sigma (6, 6)."""
+        """NIS (n,) of each observation alone, r^T (H Sigma H^T + V)^-1 r, for three rows and a Sigma (n, n)."""
         H = self.jacobian
-        return squared_norm(self.residual, H @ covariance @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
+        return squared_norm(self.residual, H @ covariance[:POSE, :POSE] @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
 
 
 def pose_innovation(
@@ -42,12 +47,12 @@ def pose_innovation(
 
 
 class PosePosterior(NamedTuple):
-    """Posterior of the pose (equation 13)."""
+    """Posterior of a body state with an error of n components (equation 13)."""
 
     correction: FloatArray
-    """(6,) K (z - z~), the right perturbation to apply to the predicted pose"""
+    """(n,) K (z - z~), the error to apply to the predicted body state"""
     covariance: FloatArray
-    """(6, 6) (I - K H) Sigma"""
+    """(n, n) (I - K H) Sigma"""
     innovation_condition: float
     """the condition number of H Sigma H^T + I (x) V, whose inverse the printed equation asks for"""
     nis: float
@@ -71,34 +76,26 @@ def pose_posterior(covariance: FloatArray, innovation: PoseInnovation, weight: F
         raise np.linalg.LinAlgError("the innovation is not finite")
     L = np.linalg.cholesky(covariance)
     root = np.sqrt(weight[:, None] / innovation.variance).reshape(-1)
-    stacked = np.vstack([(root[:, None] * innovation.jacobian.reshape(-1, 6)) @ L, np.eye(6)])
-    right = np.concatenate([root * innovation.residual.reshape(-1), np.zeros(6)])
+    n = len(L)
+    stacked = np.vstack([(root[:, None] * innovation.jacobian.reshape(-1, POSE)) @ L[:POSE], np.eye(n)])
+    right = np.concatenate([root * innovation.residual.reshape(-1), np.zeros(n)])
     by_size = np.argsort(-np.abs(stacked).max(axis=1), kind="stable")
     reflections, pivot, tau, _, _ = dgeqp3(np.asfortranarray(stacked[by_size]), overwrite_a=1)
     turned, _, _ = dormqr("L", "T", reflections, tau, right[by_size, None], lwork=len(right), overwrite_c=1)
-    R = np.triu(reflections[:6])
+    R = np.triu(reflections[:n])
     half = dtrtrs(R, L[:, pivot - 1].T, trans=1)[0].T
-    correction: FloatArray = half @ turned[:6, 0]
-    left = turned[6:, 0]
+    correction: FloatArray = half @ turned[:n, 0]
+    left = turned[n:, 0]
     return PosePosterior(correction, half @ half.T, float(np.linalg.norm(R, 2)) ** 2, float(left @ left))
 
 
 def printed_covariance(covariance: FloatArray, innovation: PoseInnovation, weight: FloatArray) -> FloatArray:
-    """Posterior covariance (6, 6) as equation 13 prints it, (I - K H) Sigma, with its rounding errors.
+    """Posterior covariance (n, n) as equation 13 prints it, (I - K H) Sigma, with its rounding errors.
 
     Raises numpy's LinAlgError where H Sigma H^T + I (x) V has no inverse.
     """
-    H = innovation.jacobian.reshape(-1, 6)
+    n = len(covariance)
+    H = np.pad(innovation.jacobian.reshape(-1, POSE), ((0, 0), (0, n - POSE)))
     noise = np.diag((innovation.variance / weight[:, None]).reshape(-1))
     gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + noise)
-    return np.asarray((np.eye(6) - gain @ H) @ covariance, dtype=np.float64)
-
-
-def predicted_covariance(covariance: FloatArray, step: FloatArray, noise: FloatArray) -> FloatArray:
-    """Predicted covariance (6, 6) after a motion `step` (4, 4) with noise W (6, 6) (equation 9).
-
-    F Sigma F^T + W with F = exp(-tau u^curly).
-    """
-    F = se3.adjoint(se3.inverse(step))
-    predicted: FloatArray = F @ covariance @ F.T + noise
-    return 0.5 * (predicted + predicted.T)
+    return np.asarray((np.eye(n) - gain @ H) @ covariance, dtype=np.float64)

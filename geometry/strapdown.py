@@ -14,18 +14,24 @@ v = v^ + dv, b = b^ + db. Within this module velocity errors are in the axes of 
 then depends on nothing but the samples. `world_axes` takes it to the world.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from .se3 import higher_coefficients
-from .so3 import FloatArray, angle_coefficients, exp_so3, hat3
+from .so3 import FloatArray, hat3
 
 STATE = 15
 TRANSLATION, ROTATION, VELOCITY, GYROSCOPE_BIAS, ACCELEROMETER_BIAS = (slice(i, i + 3) for i in range(0, STATE, 3))
 """blocks of the error state"""
-SMALL = 0.1
-"""rad, below which derivatives of the coefficients are taken from their series"""
+SMALL = 1.0
+"""rad, below which coefficients are taken from their series: the closed forms lose digits there"""
+_TERMS = 9
+"""of the series: enough for double precision"""
+_SERIES = np.array(
+    [[1.0 / math.factorial(2 * k + m) for k in range(_TERMS)] for m in (1, 2, 3, 4)]
+    + [[-2.0 * (k + 1) / math.factorial(2 * k + 2 + m) for k in range(_TERMS)] for m in (2, 3, 4)]
+)
 
 
 class ImuMotion(NamedTuple):
@@ -45,78 +51,42 @@ class ImuMotion(NamedTuple):
     """(15, 15) Q, velocity errors in body axes"""
 
 
-class _Pieces(NamedTuple):
-    rotation: FloatArray
-    velocity: FloatArray
-    position: FloatArray
-    transition: FloatArray
+def _coefficients(angle: FloatArray) -> FloatArray:
+    """f1, f2, f3, f4 (f_m the sum of (-x^2)^k / (2k + m)!) and f2'/x, f3'/x, f4'/x of n angles x: (7, n).
 
-
-def _integrals(phi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Coefficients (n,) of W and W^2 in J1, and of W and W^2 in J2, of rotation vectors (n, 3)."""
-    angle = np.linalg.norm(phi, axis=-1)
-    c = angle_coefficients(angle)
-    return c.cosine, c.cubic, c.cubic, higher_coefficients(angle)[0]
-
-
-def _slopes(phi: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Derivatives by the angle x over x, (n,), of (1 - cos x) / x^2, (x - sin x) / x^3, (x^2 / 2 + cos x - 1) / x^4."""
-    angle = np.linalg.norm(phi, axis=-1)
+    f1 to f4 are sin x / x, (1 - cos x) / x^2, (x - sin x) / x^3 and (x^2 / 2 + cos x - 1) / x^4.
+    """
     small = angle < SMALL
-    x2 = np.where(small, angle, 0.0) ** 2
-    y2 = np.where(small, 1.0, angle) ** 2
-    c, quartic = angle_coefficients(angle), higher_coefficients(angle)[0]
-    return (
-        np.where(small, -1 / 12 + x2 * (1 / 180 - x2 / 6720), (c.sine - 2.0 * c.cosine) / y2),
-        np.where(small, -1 / 60 + x2 * (1 / 1260 - x2 / 60480), (c.cosine - 3.0 * c.cubic) / y2),
-        np.where(small, -1 / 360 + x2 * (1 / 10080 - x2 / 604800), (c.cubic - 4.0 * quartic) / y2),
+    series = _SERIES @ (-(np.where(small, angle, 0.0) ** 2)) ** np.arange(_TERMS)[:, None]
+    if small.all():
+        return np.asarray(series)
+    x = np.where(small, 1.0, angle)
+    f1, f2, f3 = np.sin(x) / x, (1.0 - np.cos(x)) / x**2, (x - np.sin(x)) / x**3
+    f4 = (0.5 - f2) / x**2
+    closed = np.stack([f1, f2, f3, f4, (f1 - 2.0 * f2) / x**2, (f2 - 3.0 * f3) / x**2, (f3 - 4.0 * f4) / x**2])
+    return np.where(small, series, closed)
+
+
+def _pieces(phi: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Exp(phi) (n, 3, 3) and [J1, J2, d(J1 a)/dphi, d(J2 a)/dphi] (n, 3, 12) of n pieces.
+
+    `phi` (n, 3) is a piece's rotation vector, `force` (n, 3) its specific force a.
+    """
+    f1, f2, f3, f4, s2, s3, s4 = _coefficients(np.sqrt(np.einsum("ni,ni->n", phi, phi)))[:, :, None, None]
+    W, A = hat3(np.stack([phi, force]))
+    products = W @ np.concatenate([W, A, force[:, :, None]], axis=2)
+    WW, WA, Wa = products[:, :, :3], products[:, :, 3:6], products[:, :, 6:]
+    WWa, row = W @ Wa, phi[:, None, :]
+    minus_WW_slope = hat3(Wa[:, :, 0]) + WA
+    return np.eye(3) + f1 * W + f2 * WW, np.concatenate(
+        [
+            np.eye(3) + f2 * W + f3 * WW,
+            0.5 * np.eye(3) + f3 * W + f4 * WW,
+            (s2 * Wa + s3 * WWa) * row - f2 * A - f3 * minus_WW_slope,
+            (s3 * Wa + s4 * WWa) * row - f3 * A - f4 * minus_WW_slope,
+        ],
+        axis=2,
     )
-
-
-def _integral(linear: FloatArray, quadratic: FloatArray, W: FloatArray, constant: float) -> FloatArray:
-    return constant * np.eye(3) + linear[:, None, None] * W + quadratic[:, None, None] * (W @ W)
-
-
-def _derivative(
-    values: tuple[FloatArray, FloatArray],
-    slopes: tuple[FloatArray, FloatArray],
-    phi: FloatArray,
-    force: FloatArray,
-) -> FloatArray:
-    """(n, 3, 3) derivative by phi of (linear W + quadratic W^2) a."""
-    W, A = hat3(phi), hat3(force)
-    Wa = (W @ force[:, :, None])[:, :, 0]
-    WWa = (W @ Wa[:, :, None])[:, :, 0]
-    linear, quadratic = (value[:, None, None] for value in values)
-    d_linear, d_quadratic = (slope[:, None, None] for slope in slopes)
-    along = d_linear * Wa[:, :, None] + d_quadratic * WWa[:, :, None]
-    return -linear * A - quadratic * (hat3(Wa) + W @ A) + along * phi[:, None, :]
-
-
-def _pieces(angular_velocity: FloatArray, specific_force: FloatArray, dt: FloatArray) -> _Pieces:
-    """Motion and transition of each of n pieces."""
-    phi, h = angular_velocity * dt[:, None], dt[:, None, None]
-    E, W = exp_so3(phi), hat3(phi)
-    a1, a2, b1, b2 = _integrals(phi)
-    J1, J2 = _integral(a1, a2, W, 1.0), _integral(b1, b2, W, 0.5)
-    slope1, slope2, slope3 = _slopes(phi)
-    D1 = _derivative((a1, a2), (slope1, slope2), phi, specific_force)
-    D2 = _derivative((b1, b2), (slope2, slope3), phi, specific_force)
-    gain1 = (J1 @ specific_force[:, :, None])[:, :, 0]
-    gain2 = (J2 @ specific_force[:, :, None])[:, :, 0]
-    Et = np.swapaxes(E, 1, 2)
-    F = np.zeros((len(dt), STATE, STATE))
-    F[:, range(9, STATE), range(9, STATE)] = 1.0
-    F[:, TRANSLATION, TRANSLATION] = F[:, ROTATION, ROTATION] = F[:, VELOCITY, VELOCITY] = Et
-    F[:, TRANSLATION, ROTATION] = -(h**2) * (Et @ hat3(gain2))
-    F[:, TRANSLATION, VELOCITY] = h * Et
-    F[:, TRANSLATION, GYROSCOPE_BIAS] = -(h**3) * (Et @ D2)
-    F[:, TRANSLATION, ACCELEROMETER_BIAS] = -(h**2) * (Et @ J2)
-    F[:, ROTATION, GYROSCOPE_BIAS] = -h * np.swapaxes(J1, 1, 2)  # the right Jacobian of SO(3) is J1^T
-    F[:, VELOCITY, ROTATION] = -h * (Et @ hat3(gain1))
-    F[:, VELOCITY, GYROSCOPE_BIAS] = -(h**2) * (Et @ D1)
-    F[:, VELOCITY, ACCELEROMETER_BIAS] = -h * (Et @ J1)
-    return _Pieces(E, gain1 * dt[:, None], gain2 * dt[:, None] ** 2, F)
 
 
 def integrate(
@@ -127,24 +97,54 @@ def integrate(
     `densities` (4,): noise density and random walk of the gyroscope (rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)), then of the
     accelerometer (m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). White noise is held over a piece, with a variance of
     density^2 / dt: it acts as a bias of that piece does.
+
+    The motion that follows a piece has a transition in closed form. So every piece has a matrix G (9, 6), the
+    derivative of the final pose and velocity by its own bias. A constant bias acts through the sum of all G, a step of
+    the random walk after a piece through the sum of the later ones.
     """
-    pieces = _pieces(angular_velocity, specific_force, dt)
-    sensed = pieces.transition[:, :9, 9:]
-    variance = np.repeat(densities[[0, 2]] ** 2, 3) / dt[:, None]
-    white = (sensed * variance[:, None, :]) @ np.swapaxes(sensed, 1, 2)
-    walk = np.repeat(densities[[1, 3]] ** 2, 3) * dt[:, None]
-    R, v, p, total = np.eye(3), np.zeros(3), np.zeros(3), 0.0
-    F, Q = np.eye(STATE), np.zeros((STATE, STATE))
-    for i, h in enumerate(dt.tolist()):
-        p = p + v * h + R @ pieces.position[i]
-        v = v + R @ pieces.velocity[i]
-        R = R @ pieces.rotation[i]
-        total += h
-        F = pieces.transition[i] @ F
-        Q = pieces.transition[i] @ Q @ pieces.transition[i].T
-        Q[:9, :9] += white[i]
-        Q[range(9, STATE), range(9, STATE)] += walk[i]
-    return ImuMotion(R, v, p, total, F, 0.5 * (Q + Q.T))
+    n = len(dt)
+    rotation, columns = _pieces(angular_velocity * dt[:, None], specific_force)
+    R = np.empty((n + 1, 3, 3))  # before each piece and at the end, in the first body frame
+    R[0] = np.eye(3)
+    for i in range(n):
+        np.matmul(R[i], rotation[i], out=R[i + 1])
+    end = R[-1].T.copy()
+    columns *= np.repeat(np.stack([dt, dt**2, dt**2, dt**3], axis=1), 3, axis=1)[:, None, :]
+    turned = (end @ R[:-1]) @ columns  # from here on in the axes of the last body frame
+    gain, lift, gain_slope, lift_slope = (turned[:, :, i : i + 3] for i in range(0, 12, 3))
+    steps = turned[:, :, :6].reshape(n, 3, 2, 3) @ specific_force[:, None, :, None]
+    v = np.cumsum(steps[:, :, 0, 0], axis=0)  # after each piece
+    p = np.cumsum(steps[:, :, 1, 0] + (v - steps[:, :, 0, 0]) * dt[:, None], axis=0)
+    elapsed = np.cumsum(dt)
+    left = (elapsed[-1] - elapsed)[:, None]  # after each piece
+    v_left = v[-1] - v
+    by_turn = hat3(np.stack([p[-1] - p - v * left, v_left])) @ gain
+    G = np.zeros((n, 9, 6))
+    G[:, TRANSLATION, :3] = by_turn[0] - left[:, :, None] * gain_slope - lift_slope
+    G[:, TRANSLATION, 3:] = -lift - left[:, :, None] * gain
+    G[:, ROTATION, :3] = G[:, VELOCITY, 3:] = -gain
+    G[:, VELOCITY, :3] = by_turn[1] - gain_slope
+    total = G.sum(axis=0)
+    later = np.zeros((n, STATE, 6))  # derivatives by a step of the walk
+    later[:, :9] = total - np.cumsum(G, axis=0)
+    later[:, 9:] = np.eye(6)
+    white, walk = np.repeat(densities[[0, 2]], 3), np.repeat(densities[[1, 3]], 3)
+    Q = _gram(later * walk, dt)
+    Q[:9, :9] += _gram(G * white, 1.0 / dt)
+    P, V = hat3(np.stack([p[-1], v[-1]]))
+    F = np.eye(STATE)
+    F[TRANSLATION, TRANSLATION] = F[ROTATION, ROTATION] = F[VELOCITY, VELOCITY] = end
+    F[TRANSLATION, ROTATION], F[TRANSLATION, VELOCITY] = -P @ end, elapsed[-1] * end
+    F[VELOCITY, ROTATION] = -V @ end
+    F[:9, 9:] = total
+    return ImuMotion(R[-1], R[-1] @ v[-1], R[-1] @ p[-1], float(elapsed[-1]), F, Q)
+
+
+def _gram(factors: FloatArray, weight: FloatArray) -> FloatArray:
+    """Sum (m, m) of w A A^T over factors A (n, m, 6) with weights w (n,)."""
+    stacked = np.swapaxes(factors * np.sqrt(weight)[:, None, None], 0, 1).reshape(factors.shape[1], -1)
+    product: FloatArray = stacked @ stacked.T
+    return product
 
 
 def predict(

@@ -18,13 +18,15 @@ MAX_ATTEMPTS = 20
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FrameUpdate:
-    """New pose with its factors: motion, new landmarks and observations."""
+    """New frame with its factors: motion, new landmarks and observations."""
 
     frame: int
     initial_pose: FloatArray
     """(4, 4) world_T_imu, initial value"""
+    initial_values: gtsam.Values
+    """of the frame's variables"""
     motion_factor: gtsam.NonlinearFactor
-    """between factor from the previous frame, or the prior of the first pose"""
+    """motion from the previous frame, or the prior of the first one"""
     new_landmarks: tuple[NewLandmark, ...]
     tracked: Mapping[int, int]
     """landmark of the graph -> its observation in this frame"""

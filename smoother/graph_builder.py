@@ -12,8 +12,10 @@ from fgbaseline.geometry.measurement import measured_rows
 
 from .frame_update import FrameUpdate
 from .graph.factors import FactorBuilder
+from .graph.frame_states import FrameStates
 from .initialization.landmark_initialization import InitializationCriterion, UninitializedLandmarks
 from .initialization.pose_initialization import refine_predicted_pose
+from .initialization.prediction import predict_state
 from .initialization.windowed_initialization import optimize_window
 
 WINDOW_FRAMES = 2
@@ -31,9 +33,8 @@ class GraphBuilder:
         self._rows = list(measured_rows(self.observations.pixel))
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
-        self._information = np.linalg.inv(problem.increment_covariance)
-        self.online_poses = np.full((problem.n_frames, 4, 4), np.nan)
-        """(T, 4, 4) world_T_imu as estimated online; filled by the solver, as is `landmark_position`"""
+        self.online = FrameStates.unknown(problem)
+        """as estimated online; filled by the solver, as is `landmark_position`"""
         self.landmark_position: dict[int, FloatArray] = {}
         """landmark -> position (3,), m, as estimated at its latest observation"""
 
@@ -48,35 +49,43 @@ class GraphBuilder:
         ]
         for landmark, i in uninitialized:
             self.uninitialized.add(landmark, i)
-        self.online_poses[k] = self._predicted_pose(k, tracked)
+        motion_factor = self._predict(k, tracked)
         candidates = self.uninitialized.candidates([landmark for landmark, _ in uninitialized], first_frame)
-        path = self._windowed_path(k, first_frame) if candidates and not tracked else self.online_poses
-        new_landmarks = self.uninitialized.initialize(candidates, path)
-        motion_factor = self.factors.pose_prior() if k == 0 else self.factors.between(k - 1)
-        return FrameUpdate(k, path[k], motion_factor, tuple(new_landmarks), tracked)
+        states = self._windowed_states(k, first_frame) if candidates and not tracked else self.online
+        new_landmarks = self.uninitialized.initialize(candidates, states.world_T_imu)
+        values = gtsam.Values()
+        states.insert(values, k)
+        return FrameUpdate(k, states.world_T_imu[k], values, motion_factor, tuple(new_landmarks), tracked)
 
-    def _predicted_pose(self, k: int, tracked: dict[int, int]) -> FloatArray:
+    def _predict(self, k: int, tracked: dict[int, int]) -> gtsam.NonlinearFactor:
+        """Set the predicted state of frame k; return the factor of its motion, or the prior of frame 0."""
         if k == 0:
-            return self.problem.initial_pose
-        pose: FloatArray = self.online_poses[k - 1] @ self.factors.steps[k - 1]
-        if not tracked:
-            return pose
-        points = np.array([self.landmark_position[j] for j in tracked])
-        pixel = self.observations.pixel[list(tracked.values())]
-        return refine_predicted_pose(self.problem, self._information[k - 1], pose, points, pixel)
+            self.online.start(self.problem)
+            return self.factors.start_prior()
+        pose, covariance, factor = predict_state(self.factors, self.online, k)
+        if tracked:
+            points = np.array([self.landmark_position[j] for j in tracked])
+            pixel = self.observations.pixel[list(tracked.values())]
+            information: FloatArray = np.linalg.inv(covariance).astype(np.float64)
+            pose = refine_predicted_pose(self.problem, information, pose, points, pixel)
+        self.online.world_T_imu[k] = pose
+        return factor
 
-    def _windowed_path(self, k: int, first_frame: int) -> FloatArray:
-        """Path (T, 4, 4), its last frames optimized on the images, where frame k observes no known landmark.
+    def _windowed_states(self, k: int, first_frame: int) -> FrameStates:
+        """States of which the last are optimized on the images, where frame k observes no known landmark.
 
         At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would
         be so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.
         """
         first = max(k - WINDOW_FRAMES, first_frame)
         if self.problem.landmark_prior is not None or k - first < WINDOW_FRAMES:
-            return self.online_poses
-        path = self.online_poses.copy()
-        path[first : k + 1] = optimize_window(self.factors, self.observations, self.online_poses, first, k)
-        return path
+            return self.online
+        values = optimize_window(self.factors, self.observations, self.online, first, k)
+        if values is None:
+            return self.online
+        states = self.online.copy()
+        states.take_all(values, first, k)
+        return states
 
     def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
         """Stereo factor of one observation of the landmark `key`."""

@@ -24,10 +24,8 @@ def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: 
     imu = raw.samples
     period = imu.period
     inside = np.asarray((sequence.t >= imu.t[0] - period) & (sequence.t <= imu.t[-1] + period), dtype=np.bool_)
-    ranges = (
-        f"the frames are from {sequence.t[0]!r} to {sequence.t[-1]!r} s and the inertial samples from {imu.t[0]!r} to "
-        f"{imu.t[-1]!r} s"
-    )
+    first, last, begin, end = map(float, (sequence.t[0], sequence.t[-1], imu.t[0], imu.t[-1]))
+    ranges = f"the frames are from {first!r} to {last!r} s and the inertial samples from {begin!r} to {end!r} s"
     if int(inside.sum()) < MIN_FRAMES:
         raise InputError(
             f"imu_time_stamps: {ranges}, so that {plural(int(inside.sum()), 'frame')} of {len(inside)} can be used; "

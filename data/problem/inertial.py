@@ -80,8 +80,9 @@ def imu_intervals(samples: ImuSamples, frames: FloatArray) -> ImuIntervals:
     before, after, period = samples.t[0] - frames[0], frames[-1] - samples.t[-1], samples.period
     if max(before, after) > period:
         raise InputError(
-            f"imu_time_stamps: the frames from {frames[0]!r} to {frames[-1]!r} s reach beyond the samples from "
-            f"{samples.t[0]!r} to {samples.t[-1]!r} s by more than a sample period ({period:.4g} s)"
+            f"imu_time_stamps: the frames from {float(frames[0])!r} to {float(frames[-1])!r} s reach beyond the "
+            f"samples from {float(samples.t[0])!r} to {float(samples.t[-1])!r} s by more than a sample period "
+            f"({period:.4g} s)"
         )
     inside = samples.t[(samples.t > frames[0]) & (samples.t < frames[-1])]
     knots = np.union1d(frames, inside)

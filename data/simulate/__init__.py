@@ -17,7 +17,7 @@ A simulated town lies among the real recordings; `pytest -s tests/data/test_simu
 from ..axis_conventions import AXIS_CONVENTIONS, axes_matrix, axes_name
 from .recording import Labels, simulate, simulate_with_labels
 from .rig import HANDHELD, KITTI, Rig
-from .settings import Simulation, Velocities, default_drive
+from .settings import SimulatedImu, Simulation, Velocities, default_drive
 
 __all__ = [
     "AXIS_CONVENTIONS",
@@ -25,6 +25,7 @@ __all__ = [
     "KITTI",
     "Labels",
     "Rig",
+    "SimulatedImu",
     "Simulation",
     "Velocities",
     "axes_matrix",

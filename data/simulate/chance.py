@@ -17,6 +17,8 @@ class Concern(IntEnum):
     BURSTS = 6
     TRAFFIC = 7
     RETURNS = 8
+    IMU_NOISE = 9
+    IMU_BIAS = 10
 
 
 def generator(seed: int, concern: Concern) -> np.random.Generator:

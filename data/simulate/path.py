@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
+from ..imu import STANDARD_GRAVITY
 from ..sequence import Sequence
 from .settings import MAX_TIME_OFFSET, Simulation, Velocities
 
@@ -74,6 +75,27 @@ def handheld_path(t: FloatArray, rng: np.random.Generator) -> Path:
     poses[:, :3, :3] = so3.exp_so3(waves[:, 3:])
     poses[:, :3, 3] = waves[:, :3]
     poses[:, 3, 3] = 1.0
+    return Path.through(t, poses)
+
+
+def drone_path(t: FloatArray, rng: np.random.Generator) -> Path:
+    """A multirotor in a hall: sines of 0.05 to 0.25 Hz (1.5 m/s RMS), its z axis along the thrust, a slow heading."""
+    frequency = rng.uniform(0.05, 0.25, (4, 4))
+    phase = rng.uniform(0.0, 2.0 * np.pi, (4, 4))
+    rate = rng.uniform(0.6, 1.0, (4, 4))
+    rate *= np.array([[1.5], [1.5], [0.5], [0.3]]) * np.sqrt(2.0) / np.linalg.norm(rate, axis=1, keepdims=True)
+    omega = 2.0 * np.pi * frequency
+    angle = omega * t[:, None, None] + phase
+    waves = (rate / omega * np.sin(angle)).sum(axis=2)
+    acceleration = -(rate * omega * np.sin(angle)).sum(axis=2)[:, :3]
+    up = acceleration + np.array([0.0, 0.0, STANDARD_GRAVITY])
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    ahead = np.stack([np.cos(waves[:, 3]), np.sin(waves[:, 3]), np.zeros(len(t))], axis=1)
+    left = np.cross(up, ahead)
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    poses = np.tile(np.eye(4), (len(t), 1, 1))
+    poses[:, :3, :3] = np.stack([np.cross(left, up), left, up], axis=2)
+    poses[:, :3, 3] = waves[:, :3]
     return Path.through(t, poses)
 
 

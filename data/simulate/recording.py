@@ -5,13 +5,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
 from .chance import Concern, generator
+from .inertial import recorded_samples, standing_start
 from .matches import displaced, noisy_pixels, wrong_matches
-from .path import Path, followed, handheld_path, path_along, time_grid
+from .path import Path, drone_path, followed, handheld_path, path_along, time_grid
 from .roads import drive, highway_road, loop_road, town_road
 from .room import Room
 from .settings import MAX_FRAMES, Simulation
@@ -45,10 +46,11 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     """The same, and which observations are wrong or moving."""
     rig = settings.mount
     t, level = _path(settings)
-    origin = se3.inverse(level.at(t[:1])[0])
+    origin = _origin(level.at(t[:1])[0], upright=settings.imu is not None)
     path = level.moved(origin)
     poses = path.at(t)
-    poses[0] = np.eye(4)
+    if settings.imu is None:
+        poses[0] = np.eye(4)
 
     static, moving = _tracks(path.of(rig.body_pose), poses, t, settings)
     m = len(static.first)
@@ -64,7 +66,14 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     pixel = displaced(noisy_pixels(pixel, settings), offset, rig)
 
     order = np.lexsort((tracks.track, tracks.frame))
-    linear, angular = recorded_velocities(path, t, settings)
+    truth = Truth(poses, tracks.first, "simulated")
+    linear = angular = np.empty((0, 3))
+    samples = None
+    if settings.imu is None:
+        linear, angular = recorded_velocities(path, t, settings)
+    else:
+        samples, *inertial = recorded_samples(path, t, settings)
+        truth = Truth(poses, tracks.first, "simulated", *inertial)
     sequence = Sequence(
         name=f"simulated-{settings.path}",
         t=t,
@@ -74,8 +83,9 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
         imu_T_cam=rig.imu_T_cam.copy(),
         observations=Observations(tracks.frame[order], tracks.track[order], pixel[order]),
         n_landmarks=len(tracks.first),
-        truth=Truth(poses, tracks.first, "simulated"),
-        up_imu=origin[:3, 2],
+        imu=samples,
+        truth=truth,
+        up_imu=poses[0, :3, :3].T @ origin[:3, 2],
         form="simulated",
         source=f"simulated: {_described(settings)}",
         remarks=_remarks(settings, wrong),
@@ -83,8 +93,25 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     return sequence, Labels(wrong[order], tracks.track[order] >= m)
 
 
+def _origin(first: FloatArray, *, upright: bool) -> FloatArray:
+    """`world_T_level` (4, 4) for the first pose (4, 4) in a level world: the world is the first IMU frame.
+
+    An upright world has its z axis up and is turned from that frame by the smallest rotation.
+    """
+    if not upright:
+        return se3.inverse(first)
+    world_T_imu = np.eye(4)
+    world_T_imu[:3, :3] = so3.rotation_to_z(first[2, :3])
+    return world_T_imu @ se3.inverse(first)
+
+
 def _path(settings: Simulation) -> tuple[FloatArray, Path]:
     """The frames' times (T,) s, and the IMU's path in a level world: z up."""
+    t, path = _moving_path(settings)
+    return t, standing_start(path, settings.standing) if settings.standing else path
+
+
+def _moving_path(settings: Simulation) -> tuple[FloatArray, Path]:
     imu_T_body = settings.mount.body_pose
     if settings.path == "along":
         velocities = followed(settings)
@@ -106,8 +133,9 @@ def _path(settings: Simulation) -> tuple[FloatArray, Path]:
     t = np.arange(round(settings.seconds * settings.rate)) / settings.rate
     grid = time_grid(float(t[-1]), settings.rate)
     rng = generator(settings.seed, Concern.PATH)
-    if settings.path == "handheld":
-        return t, handheld_path(grid, rng).of(se3.inverse(imu_T_body))
+    if settings.path in ("handheld", "drone"):
+        shape = handheld_path if settings.path == "handheld" else drone_path
+        return t, shape(grid, rng).of(se3.inverse(imu_T_body))
     seconds = float(grid[-1] - grid[0])
     if settings.path == "town":
         road = town_road(13.0 * seconds + 100.0, rng)
@@ -167,6 +195,13 @@ def _described(settings: Simulation) -> str:
 
 def _remarks(settings: Simulation, wrong: BoolArray) -> tuple[str, ...]:
     share = float(wrong.mean()) if len(wrong) else 0.0
+    imu = settings.imu
+    if imu is not None:
+        return (
+            f"simulated: raw inertial samples at {imu.rate:g} Hz with {imu.gyroscope_density:g} rad/s/sqrt(Hz) and "
+            f"{imu.accelerometer_density:g} m/s^2/sqrt(Hz), pixels with {settings.sigma_pixel:g} px a row, "
+            f"{100.0 * share:.1f} % wrong matches",
+        )
     return (
         f"simulated: velocities with noise of {settings.sigma_linear:g} m/s and {settings.sigma_angular:g} rad/s a "
         f"sample, pixels with {settings.sigma_pixel:g} px a row, {100.0 * share:.1f} % wrong matches",

@@ -9,10 +9,11 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..axis_conventions import IDENTITY, axes_matrix
+from ..imu import STANDARD_GRAVITY
 from ..sequence import Sequence
 from .rig import HANDHELD, KITTI, Rig, rig_of
 
-PathName = Literal["town", "loop", "highway", "handheld", "along"]
+PathName = Literal["town", "loop", "highway", "handheld", "drone", "along"]
 WorldName = Literal["street", "room"]
 Interval = Literal["after", "before", "mean"]
 Vector = tuple[float, float, float]
@@ -32,6 +33,36 @@ class Velocities:
     """(T, 3) m/s"""
     angular: FloatArray
     """(T, 3) rad/s"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedImu:
+    """Raw inertial samples in place of body velocities; the defaults are an ADIS16448, as EuRoC has it.
+
+    Raises InputError, naming setting and value, for what cannot be.
+    """
+
+    rate: float = 200.0
+    """Hz"""
+    gyroscope_density: float = 1.7e-4
+    """rad/s/sqrt(Hz)"""
+    gyroscope_walk: float = 2e-5
+    """rad/s^2/sqrt(Hz)"""
+    accelerometer_density: float = 2e-3
+    """m/s^2/sqrt(Hz)"""
+    accelerometer_walk: float = 3e-3
+    """m/s^3/sqrt(Hz)"""
+    accelerometer_bias: Vector = (0.0, 0.0, 0.0)
+    """m/s^2 at the first sample, in recorded axes; that of the gyroscope is `Simulation.gyro_bias`"""
+    gravity: float = STANDARD_GRAVITY
+    """m/s^2"""
+
+    def __post_init__(self) -> None:
+        _require_range("imu.rate", self.rate, low=1.0, high=10_000.0)
+        for name in ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk"):
+            _require_range(f"imu.{name}", getattr(self, name), low=0.0)
+        _require_vector("imu.accelerometer_bias", self.accelerometer_bias)
+        _require_range("imu.gravity", self.gravity, low=0.0, low_open=True)
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -58,9 +89,14 @@ class Simulation:
     """frames a second; 10, or the stamps of `along`"""
     seed: int = 0
     world: WorldName | None = None
-    """what there is to see; a room for `handheld` and for what moves at less than 1.5 m/s, otherwise a street"""
+    """what there is to see; a room for `handheld`, `drone` and what moves at less than 1.5 m/s, otherwise a street"""
     rig: Rig | None = None
-    """camera and extrinsic; by default that of `along`, if it has one, a small rig for `handheld`, else KITTI's car"""
+    """camera and extrinsic; by default that of `along`, a small rig for `handheld` and `drone`, else KITTI's car"""
+
+    standing: float = 0.0
+    """s that the body stands still before it sets off"""
+    imu: SimulatedImu | None = None
+    """raw inertial samples in place of body velocities; their axes, scale, offset and gyroscope bias are those below"""
 
     sigma_linear: float = 0.1
     """m/s, noise of each component of a velocity sample, held over the interval"""
@@ -113,6 +149,7 @@ class Simulation:
             _require_choice("world", self.world, get_args(WorldName))
         if (self.along is None) == (self.path == "along"):
             raise InputError(f"path and along: path 'along' needs velocities to follow, '{self.path}' takes none")
+        _require_range("standing", self.standing, low=0.0, high=1e5)
         _require_range("duration", self.duration, low=0.0, low_open=True, high=1e5)
         _require_range("frame_rate", self.frame_rate, low=0.1, high=1000.0)
         frames = round(self.seconds * self.rate)
@@ -165,7 +202,7 @@ class Simulation:
             return self.world
         linear = self.along.linear_velocity if isinstance(self.along, Sequence) else getattr(self.along, "linear", None)
         slow = linear is not None and bool(np.mean(np.linalg.norm(linear, axis=-1)) < 1.5)
-        return "room" if slow or self.path == "handheld" else "street"
+        return "room" if slow or self.path in ("handheld", "drone") else "street"
 
     @property
     def mount(self) -> Rig:
@@ -174,7 +211,7 @@ class Simulation:
             return self.rig
         if isinstance(self.along, Sequence):
             return rig_of(self.along)
-        return HANDHELD if self.path == "handheld" else KITTI
+        return HANDHELD if self.path in ("handheld", "drone") else KITTI
 
     @property
     def depths(self) -> tuple[float, float]:

@@ -8,11 +8,12 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
 from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FgbaselineError
 
+from ..motion_model import POSE, BodyHistory
 from .filter import JointFilter
-from .gyro_bias import GyroBiasPrior
+from .gyro_bias import BIAS, GyroBiasPrior
 from .settings import JointSettings, Linearization
-from .state import BIAS, POSE
 
 BIAS_BLOCK = slice(POSE, POSE + BIAS)
 
@@ -20,19 +21,29 @@ BIAS_BLOCK = slice(POSE, POSE + BIAS)
 def joint_ekf(problem: Problem, progress: Progress | None = None, settings: JointSettings | None = None) -> Estimate:
     """EKF-SLAM with one joint state: pose, optional gyroscope bias and landmarks, with all cross-covariances.
 
-    A landmark is initialized at its first observation (or at the problem's prior) and marginalized once
-    `JointSettings.unseen_frames` consecutive frames have not observed it. For tracks without longer gaps the poses
-    equal those of the filter that keeps every landmark. A landmark observed again later is initialized as a new one.
-    Marginalized landmarks keep their estimate and covariance.
+    With raw inertial samples the state has velocity and both biases. A landmark is initialized at its first observation
+    (or at the problem's prior) and marginalized once `JointSettings.unseen_frames` consecutive frames have not observed
+    it. For tracks without longer gaps the poses equal those of the filter that keeps every landmark. A landmark
+    observed again later is initialized as a new one. Marginalized landmarks keep their estimate and covariance.
+
+    Raises FgbaselineError for `gyro_bias` in the settings of a problem with raw inertial samples.
     """
+    settings = settings or JointSettings()
+    if problem.imu is not None and settings.gyro_bias is not None:
+        raise FgbaselineError(
+            "joint-ekf-bias takes body velocities only: with raw inertial samples joint-ekf estimates both biases"
+        )
     if len(problem.observations()) == 0:
         return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
     with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _run(problem, progress, settings or JointSettings())
+        return _run(problem, progress, settings)
 
 
 def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`."""
+    """Joint filter that also estimates the gyroscope bias, `Estimate.gyro_bias`, of body velocities.
+
+    Raises FgbaselineError for raw inertial samples.
+    """
     settings = JointSettings(gyro_bias=GyroBiasPrior())
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-bias")
 
@@ -57,33 +68,30 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     start = time.perf_counter()
     T = problem.n_frames
     joint = JointFilter(problem, settings)
-    poses = np.full((T, 4, 4), np.nan)
-    covariances = np.full((T, 6, 6), np.nan)
-    bias = GyroBias(np.full((T, BIAS), np.nan), np.full((T, BIAS, BIAS), np.nan))
+    history = BodyHistory(T, joint.motion.start)
     seconds = np.zeros(T)
     failure = ""
     for k, seen in enumerate(problem.observations().by_frame(T)):
         frame_start = time.perf_counter()
         joint.process_frame(k, seen)
-        covariance = joint.state.P[:POSE, :POSE]
-        if not (np.isfinite(joint.state.pose).all() and np.isfinite(covariance).all()):
+        body, n = joint.state.body, joint.state.n_body
+        covariance = joint.state.P[:n, :n]
+        if not (np.isfinite(body.pose).all() and np.isfinite(covariance).all()):
             failure = f"the pose is not finite after the update of frame {k}"
             break
-        poses[k], covariances[k] = joint.state.pose, covariance
-        if settings.gyro_bias is not None:
-            bias.mean[k], bias.covariance[k] = joint.state.bias, joint.state.P[BIAS_BLOCK, BIAS_BLOCK]
+        history.record(k, body, covariance)
         seconds[k] = time.perf_counter() - frame_start
         if progress is not None:
             progress(k + 1, T)
+    bias = None
     if settings.gyro_bias is not None:
+        bias = GyroBias(history.additive, np.ascontiguousarray(history.covariance[:, BIAS_BLOCK, BIAS_BLOCK]))
         joint.events += _bias_events(bias)
     if not failure:
         joint.finish()
     status, reason = _status(failure, joint, T)
     return Estimate(
         name="joint-ekf",
-        world_T_imu=poses,
-        covariance=covariances,
         landmarks=joint.map.landmarks(problem.features),
         used=problem.scatter_mask(joint.used),
         status=status,
@@ -92,7 +100,8 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
         seconds_total=time.perf_counter() - start,
         events=tuple(joint.events),
         innovations=joint.innovations,
-        gyro_bias=None if settings.gyro_bias is None else bias,
+        gyro_bias=bias,
+        **history.fields(),
     )
 
 

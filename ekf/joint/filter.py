@@ -10,12 +10,15 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import back_projected, measured_rows, predict
 
+from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
 from .gating import gate_observations
+from .gyro_bias import BiasedVelocityMotion
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
 from .settings import JointSettings, Linearization
-from .state import ABSENT, POSE, JointState
+from .state import ABSENT, JointState
+from .unobservable_directions import first_estimate_transition, transform_columns
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 
 MIN_COSINE = 0.05
@@ -49,12 +52,10 @@ class JointFilter:
         self.row_variance = self.measurement.row_variance
         self.feature = problem.feature_row(o.landmark)
         self.measured = measured_rows(o.pixel)
-        self.dt = problem.sequence.dt
-        self.step = se3.exp(problem.increment)
-        self.transition = se3.adjoint(se3.inverse(self.step))
-        prior = settings.gyro_bias
-        bias_covariance = None if prior is None else prior.covariance()
-        self.state = JointState(problem.initial_pose, problem.initial_covariance, m, bias_covariance)
+        self.motion: MotionModel = motion_model(problem)
+        if settings.gyro_bias is not None:
+            self.motion = BiasedVelocityMotion(problem, settings.gyro_bias)
+        self.state = JointState(self.motion.start, self.motion.covariance, m)
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.map = LandmarkMap(m)
         self.n_deferred = 0
@@ -106,18 +107,12 @@ class JointFilter:
         return selected
 
     def _predict(self, k: int) -> None:
-        state, dt, prior = self.state, float(self.dt[k - 1]), self.settings.gyro_bias
-        step, F, Q = self.step[k - 1], self.transition[k - 1], self.problem.increment_covariance[k - 1]
-        if prior is not None:
-            twist = self.problem.increment[k - 1].copy()
-            twist[3:] -= dt * state.bias
-            step = se3.exp_one(twist)
-            F = se3.adjoint(se3.inverse(step))
+        state = self.state
+        prediction = self.motion.predict(k - 1, state.body)
         if self.settings.linearization is Linearization.FIRST_ESTIMATE:
-            F = se3.adjoint(se3.inverse(state.pose @ step) @ state.predicted_pose)
-        if prior is not None:
-            F, Q = prior.augment(twist, dt, F, Q)
-        state.predict(step, F, Q)
+            F = first_estimate_transition(prediction.transition, state.predicted, state.body, prediction.body)
+            prediction = prediction._replace(transition=F)
+        state.predict(prediction)
 
     def _update(self, k: int, index: IntArray) -> bool:
         """Update with observations `index` (n,) of active landmarks; False where the whole frame is rejected."""
@@ -164,7 +159,7 @@ class JointFilter:
         seen = now = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
         if self.settings.linearization is Linearization.FIRST_ESTIMATE:
             seen = predict(
-                self.camera, self.cam_T_imu, state.predicted_pose, homogeneous(charts, state.first_estimate[slot])
+                self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
             )
         H = StackedJacobian(slot, seen.pose_jacobian(), seen.point_jacobian() @ charts[:, :, :3], state.n_body)
         return _LinearizedObservations(index, H, self.measured[index] - now.pixel, np.minimum(now.cosine, seen.cosine))
@@ -181,20 +176,17 @@ class JointFilter:
     def _apply_correction(self, delta: FloatArray) -> None:
         """Apply the correction delta (size,) to the state, and transform P where the linearization is invariant.
 
-        N = [Ad(T^-1); nu], nu being `moved_by` of the landmarks. With - before and + after the move, B takes N- to N+:
-        [[Ad(exp(-delta)), 0], [(nu+ - nu-) Ad(T-), I]]. A bias is not changed by a rigid motion: its rows of N are 0.
+        Landmarks have the rows nu of N, their `motion_jacobian`, and (nu+ - nu-) A of B: `unobservable_directions`.
         """
-        state = self.state
-        before = state.pose
-        step = se3.exp_one(delta[:POSE])
-        state.pose = before @ step
-        state.bias[: state.n_body - POSE] += delta[POSE : state.n_body]
-        by = delta[state.n_body :].reshape(-1, 3)
+        state, n = self.state, self.state.n_body
+        before = state.body
+        state.body = before.corrected(delta[:n])
+        by = delta[n:].reshape(-1, 3)
         if self.settings.linearization is not Linearization.INVARIANT:
             state.xi[:] += by
         else:
-            pose_jacobian = state.correct_landmarks(by).reshape(-1, POSE) @ se3.adjoint(before)
-            state.transform_covariance(se3.adjoint(se3.inverse(step)), pose_jacobian)
+            landmarks = state.correct_landmarks(by).reshape(-1, POSE) @ se3.adjoint(before.pose)
+            state.transform_covariance(np.concatenate([transform_columns(before, state.body, delta[:n]), landmarks]))
 
     def _initialize_from_prior(self, row: IntArray) -> None:
         prior, n = self.problem.landmark_prior, len(row)
@@ -215,7 +207,7 @@ class JointFilter:
         points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
         shared = chart(self.settings.coordinates, world_T_cam)
         xi = coordinates_of(shared, points)
-        at = state.predicted_pose if first_estimate else state.pose
+        at = state.predicted.pose if first_estimate else state.pose
         seen = predict(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
         inverse = np.linalg.inv((seen.point_jacobian().reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
         covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)

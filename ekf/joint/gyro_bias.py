@@ -7,10 +7,14 @@ exp(xi) exp(-dt J_r(xi) [0; d]) to first order, J_r being the right Jacobian of 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
-from .state import BIAS, POSE
+from ..motion_model import POSE, BodyState, Prediction
+
+BIAS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,3 +49,21 @@ class GyroBiasPrior:
         Q[:POSE, :POSE] = noise
         Q[POSE:, POSE:] = self.walk**2 * dt * np.eye(BIAS)
         return F, Q
+
+
+class BiasedVelocityMotion:
+    """Motion by the problem's increments, less the estimated gyroscope bias: the body state's additive component."""
+
+    def __init__(self, problem: Problem, prior: GyroBiasPrior) -> None:
+        self.problem, self.prior, self.dt = problem, prior, problem.sequence.dt
+        self.start = BodyState(problem.initial_pose, np.zeros(BIAS))
+        self.covariance = block_diag(problem.initial_covariance, prior.covariance())
+
+    def predict(self, k: int, body: BodyState) -> Prediction:
+        """Prediction of frame k + 1 from the state of frame k."""
+        dt, twist = float(self.dt[k]), self.problem.increment[k].copy()
+        twist[3:] -= dt * body.additive
+        step = se3.exp_one(twist)
+        F = se3.adjoint(se3.inverse(step))
+        F, Q = self.prior.augment(twist, dt, F, self.problem.increment_covariance[k])
+        return Prediction(BodyState(body.pose @ step, body.additive), F, Q)

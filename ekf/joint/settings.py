@@ -12,9 +12,10 @@ from .landmark_representation import LandmarkRepresentation
 class Linearization(StrEnum):
     """Treatment of the unobservable directions: the common position and orientation of path and map in the world.
 
-    Six directions of the error state, N = [Ad(T^-1); d xi / d g], move everything by one rigid motion g, and H N = 0.
-    They depend on the estimate, which every update changes. The textbook filter then gains spurious information along
-    them and becomes overconfident (Huang, Mourikis and Roumeliotis, IJRR 2010).
+    Six directions of the error state, N = [Ad(T^-1); d xi / d g], move everything by one rigid motion g, and H N = 0;
+    raw inertial samples determine two of them, roll and pitch. N depends on the estimate, which every update changes.
+    The textbook filter then gains spurious information along N and becomes overconfident (Huang, Mourikis and
+    Roumeliotis, IJRR 2010).
     """
 
     TEXTBOOK = "textbook"

@@ -1,9 +1,9 @@
-"""Joint state of EKF-SLAM: pose, optional gyroscope bias and active landmarks, with their full covariance.
+"""Joint state of EKF-SLAM: body state and active landmarks, with their full covariance.
 
-The error state is [delta (6), d (3), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the error
-of the gyroscope bias (only if estimated), then the coordinates of each active landmark in its chart. The covariance
-lives in one square array that grows by doubling. A marginalized landmark is overwritten by the last one, so the active
-part is always the upper left square.
+The error state is [delta (6), d (n - 6), xi_0 (3), xi_1 (3), ...]: the right perturbation [v, w] of world_T_imu, the
+errors of the body's further components (`motion_model`, `gyro_bias`), then the coordinates of each active landmark in
+its chart. The covariance lives in one square array that grows by doubling. A marginalized landmark is overwritten by
+the last one, so the active part is always the upper left square.
 """
 
 from typing import Any
@@ -14,37 +14,25 @@ from numpy.typing import NDArray
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 
+from ..motion_model import POSE, BodyState, Prediction
 from .landmark_representation import WorldPoints, generators, motion_jacobian, world_points
 
-POSE, BIAS = 6, 3
 ABSENT = -1
 
 
 class JointState:
-    """Pose, gyroscope bias and active landmarks, with one joint covariance."""
+    """Body and active landmarks, with one joint covariance."""
 
-    def __init__(
-        self,
-        pose: FloatArray,
-        covariance: FloatArray,
-        n_features: int,
-        bias_covariance: FloatArray | None = None,
-        capacity: int = 64,
-    ) -> None:
-        self.pose = pose
-        self.bias = np.zeros(BIAS)
-        """(3,) rad/s; zero where it is not estimated"""
-        self.n_body = POSE if bias_covariance is None else POSE + BIAS
-        """dimension of pose and bias: offset of the landmarks in the error state"""
-        self.predicted_pose = pose
-        """(4, 4) pose before the update of the current frame"""
+    def __init__(self, body: BodyState, covariance: FloatArray, n_features: int, capacity: int = 64) -> None:
+        self.body = self.predicted = body
+        """`predicted` is the body state before the update of the current frame"""
+        self.n_body = len(covariance)
+        """dimension of the body's error: offset of the landmarks in the error state"""
         self.count = 0
         self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
         """(m,) slot of each of the problem's features; ABSENT where it is not active"""
         self._P = np.zeros((self.n_body + 3 * capacity, self.n_body + 3 * capacity))
-        self._P[:POSE, :POSE] = covariance
-        if bias_covariance is not None:
-            self._P[POSE : self.n_body, POSE : self.n_body] = bias_covariance
+        self._P[: self.n_body, : self.n_body] = covariance
         self._feature = np.zeros(capacity, dtype=np.int64)
         self._xi, self._first_estimate = np.zeros((capacity, 3)), np.zeros((capacity, 3))
         self._charts = np.zeros((capacity, 4, 4))
@@ -62,6 +50,11 @@ class JointState:
     def _slot_arrays(self) -> tuple[NDArray[Any], ...]:
         """Arrays with one entry per landmark slot."""
         return self._feature, self._xi, self._first_estimate, self._charts, self._slot_generators, self._motion_jacobian
+
+    @property
+    def pose(self) -> FloatArray:
+        """Pose (4, 4) world_T_imu."""
+        return self.body.pose
 
     @property
     def size(self) -> int:
@@ -102,27 +95,19 @@ class JointState:
         before[:] = now
         return change
 
-    def predict(self, step: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
-        """Predict (equation 9): move the pose by `step` (4, 4), Sigma <- F Sigma F^T + W.
-
-        `transition` F and `noise` W are (n_body, n_body): of the pose, and of the bias if estimated.
-        """
-        P, body = self.P, self.n_body
+    def predict(self, prediction: Prediction) -> None:
+        """Predict the body (equation 9), with Sigma <- F Sigma F^T + W."""
+        transition, P, body = prediction.transition, self.P, self.n_body
         moved = transition @ P[:body]
         P[:body, body:] = moved[:, body:]
         P[body:, :body] = moved[:, body:].T
-        own = moved[:, :body] @ transition.T + noise
+        own = moved[:, :body] @ transition.T + prediction.noise
         P[:body, :body] = 0.5 * (own + own.T)
-        self.pose = self.predicted_pose = self.pose @ step
+        self.body = self.predicted = prediction.body
 
-    def transform_covariance(self, pose_block: FloatArray, pose_jacobian: FloatArray) -> None:
-        """P <- B P B^T, B = [[pose_block, 0], [pose_jacobian, I]] with blocks (6, 6) and (3 count, 6).
-
-        The bias is unchanged: its rows of `pose_jacobian` would be zero.
-        """
-        P, G = self.P, pose_jacobian
-        if self.n_body > POSE:
-            G = np.concatenate([np.zeros((self.n_body - POSE, POSE)), pose_jacobian])
+    def transform_covariance(self, columns: FloatArray) -> None:
+        """P <- B P B^T with an identity B but for the pose's columns (size, 6)."""
+        P, pose_block, G = self.P, columns[:POSE], columns[POSE:]
         own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
         half = G @ (cross + 0.5 * own @ G.T)
         P[POSE:, POSE:] += half + half.T

@@ -19,7 +19,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.measurement import squared_norm
 
-from .state import POSE
+from ..motion_model import POSE
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -5,8 +5,9 @@ from typing import Any
 
 import click
 
-PATHS = ("town", "loop", "highway", "handheld", "along")
+PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
 INTERVALS = ("after", "before", "mean")
+DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
 
 
 class Interval(click.ParamType[tuple[float, ...]]):
@@ -39,6 +40,16 @@ class Interval(click.ParamType[tuple[float, ...]]):
 @click.option("--duration", help="Seconds.  [default: 60, or all of --along]", type=float)
 @click.option("--frame-rate", help="Frames a second.  [default: 10]", type=float)
 @click.option("--seed", help="Same seed, same bytes.  [default: 0]", type=int)
+@click.option("--standing", help="Seconds that the body stands still first.", type=float)
+@click.option("--imu", is_flag=True, help="Raw inertial samples in place of body velocities.")
+@click.option("--imu-rate", help="Hz, with --imu.  [default: 200]", type=float)
+@click.option(
+    "--imu-noise",
+    help="With --imu: noise density and random walk of the gyroscope, then of the accelerometer (continuous time).  "
+    "[default: 1.7e-4 2e-5 2e-3 3e-3]",
+    type=(float, float, float, float),
+)
+@click.option("--accelerometer-bias", help="m/s^2, with --imu.", type=(float, float, float))
 @click.option("--sigma-linear", help="m/s, noise of a velocity sample.  [default: 0.1]", type=float)
 @click.option("--sigma-angular", help="rad/s, noise of a rate sample.  [default: 0.01]", type=float)
 @click.option("--gyro-bias", help="rad/s, in recorded axes.", type=(float, float, float))
@@ -63,14 +74,23 @@ class Interval(click.ParamType[tuple[float, ...]]):
 @click.option("--blackout", help="Time without features, s; repeatable.", type=Interval("START", "END"), multiple=True)
 @click.option("--moving-share", help="Share of observations on things that move.", type=float)
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-def command(output: Path, along: Path | None, force: bool, **given: Any) -> None:
+def command(
+    output: Path,
+    along: Path | None,
+    force: bool,
+    imu: bool,
+    imu_rate: float | None,
+    imu_noise: tuple[float, float, float, float] | None,
+    accelerometer_bias: tuple[float, float, float] | None,
+    **given: Any,
+) -> None:
     """Simulate a recording and write it to OUTPUT (.npz) with its truth.
 
     The file is the later course form plus `ground_truth` and `landmarks`, and `fgbaseline run` reads it.
     """
     from fgbaseline.data import read, write_npz
     from fgbaseline.data.plural import plural
-    from fgbaseline.data.simulate import Simulation, simulate
+    from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
     from fgbaseline.geometry import InputError
 
     if output.suffix != ".npz":
@@ -81,6 +101,16 @@ def command(output: Path, along: Path | None, force: bool, **given: Any) -> None
     for many, one in (("bursts", "burst"), ("blackouts", "blackout")):
         if one in settings:
             settings[many] = settings.pop(one)
+    inertial: dict[str, Any] = {"rate": imu_rate, "accelerometer_bias": accelerometer_bias}
+    if imu_noise is not None:
+        inertial |= dict(zip(DENSITIES, imu_noise, strict=True))
+    inertial = {name: value for name, value in inertial.items() if value is not None}
+    if inertial and not imu:
+        raise InputError(
+            "imu-rate, imu-noise, accelerometer-bias: they are settings of --imu; add it, or leave them out"
+        )
+    if imu:
+        settings["imu"] = SimulatedImu(**inertial)
     if along is not None:
         settings["along"] = read(along)
         settings.setdefault("path", "along")

@@ -5,20 +5,22 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import gtsam
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray
 
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
-from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
-from ..graph.keys import landmark_key, pose_key
-from ..graph.marginal_covariances import marginal_covariances
+from ..graph.frame_states import FrameStates
+from ..graph.gtsam_conversions import landmarks_from_values, poses_from_values
+from ..graph.keys import landmark_key
+from ..initialization.inertial_windows import inertial_states
 from ..initialization.initial_values import determined_observations, restricted_problem, select_landmarks
 from ..initialization.landmark_initialization import InitializationCriterion
+from ..initialization.windowed_initialization import optimize_in_windows
 from ..isam2.estimator import isam2
 from .full_graph import full_graph
 from .levenberg_marquardt import LocalMinimum, optimize_from_estimate, optimize_from_path
@@ -49,27 +51,27 @@ def batch(problem: Problem, progress: Progress | None = None, given: Mapping[str
 
 def _solve(problem: Problem, answer: Estimate) -> Estimate:
     start = time.perf_counter()
-    T, path = problem.n_frames, dead_reckoned_path(problem.increment, problem.initial_pose)
-    failed = answer.status is Status.FAILED
-    used = determined_observations(problem, path, InitializationCriterion()) if failed else answer.used
+    T, failed = problem.n_frames, answer.status is Status.FAILED
+    around = _dead_reckoned(problem, windows=False) if failed else FrameStates.of_estimate(answer)
+    used = determined_observations(problem, around.world_T_imu, InitializationCriterion()) if failed else answer.used
     events: list[Event] = []
     while used.any():
         kept = restricted_problem(problem, used)
-        minima = _minima(kept, path, None if failed else answer, events)
+        graph = full_graph(kept, around)
+        minima = _minima(graph, kept, None if failed else answer, events)
         if not minima:
             break
         best = min(minima, key=lambda minimum: minimum.cost)
-        world_T_imu = poses_from_values(best.values, range(T))
-        gone = cheirality_violations(
-            kept, kept.observations(), world_T_imu, landmarks_from_values(best.values, _keys(kept))
-        )
+        states = FrameStates.unknown(kept)
+        states.take_all(best.values)
+        landmarks = landmarks_from_values(best.values, _keys(kept))
+        gone = cheirality_violations(kept, kept.observations(), states.world_T_imu, landmarks)
         if not gone:
-            covariance, landmarks = _marginals(kept, best, events)
+            landmarks = _marginals(graph, kept, best, states, events)
             status, reason = _status(answer, events)
-            return Estimate(
+            estimate = Estimate(
                 name="batch",
-                world_T_imu=world_T_imu,
-                covariance=covariance,
+                world_T_imu=states.world_T_imu,
                 landmarks=landmarks,
                 used=used,
                 status=status,
@@ -77,6 +79,7 @@ def _solve(problem: Problem, answer: Estimate) -> Estimate:
                 seconds_total=time.perf_counter() - start,
                 events=(*events, _costs(minima, T - 1)),
             )
+            return states.answer(estimate)
         # Such a landmark pulls at nothing and its residual means nothing: the costs with it cannot be compared.
         events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in gone]
         used = used & ~np.isin(problem.sequence.observations.landmark, gone)
@@ -90,13 +93,27 @@ def _status(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
     return (Status.RECOVERED, ", ".join(trouble)) if trouble else (Status.OK, "")
 
 
-def _minima(kept: Problem, path: FloatArray, answer: Estimate | None, events: list[Event]) -> list[LocalMinimum]:
+def _dead_reckoned(problem: Problem, *, windows: bool = True) -> FrameStates:
+    """States by the motion, corrected by the images window by window, as they always are with raw inertial data."""
+    if problem.imu is not None:
+        return inertial_states(problem)
+    path = dead_reckoned_path(problem.increment, problem.initial_pose)
+    states = FrameStates.unknown(problem)
+    states.world_T_imu = optimize_in_windows(problem, path) if windows else path
+    return states
+
+
+def _minima(
+    graph: gtsam.NonlinearFactorGraph, kept: Problem, answer: Estimate | None, events: list[Event]
+) -> list[LocalMinimum]:
     """Where the descents end; one that GTSAM breaks off is an event."""
-    graph = full_graph(kept)
-    starts: list[Callable[[], LocalMinimum]] = [lambda: optimize_from_path(graph, kept, DEAD_RECKONING, path)]
+    starts: list[Callable[[], LocalMinimum]] = [
+        lambda: optimize_from_path(graph, kept, DEAD_RECKONING, _dead_reckoned(kept))
+    ]
     if answer is not None:
         landmarks = select_landmarks(answer.landmarks, np.unique(kept.observations().landmark))
-        starts.append(lambda: optimize_from_estimate(graph, ISAM2, answer.world_T_imu, landmarks))
+        states = FrameStates.of_estimate(answer)
+        starts.append(lambda: optimize_from_estimate(graph, ISAM2, states, landmarks))
     minima = []
     for descend in starts:
         try:
@@ -121,15 +138,18 @@ def _costs(minima: list[LocalMinimum], last: int) -> Event:
     return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {told}: {apart}; the lower one counts")
 
 
-def _marginals(kept: Problem, best: LocalMinimum, events: list[Event]) -> tuple[FloatArray, Landmarks]:
-    T, keys = kept.n_frames, _keys(kept)
+def _marginals(
+    graph: gtsam.NonlinearFactorGraph, kept: Problem, best: LocalMinimum, states: FrameStates, events: list[Event]
+) -> Landmarks:
+    """Landmarks with their covariances; those of the states are set."""
+    keys = _keys(kept)
     try:
-        covariance = marginal_covariances(full_graph(kept), best.values)
+        covariance = states.take_marginals(kept, graph, best.values)
     except RuntimeError:
-        events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
-        return np.full((T, 6, 6), np.nan), landmarks_from_values(best.values, keys)
-    poses = pose_covariances(kept, [covariance[pose_key(k)] for k in range(T)])
-    return poses, landmarks_from_values(best.values, keys, covariance)
+        last = kept.n_frames - 1
+        events.append(Event(last, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
+        return landmarks_from_values(best.values, keys)
+    return landmarks_from_values(best.values, keys, covariance)
 
 
 def _keys(problem: Problem) -> dict[int, int]:

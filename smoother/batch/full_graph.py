@@ -7,15 +7,23 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry.measurement import measured_rows
 
 from ..graph.factors import FactorBuilder
+from ..graph.frame_states import FrameStates, start_bias
 from ..graph.keys import landmark_key
 
 
-def full_graph(problem: Problem) -> gtsam.NonlinearFactorGraph:
-    """Graph with the first pose, increments, unmasked observations and landmark priors."""
+def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.NonlinearFactorGraph:
+    """Graph with the start, the motions, unmasked observations and landmark priors.
+
+    Raw inertial samples are integrated with the biases of `states`, by default with those of the start; how near these
+    are to the solution matters to second order only.
+    """
     factors, graph = FactorBuilder(problem), gtsam.NonlinearFactorGraph()
-    graph.push_back(factors.pose_prior())
+    if states is None:
+        states = FrameStates.unknown(problem)
+        states.bias[:] = start_bias(problem)
+    graph.push_back(factors.start_prior())
     for k in range(problem.n_frames - 1):
-        graph.push_back(factors.between(k))
+        graph.push_back(factors.motion(k, states))
     o = problem.observations()
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
         graph.push_back(factors.stereo(k, landmark_key(j), rows))

@@ -6,12 +6,10 @@ import gtsam
 
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray
 
+from ..graph.frame_states import FrameStates
 from ..graph.gauss_newton import gauss_newton
-from ..graph.gtsam_conversions import values_from_state
 from ..initialization.initial_values import initial_landmarks
-from ..initialization.windowed_initialization import optimize_in_windows
 
 LM_STEPS, LM_DECREASE = 100, 1e-6
 """Levenberg-Marquardt goes on until a step lowers the cost by no more than this share: it is near then"""
@@ -31,18 +29,17 @@ class LocalMinimum(NamedTuple):
 
 
 def optimize_from_estimate(
-    graph: gtsam.NonlinearFactorGraph, start: str, world_T_imu: FloatArray, landmarks: Landmarks
+    graph: gtsam.NonlinearFactorGraph, start: str, states: FrameStates, landmarks: Landmarks
 ) -> LocalMinimum:
     """Optimize from the estimate of another smoother."""
-    return _levenberg_marquardt(graph, start, values_from_state(world_T_imu, landmarks), NEAR)
+    return _levenberg_marquardt(graph, start, states.values(landmarks), NEAR)
 
 
 def optimize_from_path(
-    graph: gtsam.NonlinearFactorGraph, problem: Problem, start: str, world_T_imu: FloatArray
+    graph: gtsam.NonlinearFactorGraph, problem: Problem, start: str, states: FrameStates
 ) -> LocalMinimum:
-    """Optimize from a path alone, after windowed initialization; `graph` is that of `problem`."""
-    path = optimize_in_windows(problem, world_T_imu)
-    return _levenberg_marquardt(graph, start, values_from_state(path, initial_landmarks(problem, path)), FAR)
+    """Optimize from the states of a path alone; `graph` is that of `problem`."""
+    return _levenberg_marquardt(graph, start, states.values(initial_landmarks(problem, states.world_T_imu)), FAR)
 
 
 def _levenberg_marquardt(

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..errors import IndeterminateSystemError, UnrecoverableError, named_variable
 from ..graph.gauss_newton import compact_graph
-from ..graph.keys import landmark_of
+from ..graph.keys import landmark_of, width
 from ..graph.marginal_covariances import marginal_covariances
 from ..isam2.settings import ISAM2Settings
 
@@ -28,18 +28,19 @@ class Checkpoint(NamedTuple):
     linearization_point: gtsam.Values
     times: dict[int, float]
 
-    def covariances(self, keys: Collection[int]) -> dict[int, FloatArray]:
-        """Covariances of some variables by key: all others are eliminated first."""
+    def covariances(self, together: Collection[list[int]]) -> dict[int, FloatArray]:
+        """Joint covariances of lists of variables by their first keys: all others are eliminated first."""
+        keys = [key for each in together for key in each]
         if len(keys) == len(self.times):
-            return marginal_covariances(self.factors, self.linearization_point)
-        marginal = self.factors.linearize(self.linearization_point).marginal(list(keys))
-        ordering, widths = gtsam.Ordering(), []
+            return marginal_covariances(self.factors, self.linearization_point, together)
+        marginal = self.factors.linearize(self.linearization_point).marginal(keys)
+        ordering = gtsam.Ordering()
         for key in keys:
             ordering.push_back(key)
-            widths.append(6 if landmark_of(key) is None else 3)
         joint: FloatArray = np.linalg.inv(marginal.hessian(ordering)[0]).astype(np.float64)
-        ends = np.cumsum(widths)
-        return {key: joint[end - w : end, end - w : end] for key, end, w in zip(keys, ends, widths, strict=True)}
+        ends = np.cumsum([sum(map(width, each)) for each in together]).tolist()
+        starts = [0, *ends]
+        return {each[0]: joint[a:b, a:b] for each, a, b in zip(together, starts, ends, strict=False)}
 
 
 class CheckpointedFixedLag:
@@ -146,12 +147,9 @@ class CheckpointedFixedLag:
                 continue
             graph.push_back(factor)
         times = {key: time for key, time in checkpoint.times.items() if key not in forgotten or key in in_marginals}
-        values = gtsam.Values()
-        for key in times:
-            if landmark_of(key) is None:
-                values.insert(key, checkpoint.linearization_point.atPose3(key))
-            else:
-                values.insert(key, checkpoint.linearization_point.atPoint3(key))
+        values = gtsam.Values(checkpoint.linearization_point)
+        for key in checkpoint.times.keys() - times.keys():
+            values.erase(key)
         return self._with_loose_priors(Checkpoint(graph, values, times), in_marginals)
 
     def _with_loose_priors(self, checkpoint: Checkpoint, landmarks: Collection[int]) -> Checkpoint:

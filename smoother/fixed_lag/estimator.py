@@ -13,7 +13,7 @@ from fgbaseline.data.problem import Problem
 from ..errors import UnrecoverableError
 from ..frame_update import add_with_recovery
 from ..graph.cheirality import CHEIRALITY_VIOLATION
-from ..graph.gtsam_conversions import in_first_pose_frame
+from ..graph.gtsam_conversions import in_solver_frame
 from ..graph_builder import GraphBuilder
 from ..isam2.settings import ISAM2Settings
 from .window import FixedLagWindow
@@ -36,8 +36,8 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     new to the graph. Indeterminate systems are handled as in `isam2`.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        answer = _solve(in_first_pose_frame(problem), progress, settings or FixedLagSettings())
-        return answer.moved(problem.initial_pose)
+        posed, world_T_solver = in_solver_frame(problem)
+        return _solve(posed, progress, settings or FixedLagSettings()).moved(world_T_solver)
 
 
 def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:
@@ -57,7 +57,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
             return Estimate.failed("fixed-lag", str(error), T, len(problem.excluded))
         dropped |= cost.landmarks
         events += cost.events
-        builder.online_poses[k] = window.pose(k)
+        window.take_newest(builder.online)
         for j in builder.observations.landmark[observed].tolist():
             if j in window.key:
                 builder.landmark_position[j] = window.position(j)
@@ -67,10 +67,9 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
     window.store_marginalized(np.inf, ())
     events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in window.lost]
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
-    return Estimate(
+    estimate = Estimate(
         name="fixed-lag",
-        world_T_imu=window.path,
-        covariance=window.covariance,
+        world_T_imu=window.states.world_T_imu,
         landmarks=window.landmarks(),
         used=problem.scatter_mask(window.used),
         status=Status.RECOVERED if trouble else Status.OK,
@@ -79,3 +78,4 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         seconds_total=time.perf_counter() - start,
         events=tuple(events),
     )
+    return window.states.answer(estimate)

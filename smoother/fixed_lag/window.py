@@ -13,8 +13,10 @@ from fgbaseline.geometry import FloatArray
 from ..errors import IndeterminateSystemError
 from ..frame_update import FrameUpdate
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
-from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
-from ..graph.keys import distance_key, landmark_of, pose_key
+from ..graph.frame_states import FrameStates
+from ..graph.gtsam_conversions import landmarks_from_values, poses_from_values
+from ..graph.keys import distance_key, landmark_of, state_keys, width
+from ..graph.marginal_covariances import joint_covariance
 from ..graph_builder import GraphBuilder
 from ..isam2.settings import ISAM2Settings
 from .checkpointed_fixed_lag import CheckpointedFixedLag
@@ -37,9 +39,8 @@ class FixedLagWindow:
         """frame in the window"""
         self.newest = -1
         self.used = np.zeros(len(builder.observations), dtype=np.bool_)
-        self.path = np.full((problem.n_frames, 4, 4), np.nan)
-        """(T, 4, 4) world_T_imu of marginalized frames, from all data in the window then"""
-        self.covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        self.states = FrameStates.unknown(problem)
+        """of marginalized frames, from all data in the window then"""
         self.lost: list[int] = []
         """landmarks that violated cheirality when they were marginalized"""
         self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}
@@ -48,7 +49,7 @@ class FixedLagWindow:
         """See `IncrementalGraph.add`."""
         k, now = update.frame, float(self._problem.sequence.t[update.frame])
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
+        values.insert(update.initial_values)
         graph.push_back(update.motion_factor)
         new: dict[int, int] = {}
         for entry in update.new_landmarks:
@@ -64,7 +65,7 @@ class FixedLagWindow:
         for j, i in update.tracked.items():
             graph.push_back(self._builder.stereo(i, self.key[j]))
         seen = new | {j: self.key[j] for j in update.tracked}
-        times = {pose_key(k): now} | dict.fromkeys(seen.values(), now)
+        times = dict.fromkeys(state_keys(k, self.states.inertial), now) | dict.fromkeys(seen.values(), now)
         forgotten = {self.key[j] for j in dropped if j in self.key}
         try:
             self._lag.update(graph, values, times, forgotten)
@@ -114,7 +115,7 @@ class FixedLagWindow:
         if not landmarks:
             return []
         values = self._lag.smoother.calculateEstimate()
-        path = np.full_like(self.path, np.nan)
+        path = np.full_like(self.states.world_T_imu, np.nan)
         path[self.oldest : self.newest + 1] = poses_from_values(values, range(self.oldest, self.newest + 1))
         o = self._builder.observations.select(np.sort([i for j in landmarks for i in self._observed[j]]))
         o = o.select(o.frame >= self.oldest)
@@ -122,9 +123,16 @@ class FixedLagWindow:
             self._problem, o, path, landmarks_from_values(values, {j: self.key[j] for j in landmarks})
         )
 
-    def pose(self, frame: int) -> FloatArray:
-        """Pose world_T_imu (4, 4) of a frame in the window."""
-        return np.asarray(self._lag.smoother.calculateEstimatePose3(pose_key(frame)).matrix(), dtype=np.float64)
+    def take_newest(self, states: FrameStates) -> None:
+        """Set the newest state; the covariance is needed, and so set, with raw inertial data only."""
+        state = state_keys(self.newest, states.inertial)
+        states.take(self.newest, self._estimate(state))
+        if states.inertial:
+            joint = joint_covariance(self._lag.smoother.getISAM2(), state)
+            states.take_covariances(self._problem, self.newest, [joint])
+
+    def _estimate(self, keys: list[int]) -> gtsam.Values:
+        return self._lag.smoother.getISAM2().calculateEstimate(keys)
 
     def position(self, landmark: int) -> FloatArray:
         """Position (3,), m, of a landmark in the window."""
@@ -137,10 +145,11 @@ class FixedLagWindow:
         leaving = [j for j, time in self._last_seen.items() if time < now - self._seconds and j not in seen]
         if not frames and not leaving:
             return
-        covariance = self._covariances([*map(pose_key, frames), *(self.key[j] for j in leaving)])
-        for frame in frames:
-            self.path[frame] = self.pose(frame)
-            self.covariance[frame] = pose_covariances(self._problem, [covariance[pose_key(frame)]], frame)[0]
+        states = {frame: state_keys(frame, self.states.inertial) for frame in frames}
+        covariance = self._covariances([*states.values(), *([self.key[j]] for j in leaving)])
+        for frame, state in states.items():
+            self.states.take(frame, self._estimate(state))
+            self.states.take_covariances(self._problem, frame, [covariance[state[0]]])
         lost = self.cheirality_violations(leaving)
         self.lost += lost
         for j in leaving:
@@ -149,12 +158,12 @@ class FixedLagWindow:
             else:
                 self._landmark[j] = (self.position(j), covariance[self.key[j]])
 
-    def _covariances(self, keys: list[int]) -> dict[int, FloatArray]:
-        """Covariances of variables by key; NaN where they are indeterminate."""
+    def _covariances(self, together: list[list[int]]) -> dict[int, FloatArray]:
+        """Joint covariances of lists of variables, by their first keys; NaN where they are indeterminate."""
         try:
-            return self._lag.checkpoint.covariances(keys)
+            return self._lag.checkpoint.covariances(together)
         except (RuntimeError, np.linalg.LinAlgError):
-            size = {key: 6 if landmark_of(key) is None else 3 for key in keys}
+            size = {keys[0]: sum(map(width, keys)) for keys in together}
             return {key: np.full((n, n), np.nan) for key, n in size.items()}
 
     def landmarks(self) -> Landmarks:

@@ -9,7 +9,9 @@ import numpy as np
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
+from .frame_states import FrameStates
 from .gtsam_conversions import reorder_tangent
+from .inertial_factors import InertialFactors
 from .keys import pose_key
 
 FIXED_POSE_SIGMA = 1e-6
@@ -27,11 +29,33 @@ class FactorBuilder:
         self.stereo_noise = stereo_noise(problem)
         self.steps = se3.exp(problem.increment)
         self.step_covariance = reorder_tangent(problem.increment_covariance)
+        self.inertial = (
+            None
+            if problem.imu is None or problem.start is None
+            else InertialFactors(problem.imu, problem.start, problem.initial_pose, self.fixed_pose_sigmas)
+        )
 
     @property
     def fixed_pose_sigmas(self) -> FloatArray:
         """Standard deviations (6,), rad and m, of a fixed pose."""
         return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
+
+    def start_prior(self) -> gtsam.NonlinearFactor:
+        """Prior factor of frame 0."""
+        return self.pose_prior() if self.inertial is None else self.inertial.start_prior()
+
+    def motion(self, frame: int, states: FrameStates) -> gtsam.NonlinearFactor:
+        """Factor of the motion from `frame` to the next; samples are integrated with the frame's biases."""
+        if self.inertial is None:
+            return self.between(frame)
+        return self.inertial.motion(frame, self.inertial.preintegrated(frame, states.bias[frame]))
+
+    def held_state(self, frame: int, states: FrameStates) -> gtsam.NonlinearFactor:
+        """Prior factor that holds the pose of a frame; velocity and biases have the covariance that they have then."""
+        if self.inertial is not None:
+            return self.inertial.held_pose(frame, states)
+        held = gtsam.noiseModel.Diagonal.Sigmas(self.fixed_pose_sigmas)
+        return gtsam.PriorFactorPose3(pose_key(frame), gtsam.Pose3(states.world_T_imu[frame]), held)
 
     def pose_prior(self) -> gtsam.PriorFactorPose3:
         """Prior factor of the pose of frame 0."""

@@ -9,50 +9,105 @@ import numpy as np
 
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3, so3
+from fgbaseline.geometry import FloatArray, se3, so3, strapdown
 
 from .keys import landmark_key, pose_key
 
 ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """Index that takes [v, w] (ours) to [w, v] (GTSAM), and back."""
+STATE_ORDER = np.r_[ROTATION_FIRST, 6:9, 12:15, 9:12]
+"""Index that takes our error state, and noise, to GTSAM's, which has the accelerometer's bias first, and back."""
+HELD_VARIANCE = 1e-9
+"""as a share of the largest in a block of a start's covariance: what is no more than this is rounding"""
 
 
-def in_first_pose_frame(problem: Problem) -> Problem:
-    """Express the problem in the frame of its first pose; `Estimate.moved` by that pose undoes it.
+def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
+    """The problem in the frame of its first pose, and that pose (4, 4); `Estimate.moved` by it undoes the change.
 
     GTSAM relinearizes a landmark by each coordinate of its step in the world: what an incremental solver does would
-    depend on how the world is turned.
+    depend on how the world is turned. With raw inertial data z stays up, and the frame is that of the first pose but
+    for the smallest rotation that takes the pose's up to z.
     """
-    world_T_first, prior = problem.initial_pose, problem.landmark_prior
-    if np.array_equal(world_T_first, np.eye(4)):
-        return problem
+    first = np.eye(4) if problem.imu is None else _level(problem)
+    world_T_solver = problem.initial_pose if problem.imu is None else problem.initial_pose @ se3.inverse(first)
+    prior, start = problem.landmark_prior, problem.start
+    if np.array_equal(world_T_solver, np.eye(4)):
+        return problem, world_T_solver
+    solver_T_world = se3.inverse(world_T_solver)
+    R = solver_T_world[:3, :3]
     if prior is not None:
-        first_T_world = se3.inverse(world_T_first)
-        R = first_T_world[:3, :3]
-        prior = replace(prior, mean=se3.transform(first_T_world, prior.mean), covariance=R @ prior.covariance @ R.T)
-    return replace(problem, initial_pose=np.eye(4), landmark_prior=prior)
+        prior = replace(prior, mean=se3.transform(solver_T_world, prior.mean), covariance=R @ prior.covariance @ R.T)
+    if start is not None:
+        turn = np.eye(strapdown.STATE)
+        turn[strapdown.VELOCITY, strapdown.VELOCITY] = R
+        start = replace(start, velocity=R @ start.velocity, covariance=turn @ start.covariance @ turn.T)
+    return replace(problem, initial_pose=first, landmark_prior=prior, start=start), world_T_solver
 
 
-def pose_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
-    """Covariances (n, 6, 6) of the poses of the frames from `first` on, from GTSAM's order to ours.
+def _level(problem: Problem) -> FloatArray:
+    """Pose (4, 4) at the origin with the tilt of the first pose, by the smallest rotation (about x if upside down)."""
+    up = problem.initial_pose[2, :3]
+    axis = np.array([up[1], -up[0], 0.0])
+    sine = float(np.linalg.norm(axis))
+    axis = axis / sine if sine > 0.0 else np.array([1.0, 0.0, 0.0])
+    level = np.eye(4)
+    level[:3, :3] = so3.exp_so3(np.arctan2(sine, up[2]) * axis)
+    return level
 
-    That of a first pose that the problem holds is zero, and not what stands for zero in the graph.
+
+def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
+    """Covariances (n, 6, 6) of the poses of the frames from `first` on, or (n, 15, 15) of their states, from GTSAM's
+    order to ours.
+
+    Directions of the first pose that the problem holds have none, and not what stands for zero in the graph.
     """
     matrix = reorder_tangent(covariance)
-    if first == 0 and not problem.initial_covariance.any():
+    if problem.start is not None:
+        matrix = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
+    if first == 0 and problem.start is not None:
+        free = np.eye(len(STATE_ORDER))
+        free[:6, :6] -= held_directions(problem.start.covariance)
+        matrix[:1] = free @ matrix[:1] @ free
+    elif first == 0 and not problem.initial_covariance.any():
         matrix[:1] = 0.0
     return matrix
 
 
+def held_directions(covariance: FloatArray) -> FloatArray:
+    """Projection (6, 6) onto the directions of the pose that have no variance in a start's covariance (15, 15)."""
+    held = np.zeros((6, 6))
+    for block in (slice(0, 3), slice(3, 6)):
+        variance, axes = np.linalg.eigh(covariance[block, block])
+        without = axes[:, variance <= HELD_VARIANCE * max(float(variance[-1]), 0.0)]
+        held[block, block] = without @ without.T
+    return held
+
+
 def reorder_tangent(covariance: Any) -> FloatArray:
-    """A covariance or information matrix (..., 6, 6) from [v, w] to [w, v], or back."""
+    """A covariance or information matrix, (..., 6, 6) of a pose or (..., 15, 15) of a state, to GTSAM's order, or
+    back."""
     matrix = np.asarray(covariance, dtype=np.float64)
-    return matrix[..., ROTATION_FIRST[:, None], ROTATION_FIRST[None, :]]
+    order = ROTATION_FIRST if matrix.shape[-1] == len(ROTATION_FIRST) else STATE_ORDER
+    return matrix[..., order[:, None], order[None, :]]
+
+
+def bias_to_gtsam(bias: FloatArray) -> gtsam.imuBias.ConstantBias:
+    """Biases (6,), gyroscope first, as GTSAM has them."""
+    return gtsam.imuBias.ConstantBias(bias[3:], bias[:3])
+
+
+def bias_from_gtsam(bias: gtsam.imuBias.ConstantBias) -> FloatArray:
+    """Biases (6,), gyroscope first."""
+    return np.concatenate([bias.gyroscope(), bias.accelerometer()])
 
 
 def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
     """Poses world_T_imu (n, 4, 4) of the frames, renormalized: GTSAM's lose that by rounding in long descents."""
-    poses = np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4)
+    return rigid_poses(np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4))
+
+
+def rigid_poses(poses: FloatArray) -> FloatArray:
+    """Poses (n, 4, 4), changed in place: the rotations normalized."""
     poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
     return poses
 

@@ -11,7 +11,10 @@ import math
 import gtsam
 import numpy as np
 
-POSE = "x"
+from fgbaseline.geometry import FloatArray
+
+POSE, VELOCITY, BIAS = "x", "v", "w"
+"""the letters of a frame's variables; b is that of a class of landmarks"""
 LANDMARK = "l"
 """the letter where no thresholds are at work"""
 LETTERS = "abcdefghijk"
@@ -22,18 +25,36 @@ NEAREST, RATIO = 10.0, 1.6
 _LETTER_AT = 56
 """the bit of a key from which on it holds its letter, as in `gtsam.symbol`, which costs ten times as much"""
 _POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
+_VELOCITIES, _BIASES = ord(VELOCITY) << _LETTER_AT, ord(BIAS) << _LETTER_AT
 
 AUXILIARY_POSE = ord("z") << _LETTER_AT
 """the key of a pose that hangs on the newest one alone and is eliminated after it.
 
 It tells nothing, but makes a root of two poses, where the covariance of the newest one is at hand. Without it GTSAM
 would find that pose at the end of a clique with all that a frame sees, and invert the whole of it for each frame.
+With raw inertial data it hangs on all variables of the newest frame.
 """
+_FRAME_LETTERS = frozenset([*map(ord, (POSE, VELOCITY, BIAS)), AUXILIARY_POSE >> _LETTER_AT])
 
 
 def pose_key(frame: int) -> int:
     """The key of the pose of a frame."""
     return _POSES | frame
+
+
+def frame_of(key: int) -> int:
+    """The frame of a variable of a frame."""
+    return key & ((1 << _LETTER_AT) - 1)
+
+
+def state_keys(frame: int, inertial: bool) -> list[int]:
+    """The keys of a frame's variables: its pose, and with raw inertial data its velocity and its biases."""
+    return [_POSES | frame, _VELOCITIES | frame, _BIASES | frame] if inertial else [_POSES | frame]
+
+
+def width(key: int) -> int:
+    """How many numbers the tangent of a variable has."""
+    return 6 if key >> _LETTER_AT in (ord(POSE), ord(BIAS)) else 3
 
 
 def landmark_key(landmark: int) -> int:
@@ -48,14 +69,19 @@ def distance_key(landmark: int, distance: float) -> int:
 
 
 def landmark_of(key: int) -> int | None:
-    """The landmark that a key stands for; None for a pose."""
-    return None if key == AUXILIARY_POSE or key >> _LETTER_AT == ord(POSE) else key & ((1 << _LETTER_AT) - 1)
+    """The landmark that a key stands for; None for a variable of a frame."""
+    return None if key >> _LETTER_AT in _FRAME_LETTERS else key & ((1 << _LETTER_AT) - 1)
 
 
-def thresholds(position: float, rotation: float, landmark: float, baseline: float) -> gtsam.ISAM2ThresholdMap:
-    """Relinearization thresholds: of poses in baselines (m) and rad, of landmarks as a share of their distance."""
+def thresholds(
+    pose: FloatArray, velocity: FloatArray, bias: FloatArray, landmark: float, baseline: float
+) -> gtsam.ISAM2ThresholdMap:
+    """Relinearization thresholds: of poses (6,), rad and baselines (m), of velocities (3,), m/s, of biases (6,), m/s^2
+    and rad/s, of landmarks as a share of their distance."""
     by_letter = gtsam.ISAM2ThresholdMap()
-    by_letter.insert((POSE, np.array([rotation] * 3 + [position * baseline] * 3)))
+    by_letter.insert((POSE, pose * np.repeat([1.0, baseline], 3)))
+    by_letter.insert((VELOCITY, velocity))
+    by_letter.insert((BIAS, bias))
     by_letter.insert((chr(AUXILIARY_POSE >> _LETTER_AT), np.full(6, np.inf)))
     for i, letter in enumerate(LETTERS):
         by_letter.insert((letter, np.full(3, landmark * baseline * NEAREST * RATIO**i)))

@@ -10,6 +10,7 @@ Takahashi (1973). It is exact, and has the landmarks as well, where `gtsam.Margi
 """
 
 from collections import defaultdict
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import gtsam
@@ -51,13 +52,17 @@ class _Conditional(NamedTuple):
         return self.inverse @ self.density.S()
 
 
-def marginal_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> dict[int, FloatArray]:
+def marginal_covariances(
+    graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, joint: Iterable[list[int]] = ()
+) -> dict[int, FloatArray]:
     """The covariance (d, d) of every variable, by its key, in GTSAM's tangent order, linearized at `values`.
 
-    Raises RuntimeError where the system is indeterminate.
+    For the variables of each list of `joint`, which a factor connects, there is one joint covariance, in their order,
+    by the first key. Raises RuntimeError where the system is indeterminate.
     """
     conditionals = _conditionals(graph.linearize(values).eliminateSequential(gtsam.Ordering.OrderingType.COLAMD))
     position = {conditional.key: i for i, conditional in enumerate(conditionals)}
+    together = {min(keys, key=position.__getitem__): keys for keys in joint if len(keys) > 1}
     children: dict[int, list[int]] = defaultdict(list)
     pending: list[tuple[int, _Joint]] = []
     for i, conditional in enumerate(conditionals):
@@ -66,16 +71,20 @@ def marginal_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values
         else:
             pending.append((i, _Joint({}, np.empty((0, 0)))))
     found: dict[int, FloatArray] = {}
+    found_together: dict[int, FloatArray] = {}
     while pending:
         # Depth first: only the joint covariances on the way to the root are held.
         i, parent = pending.pop()
-        joint = _joint(conditionals[i], parent)
-        d = len(conditionals[i].inverse)
-        found[conditionals[i].key] = joint.covariance[:d, :d].copy()  # a view would hold the whole
-        inner = [child for child in children[i] if child in children]
-        pending.extend((child, joint) for child in inner)
-        found |= _leaves([conditionals[child] for child in children[i] if child not in children], joint)
-    return found
+        clique = _joint(conditionals[i], parent)
+        d, key = len(conditionals[i].inverse), conditionals[i].key
+        found[key] = clique.covariance[:d, :d].copy()  # a view would hold the whole
+        if key in together:
+            columns = clique.of(together[key])
+            found_together[together[key][0]] = clique.covariance[columns][:, columns]
+        inner = [child for child in children[i] if child in children or conditionals[child].key in together]
+        pending.extend((child, clique) for child in inner)
+        found |= _leaves([conditionals[child] for child in children[i] if child not in inner], clique)
+    return found | found_together
 
 
 def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
@@ -121,3 +130,10 @@ def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]
         covariance = (gain @ parent.covariance) @ gain.transpose(0, 2, 1) + np.array([leaf.own for leaf in chosen])
         result |= {leaf.key: covariance[i] for i, leaf in enumerate(chosen)}
     return result
+
+
+def joint_covariance(tree: gtsam.ISAM2, keys: list[int]) -> FloatArray:
+    """The joint covariance of variables of a tree, in their order, from its linearization point."""
+    if len(keys) == 1:
+        return np.asarray(tree.marginalCovariance(keys[0]), dtype=np.float64)
+    return np.asarray(tree.jointMarginalCovariance(keys).fullMatrix(), dtype=np.float64)

@@ -7,7 +7,7 @@ Groups by age eliminate the oldest first; COLAMD orders within a group. The solu
 
 from collections.abc import Collection
 
-from ..graph.keys import AUXILIARY_POSE, pose_key
+from ..graph.keys import AUXILIARY_POSE, frame_of, landmark_of, pose_key, state_keys
 
 GROUP_FRAMES, N_GROUPS = 20, 6
 """of a group, and how many there are beside the last one; what is older is in the first of them.
@@ -23,7 +23,9 @@ the end, which costs the next frame least, as long as so many dense columns do n
 class EliminationOrdering:
     """Last observation of each landmark, and the elimination groups that follow from it."""
 
-    def __init__(self) -> None:
+    def __init__(self, inertial: bool = False) -> None:
+        """With raw inertial data (`inertial`) velocity and biases of a frame are in the group of its pose."""
+        self._inertial = inertial
         self._seen: dict[int, int] = {}
         """key of a landmark -> frame that saw it last; those seen last are at the end"""
 
@@ -49,12 +51,11 @@ class EliminationOrdering:
         # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
         most = len(landmarks) + (frame > 0)
         if len(landmarks) > MANY_LANDMARKS:
-            return {pose_key(frame): 1, AUXILIARY_POSE: 2}
+            return self._with_states({pose_key(frame): 1, AUXILIARY_POSE: 2}, frame)
         if all_new:
             last, first = min(1, most), max(first, frame - 1)
-            return dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last) | {
-                AUXILIARY_POSE: last + 1
-            }
+            together = dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last)
+            return self._with_states(together | {AUXILIARY_POSE: last + 1}, frame)
         last = min(N_GROUPS, most)
         groups = dict.fromkeys([pose_key(frame), *landmarks], last) | {AUXILIARY_POSE: last + 1}
         oldest = max(first, frame - GROUP_FRAMES * (last - 1))
@@ -65,7 +66,23 @@ class EliminationOrdering:
                 break
             if seen[key] < frame:
                 groups[key] = of_frame[seen[key] - oldest]
-        return groups
+        return self._with_states(groups, frame)
+
+    def _with_states(self, groups: dict[int, int], newest: int) -> dict[int, int]:
+        """Groups with those of velocities and biases.
+
+        The newest state comes after all landmarks: else they were one clique with it, and its covariance far away.
+        """
+        if not self._inertial:
+            return groups
+        newest_pose, end = pose_key(newest), groups[AUXILIARY_POSE]
+        states = {
+            key: end if pose == newest_pose else group
+            for pose, group in groups.items()
+            if landmark_of(pose) is None and pose != AUXILIARY_POSE
+            for key in state_keys(frame_of(pose), True)
+        }
+        return groups | states | {AUXILIARY_POSE: end + 1}
 
     def batch_groups(self, first: int, frame: int) -> dict[int, int]:
         """Key -> group of elimination, for a tree that is built at once over the frames `first` to `frame`, the last
@@ -76,4 +93,4 @@ class EliminationOrdering:
             if self._seen[key] < first:
                 break
             groups[key] = last if self._seen[key] == frame else (self._seen[key] - first) // GROUP_FRAMES
-        return groups | {AUXILIARY_POSE: last + 1}
+        return self._with_states(groups | {AUXILIARY_POSE: last + 1}, frame)

@@ -13,10 +13,9 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from ..errors import IndeterminateSystemError, UnrecoverableError
+from ..graph.frame_states import FrameStates
 from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
-from ..graph.gtsam_conversions import in_first_pose_frame, landmarks_from_values, pose_covariances, poses_from_values
-from ..graph.keys import pose_key
-from ..graph.marginal_covariances import marginal_covariances
+from ..graph.gtsam_conversions import in_solver_frame, landmarks_from_values
 from .incremental_smoother import FrameLostError, IncrementalSmoother
 from .settings import ISAM2Settings
 
@@ -29,8 +28,8 @@ def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Set
     `recovered`. `by_products["isam2-online"]` is pose k as estimated from data up to k.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        answer = _solve(in_first_pose_frame(problem), progress, settings or ISAM2Settings())
-        return answer.moved(problem.initial_pose)
+        posed, world_T_solver = in_solver_frame(problem)
+        return _solve(posed, progress, settings or ISAM2Settings.of(problem)).moved(world_T_solver)
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:
@@ -56,14 +55,13 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         graph, values = _final_solution(smoother, settings.relinearize_at_end)
     except (UnrecoverableError, IndeterminateSystemError) as error:
         return Estimate.failed("isam2", str(error), T, len(problem.excluded))
-    poses, landmarks = _marginals(smoother, graph, values)
+    states, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _status(events)
     used = problem.scatter_mask(smoother.used())
     online = Estimate(
         name="isam2-online",
-        world_T_imu=smoother.builder.online_poses,
-        covariance=smoother.online_covariance,
+        world_T_imu=smoother.builder.online.world_T_imu,
         landmarks=smoother.online_landmarks(),
         used=used,
         status=status,
@@ -74,8 +72,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
     )
     final = Estimate(
         name="isam2",
-        world_T_imu=poses_from_values(values, range(T)),
-        covariance=poses,
+        world_T_imu=states.world_T_imu,
         landmarks=landmarks,
         used=used,
         status=status,
@@ -84,7 +81,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         seconds_total=time.perf_counter() - start,
         events=events,
     )
-    return _with_by_product(final, online)
+    return _with_by_product(states.answer(final), smoother.builder.online.answer(online))
 
 
 def _run(
@@ -102,8 +99,7 @@ def _run(
     smoother = IncrementalSmoother(problem, replace(settings, qr=True))
     smoother.run(seconds, progress)
     # Online, the frames before the failure were known by Cholesky.
-    smoother.builder.online_poses[:where] = quick.builder.online_poses[:where]
-    smoother.online_covariance[:where] = quick.online_covariance[:where]
+    smoother.builder.online.replace_before(where, quick.builder.online)
     smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
     return smoother
 
@@ -130,16 +126,17 @@ def _final_solution(
 
 def _marginals(
     smoother: IncrementalSmoother, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values
-) -> tuple[FloatArray, Landmarks]:
-    """Covariances (T, 6, 6) of the poses, order [v, w], NaN where there are none; the landmarks with theirs."""
-    T = smoother.problem.n_frames
+) -> tuple[FrameStates, Landmarks]:
+    """States with their covariances, NaN where there are none; the landmarks with theirs."""
+    states = FrameStates.unknown(smoother.problem)
+    states.take_all(values)
     try:
-        covariance = marginal_covariances(graph, values)
+        covariance = states.take_marginals(smoother.problem, graph, values)
     except RuntimeError:
-        smoother.events.append(Event(T - 1, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
-        return np.full((T, 6, 6), np.nan), landmarks_from_values(values, smoother.key)
-    poses = pose_covariances(smoother.problem, [covariance[pose_key(k)] for k in range(T)])
-    return poses, landmarks_from_values(values, smoother.key, covariance)
+        last = smoother.problem.n_frames - 1
+        smoother.events.append(Event(last, EventKind.NO_COVARIANCES, "the system is indeterminate at its solution"))
+        return states, landmarks_from_values(values, smoother.key)
+    return states, landmarks_from_values(values, smoother.key, covariance)
 
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:

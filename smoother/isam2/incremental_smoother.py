@@ -14,8 +14,9 @@ from fgbaseline.geometry import FloatArray
 from ..errors import IndeterminateSystemError
 from ..frame_update import FrameUpdate, add_with_recovery
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
-from ..graph.gtsam_conversions import landmarks_from_values, pose_covariances, poses_from_values
-from ..graph.keys import distance_key, landmark_of, pose_key
+from ..graph.gtsam_conversions import landmarks_from_values, poses_from_values
+from ..graph.keys import distance_key, landmark_of, state_keys
+from ..graph.marginal_covariances import joint_covariance
 from ..graph_builder import GraphBuilder
 from .elimination_ordering import EliminationOrdering
 from .marginalized_isam2 import NO_POSE, MarginalizedISAM2, marginalization_horizon
@@ -46,7 +47,7 @@ class IncrementalSmoother:
         self.problem = problem
         self._may_lose_frames = settings.qr or problem.landmark_prior is not None
         self.builder = GraphBuilder(problem, settings.initialization)
-        self.online_covariance = np.full((problem.n_frames, 6, 6), np.nan)
+        self._inertial = problem.imu is not None
         self.key: dict[int, int] = {}
         """of each landmark in the graph"""
         self._slots: dict[int, dict[int, int]] = {}
@@ -56,7 +57,7 @@ class IncrementalSmoother:
         """in the graph"""
         self._settling_frames = 0
         """frames for which every update relinearizes"""
-        self._ordering = EliminationOrdering()
+        self._ordering = EliminationOrdering(self._inertial)
         self._first = 0
         """frame in the tree"""
         self._marginalize_at = settings.tree_frames
@@ -93,9 +94,9 @@ class IncrementalSmoother:
         self.n_frames = k + 1
         self._dropped |= landmarks
         self.events += events
-        tree = self.solver.tree
-        self.builder.online_poses[k] = tree.calculateEstimatePose3(pose_key(k)).matrix()
-        self.online_covariance[k] = pose_covariances(self.problem, [tree.marginalCovariance(pose_key(k))], k)[0]
+        tree, state = self.solver.tree, state_keys(k, self._inertial)
+        self.builder.online.take(k, tree.calculateEstimate(state))
+        self.builder.online.take_covariances(self.problem, k, [joint_covariance(tree, state)])
         for j in self.builder.observed_landmarks(observed).tolist():
             if j in self.key and j not in self._dropped:
                 self.builder.landmark_position[j] = tree.calculateEstimatePoint3(self.key[j])
@@ -139,7 +140,7 @@ class IncrementalSmoother:
         """See `IncrementalGraph.add`."""
         k, factors = update.frame, self.builder.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        values.insert(pose_key(k), gtsam.Pose3(update.initial_pose))
+        values.insert(update.initial_values)
         graph.push_back(update.motion_factor)
         owner: list[tuple[int, int]] = []
         new = {
@@ -167,7 +168,8 @@ class IncrementalSmoother:
         groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._settling_frames > 0)
         frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
         try:
-            slots = self.solver.update(graph, frames, values, pose_key(k), removed, groups, self._settling_frames > 0)
+            state = state_keys(k, self._inertial)
+            slots = self.solver.update(graph, frames, values, state, removed, groups, self._settling_frames > 0)
         except IndeterminateSystemError:
             self._ordering.remove(new.values())
             raise

@@ -15,7 +15,7 @@ import numpy as np
 from fgbaseline.data.observations import Observations
 
 from ..errors import IndeterminateSystemError
-from ..graph.keys import AUXILIARY_POSE
+from ..graph.keys import AUXILIARY_POSE, width
 from .checkpointed_isam2 import CheckpointedISAM2
 
 AUXILIARY_NOISE = gtsam.noiseModel.Unit.Create(6)
@@ -56,22 +56,22 @@ class MarginalizedISAM2:
         factors: gtsam.NonlinearFactorGraph,
         frames: Listing[int],
         values: gtsam.Values,
-        newest: int,
+        newest: Listing[int],
         removed: Collection[int] = (),
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
     ) -> Listing[int]:
         """An update of the tree, see `RestorableISAM2`; the slots of the new factors, in their order.
 
-        `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` is the key of the pose,
-        among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior already
-        cannot be taken out of it. Raises IndeterminateSystemError.
+        `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` are the keys of the
+        state, among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior
+        already cannot be taken out of it. Raises IndeterminateSystemError.
         """
         places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
         tied = gtsam.NonlinearFactorGraph(factors)
-        tied.push_back(gtsam.BetweenFactorPose3(newest, AUXILIARY_POSE, gtsam.Pose3(), AUXILIARY_NOISE))
+        tied.push_back(_auxiliary_factor(newest))
         if self._auxiliary_slot is None:
-            values.insert(AUXILIARY_POSE, values.atPose3(newest))
+            values.insert(AUXILIARY_POSE, values.atPose3(newest[0]))
         else:
             places.append(self._auxiliary_slot)
         result = self._isam.update(tied, values, places, groups, relinearize)
@@ -197,6 +197,17 @@ class MarginalizedISAM2:
         values.erase(AUXILIARY_POSE)
         del self._isam
         return self._graph, values
+
+
+def _auxiliary_factor(newest: Listing[int]) -> gtsam.NonlinearFactor:
+    """The tie of the auxiliary pose to the newest state; one to several variables says nothing of them."""
+    if len(newest) == 1:
+        return gtsam.BetweenFactorPose3(newest[0], AUXILIARY_POSE, gtsam.Pose3(), AUXILIARY_NOISE)
+    graph = gtsam.GaussianFactorGraph()
+    noise, tail = gtsam.noiseModel.Diagonal.Sigmas(np.ones(6)), (AUXILIARY_POSE, np.eye(6), np.zeros(6))
+    for key in newest:
+        graph.push_back(gtsam.JacobianFactor(key, np.zeros((6, width(key))), *tail, noise))
+    return gtsam.LinearContainerFactor(gtsam.JacobianFactor(graph))
 
 
 def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:

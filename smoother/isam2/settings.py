@@ -3,6 +3,9 @@
 from dataclasses import dataclass, field
 
 import gtsam
+import numpy as np
+
+from fgbaseline.data.problem import Problem
 
 from ..graph.keys import thresholds
 from ..initialization.landmark_initialization import InitializationCriterion
@@ -20,6 +23,13 @@ class ISAM2Settings:
     """baselines of the rig, of a pose: what is seen moves by no more than this share of its disparity"""
     relinearize_rotation: float = 0.002
     """rad, of a pose"""
+    relinearize_velocity: float = 0.2
+    """m/s, with raw inertial data, as for the biases: the factors are close to linear in these, and a change of one
+    bias moves all of them, so that narrow thresholds relinearize the whole chain at every update"""
+    relinearize_gyroscope_bias: float = 0.01
+    """rad/s"""
+    relinearize_accelerometer_bias: float = 0.2
+    """m/s^2"""
     relinearize_landmark: float = 0.002
     """as a share of its distance"""
     relinearize_skip: int = 3
@@ -38,9 +48,24 @@ class ISAM2Settings:
         """GTSAM parameters for a rig with this baseline (m)."""
         params = gtsam.ISAM2Params()
         params.setRelinearizeThreshold(
-            thresholds(self.relinearize_position, self.relinearize_rotation, self.relinearize_landmark, baseline)
+            thresholds(
+                np.repeat([self.relinearize_rotation, self.relinearize_position], 3),
+                np.full(3, self.relinearize_velocity),
+                np.repeat([self.relinearize_accelerometer_bias, self.relinearize_gyroscope_bias], 3),
+                self.relinearize_landmark,
+                baseline,
+            )
         )
         params.relinearizeSkip = self.relinearize_skip
         params.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE_THRESHOLD * min(2.0 * baseline, 1.0)))
         params.setFactorization("QR" if self.qr else "CHOLESKY")
         return params
+
+    @classmethod
+    def of(cls, problem: Problem) -> "ISAM2Settings":
+        """Default settings for a problem.
+
+        With raw inertial data a frame bends the path behind it by more than the thresholds, and all of the tree would
+        be relinearized again and again: it is shorter, and relinearizes less often.
+        """
+        return cls() if problem.imu is None else cls(relinearize_skip=5, tree_frames=100, kept_frames=40)

@@ -85,6 +85,9 @@ class DenseFilter:
         self.K = K_s(problem.sequence.camera)
         self.o_T_I = np.linalg.inv(problem.sequence.imu_T_cam)
         """the report's optical frame from the IMU's"""
+        self.start = problem.initial_covariance
+        self.additive = np.zeros(0)
+        """the state after the pose, where there is more"""
 
     def seen(self, k: int) -> tuple[NDArray[np.int64], FloatArray]:
         """The rows j of the landmarks seen at frame k, and z (n, 4)."""
@@ -125,19 +128,20 @@ class DenseFilter:
             return mu, sigma
         mu_inv = np.linalg.inv(mu)
         z_tilde = np.zeros((len(rows), 4))
-        H = np.zeros((4 * len(rows), 6))
+        H = np.zeros((4 * len(rows), len(sigma)))
         for i, j in enumerate(rows):
             s = mu_inv @ homogeneous(m[j])
             z_tilde[i] = self.K @ pi(self.o_T_I @ s)
-            H[4 * i : 4 * i + 4] = -self.K @ dpi_dq(self.o_T_I @ s) @ self.o_T_I @ odot(s)
+            H[4 * i : 4 * i + 4, :6] = -self.K @ dpi_dq(self.o_T_I @ s) @ self.o_T_I @ odot(s)
         I_V = block_diag(*[self.V_slam] * len(rows))
         gain = sigma @ H.T @ np.linalg.inv(H @ sigma @ H.T + I_V)
         correction = gain @ (z - z_tilde).reshape(-1)
-        return mu @ expm(u_hat(correction)), (np.eye(6) - gain @ H) @ sigma
+        self.additive = self.additive + correction[6:]
+        return mu @ expm(u_hat(correction[:6])), (np.eye(len(sigma)) - gain @ H) @ sigma
 
     def dead_reckoning(self) -> tuple[FloatArray, FloatArray]:
         """Part a: means (T, 4, 4) and covariances (T, 6, 6)."""
-        mu, sigma = [self.problem.initial_pose], [self.problem.initial_covariance]
+        mu, sigma = [self.problem.initial_pose], [self.start]
         for k in range(self.problem.n_frames - 1):
             predicted, covariance = self.predict(k, mu[-1], sigma[-1])
             mu.append(predicted)
@@ -160,7 +164,7 @@ class DenseFilter:
         else:
             mapped = self.mapping()
             m, sigma_m = mapped.m, mapped.sigma_m
-        mu, sigma = self.problem.initial_pose, self.problem.initial_covariance
+        mu, sigma = self.problem.initial_pose, self.start
         path, covariances = [], []
         for k in range(self.problem.n_frames):
             if k > 0:

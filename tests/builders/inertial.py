@@ -1,4 +1,4 @@
-"""Small inertial problems with known truth: a smooth closed-form motion among random landmarks."""
+"""Inertial problems with known truth: a smooth closed-form motion among random landmarks, and simulated recordings."""
 
 from dataclasses import replace
 
@@ -8,6 +8,8 @@ from fgbaseline import data
 from fgbaseline.data.imu import ImuNoise, ImuSamples
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.problem.inertial import InertialStart, imu_intervals
+from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
+from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, se3, so3, strapdown
 
 CAMERA = StereoCamera(450.0, 450.0, 320.0, 240.0, 0.12)
@@ -16,7 +18,7 @@ IMU_T_CAM[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 NOISE = ImuNoise(2e-3, 2e-5, 2e-2, 3e-3)
 START_SIGMA = np.repeat([0.0, 0.01, 0.05, 2e-3, 2e-2], 3)
 """of the true start about the given one; heading and position are exact"""
-MIN_DISPARITY = 3.0
+MIN_DISPARITY = 6.0
 """px, of the exact pixels"""
 STEP = 1e-4
 """s, of the finite differences that give the true samples"""
@@ -62,18 +64,36 @@ def inertial_problem(seed: int = 0, n_frames: int = 50, rate: float = 10.0, imu_
     sequence = data.Sequence(
         "inertial", t, none, none, CAMERA, IMU_T_CAM, observations, n_landmarks, imu=imu, truth=truth
     )
-    pose, start = _start(truth, rng)
+    return _problem(sequence, 1.0, rng)
+
+
+def simulated_problem(path: PathName, seed: int, seconds: float = 10.0) -> Problem:
+    """A simulated recording with 30 stereo tracks a frame and random biases, at its true noise."""
+    rng = np.random.default_rng([seed, 7])
+    imu = SimulatedImu(accelerometer_bias=tuple(5e-2 * rng.normal(size=3)))
+    gyro_bias = tuple(5e-3 * rng.normal(size=3))
+    settings = Simulation(
+        path=path, duration=seconds, features_per_frame=30.0, seed=seed, wrong_share=0.0, gyro_bias=gyro_bias, imu=imu
+    )
+    return _problem(simulate(settings), settings.sigma_pixel**2, rng)
+
+
+def _problem(sequence: data.Sequence, pixel_variance: float, rng: np.random.Generator) -> Problem:
+    """All observations of the sequence, with a start drawn about its truth."""
+    assert sequence.truth is not None
+    assert sequence.imu is not None
+    pose, start = _start(sequence.truth, rng)
     return Problem(
         preset="calibrated",
         sequence=sequence,
         increment=np.empty((0, 6)),
         increment_covariance=np.empty((0, 6, 6)),
-        pixel_variance=1.0,
-        features=np.unique(observations.landmark),
-        excluded=np.zeros(len(observations), np.uint8),
+        pixel_variance=pixel_variance,
+        features=np.unique(sequence.observations.landmark),
+        excluded=np.zeros(len(sequence.observations), np.uint8),
         initial_pose=pose,
         initial_covariance=np.zeros((6, 6)),
-        imu=imu_intervals(imu, t),
+        imu=imu_intervals(sequence.imu, sequence.t),
         start=start,
         kernel=HuberKernel(),
     )

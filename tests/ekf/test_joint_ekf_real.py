@@ -99,3 +99,25 @@ def test_landmarks_that_come_back_are_the_same_landmarks(recordings: Recordings)
     assert estimate.status is Status.OK
     assert estimate.used[problem.mask].all()
     np.testing.assert_array_equal(estimate.landmarks.index, problem.features)
+
+
+@pytest.mark.slow
+def test_raw_inertial_samples_and_tracks_correct_each_other(recordings: Recordings) -> None:
+    sequence = data.read(
+        recordings(f"utias/{UTIAS[-1]}.mat"),
+        imu=recordings("imu/2011_09_30_drive_0027_imu0.csv"),
+        imu_calibration=recordings("imu/oxts_sensor.yaml"),
+    )
+    problem = diagnosis.calibrated(sequence)
+    error = {}
+    for solve in (ekf.dead_reckoning, ekf.ekf, ekf.joint_ekf, ekf.joint_ekf_first_estimate):
+        estimate = solve(problem)
+        assert estimate.status is Status.OK
+        assert estimate.state_covariance is not None
+        assert_covariances(estimate.state_covariance[1:])
+        error[estimate.name] = ate(estimate, problem.sequence)
+    print(f"\nATE over 327 m: {error}")
+    assert error["dead-reckoning"] > 30.0
+    assert error["joint-ekf"] < 1.0
+    assert error["joint-ekf-first-estimate"] < 1.0
+    assert error["joint-ekf"] < error["ekf"] < error["dead-reckoning"]

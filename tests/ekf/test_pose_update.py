@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline import data
+from fgbaseline import data, ekf
 from fgbaseline.data.simulate import KITTI
-from fgbaseline.ekf.dead_reckoning import propagated_covariance
+from fgbaseline.ekf.motion_model import BodyState, Prediction, VelocityMotion
 from fgbaseline.ekf.pose_update import (
     PoseInnovation,
     pose_innovation,
     pose_posterior,
-    predicted_covariance,
     printed_covariance,
 )
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
@@ -88,7 +87,8 @@ def test_a_posterior_is_positive_and_no_worse_than_the_prior_however_awful_the_j
     assert np.linalg.eigvalsh(S * scale)[0] > -1e-14
     assert np.linalg.eigvalsh((sigma - S) * scale)[0] > -1e-9
     # The noise of the next step makes it positive definite beyond doubt: the filter can go on.
-    np.linalg.cholesky(predicted_covariance(S, np.eye(4), 1e-6 * sigma))
+    still = Prediction(BodyState(np.eye(4), np.empty(0)), np.eye(6), 1e-6 * sigma)
+    np.linalg.cholesky(still.covariance(S))
 
 
 def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> None:
@@ -153,7 +153,7 @@ def test_prediction_is_equation_9(seed: int) -> None:
         data.documented(drive()), increment=random.normal(size=(1, 6)), increment_covariance=np.array([W])
     )
     _, expected = DenseFilter(problem).predict(0, np.eye(4), sigma)
-    actual = predicted_covariance(sigma, se3.exp(problem.increment[0]), W)
+    actual = VelocityMotion(problem).predict(0, BodyState(np.eye(4), np.empty(0))).covariance(sigma)
     np.testing.assert_array_equal(actual, actual.T)
     np.testing.assert_allclose(actual, expected, rtol=1e-10, atol=1e-10)
 
@@ -171,7 +171,9 @@ def test_the_dead_reckoned_covariance_is_that_of_many_noisy_drives() -> None:
     for step, W in zip(steps, problem.increment_covariance, strict=True):
         poses, mean = poses @ step @ noise(W), mean @ step
     deviations = se3.log(se3.inverse(mean) @ poses)
-    predicted = propagated_covariance(problem)[-1]
+    covariance = ekf.dead_reckoning(problem).covariance
+    assert covariance is not None
+    predicted = covariance[-1]
     L_inverse = np.linalg.inv(np.linalg.cholesky(predicted))
     whitened = deviations @ L_inverse.T
     # A sample covariance of n draws is off by about sqrt(2 / n) = 0.01.

@@ -1,0 +1,209 @@
+"""The calibrated problem of raw inertial data: start, noise, mask, truth in its world; units, and what is refused."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fgbaseline import data, diagnosis
+from fgbaseline.data.imu import ImuSamples
+from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
+
+from ..builders.commands import fgbaseline
+from ..builders.inertial_paths import PIXEL, inertial_recording, turn, upside_down
+
+
+@pytest.fixture(scope="module")
+def recording() -> data.Sequence:
+    return inertial_recording(turn, seed=1, n_frames=60)
+
+
+@pytest.fixture(scope="module")
+def problem(recording: data.Sequence) -> Problem:
+    return diagnosis.calibrated(recording)
+
+
+def faults(problem: Problem) -> list[str]:
+    """Codes of the findings but for biases, which every unit has and the builder draws."""
+    return [f.code for f in problem.findings if f.code not in ("gyro_bias", "accelerometer_bias", "gravity")]
+
+
+def test_a_clean_recording_has_its_noise_and_no_findings(problem: Problem, recording: data.Sequence) -> None:
+    assert faults(problem) == []
+    assert problem.repairs == ()
+    assert np.sqrt(problem.pixel_variance) == pytest.approx(PIXEL, rel=0.3)
+    assert float(problem.mask.mean()) > 0.95
+    assert problem.imu is not None
+    assert recording.imu is not None
+    assert problem.imu.noise == recording.imu.noise
+    assert problem.increment.shape == (0, 6)
+    assert any("as given" in remark for remark in problem.remarks)
+
+
+def test_wrong_matches_are_masked(recording: data.Sequence) -> None:
+    """A tenth of the observations moved by 40 px: nearly all of them are excluded, and few others."""
+    o = recording.observations
+    wrong = np.random.default_rng(5).random(len(o)) < 0.1
+    pixel = o.pixel.copy()
+    pixel[wrong, 0] += 40.0
+    pixel[wrong, 2] += 40.0
+    found = diagnosis.calibrated(replace(recording, observations=replace(o, pixel=pixel)))
+    order = np.lexsort((*o.pixel.T, o.frame)), np.lexsort((*found.sequence.observations.pixel.T, o.frame))
+    moved = set(pixel[wrong, 0].tolist())
+    is_wrong = np.isin(found.sequence.observations.pixel[:, 0], list(moved))
+    assert len(order[0]) == len(order[1])
+    assert float(found.mask[is_wrong].mean()) < 0.05
+    assert float(found.mask[~is_wrong].mean()) > 0.8
+
+
+def moved_truth(recording: data.Sequence, first: int, motion: FloatArray, up: FloatArray | None) -> data.Sequence:
+    """The recording with its truth in another world, and without its first frames."""
+    truth = recording.truth
+    assert truth is not None
+    late = replace(truth.moved(motion), up=up)
+    poses = late.world_T_imu.copy()
+    poses[:first] = np.nan
+    return recording.with_truth(replace(late, world_T_imu=poses))
+
+
+@pytest.mark.parametrize("first", [0, 7])
+def test_truth_of_any_world_is_tied_to_the_start(first: int, recording: data.Sequence) -> None:
+    """Turned by 70 degrees, tilted by 10 and shifted; the tie takes it back by the start and the samples alone."""
+    motion = se3.exp(np.array([5.0, -3.0, 2.0, 0.1, 0.14, 1.2]))
+    found = diagnosis.calibrated(moved_truth(recording, first, motion, None))
+    reference = diagnosis.calibrated(recording)
+    tied, expected = found.sequence.truth, reference.sequence.truth
+    assert tied is not None
+    assert expected is not None
+    assert not tied.known[:first].any()
+    apart = se3.log(se3.inverse(expected.world_T_imu[first:]) @ tied.world_T_imu[first:])
+    assert np.linalg.norm(apart[:, 3:], axis=1).max() < np.deg2rad(1.0)
+    assert np.linalg.norm(apart[:, :3], axis=1).max() < 0.3
+    if first == 0:
+        np.testing.assert_allclose(tied.world_T_imu[0, :3, 3], 0.0, atol=1e-9)
+        heading = so3.log_so3(found.initial_pose[:3, :3] @ tied.world_T_imu[0, :3, :3].T)[2]
+        assert heading == pytest.approx(0.0, abs=1e-9)
+
+
+def test_true_velocities_turn_with_the_world(problem: Problem, recording: data.Sequence) -> None:
+    tied, given = problem.sequence.truth, recording.truth
+    assert tied is not None
+    assert given is not None
+    assert tied.velocity is not None
+    assert given.velocity is not None
+    before = np.einsum("nji,nj->ni", given.world_T_imu[:, :3, :3], given.velocity)
+    after = np.einsum("nji,nj->ni", tied.world_T_imu[:, :3, :3], tied.velocity)
+    np.testing.assert_allclose(after, before, atol=1e-9)
+    start = problem.start
+    assert start is not None
+    deviation = np.sqrt(np.diag(start.covariance))
+    assert (np.abs(tied.velocity[0] - start.velocity) < 4.0 * deviation[strapdown.VELOCITY]).all()
+
+
+def in_units(imu: ImuSamples, rate: float, force: float) -> ImuSamples:
+    return replace(imu, angular_velocity=imu.angular_velocity / rate, specific_force=imu.specific_force / force)
+
+
+UNITS = {"angular_velocity_unit": (np.pi / 180.0, 1.0, "°/s"), "accelerometer_unit": (1.0, 9.80665, "in g and")}
+
+
+@pytest.mark.parametrize("code", UNITS)
+def test_other_units_are_found_and_repaired_or_refused(code: str, recording: data.Sequence, problem: Problem) -> None:
+    rate, force, name = UNITS[code]
+    assert recording.imu is not None
+    wrong = replace(recording, imu=in_units(recording.imu, rate, force))
+    found = diagnosis.calibrated(wrong)
+    assert faults(found) == [code]
+    assert name in found.findings[0].sentence
+    assert found.start is not None
+    assert problem.start is not None
+    np.testing.assert_allclose(found.start.velocity, problem.start.velocity, atol=1e-6)
+    with pytest.raises(InputError, match=name):
+        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+
+
+def test_as_recorded_repairs_nothing(recording: data.Sequence) -> None:
+    found = diagnosis.calibrated(recording, settings=diagnosis.Calibration())
+    assert np.sqrt(found.pixel_variance) == 1.5
+    assert not found.diagnosed
+    assert found.repairs == ()
+    assert found.start is not None
+
+
+def test_a_time_offset_is_found(recording: data.Sequence) -> None:
+    """Stamps 12 ms late: the gyroscope at full rate shows it to a millisecond or two."""
+    imu = recording.imu
+    assert imu is not None
+    late = replace(recording, imu=replace(imu, t=imu.t + 0.012))
+    found = diagnosis.diagnose_inertial(late)
+    assert found.sensors is not None
+    assert found.sensors.time_offset[0] == pytest.approx(0.012, abs=max(0.002, 4.0 * found.sensors.time_offset[1]))
+
+
+def test_a_recording_without_tracks_is_refused_in_one_sentence(recording: data.Sequence) -> None:
+    blind = replace(recording, observations=data.Observations.none(), n_landmarks=0)
+    with pytest.raises(InputError, match="no observations"):
+        diagnosis.calibrated(blind)
+
+
+def test_gaps_and_dropped_samples_are_reported(recording: data.Sequence) -> None:
+    imu = recording.imu
+    assert imu is not None
+    kept = ((imu.t < 2.02) | (imu.t > 2.33)) & (np.arange(len(imu)) % 50 != 7)
+    holed = replace(
+        imu, t=imu.t[kept], angular_velocity=imu.angular_velocity[kept], specific_force=imu.specific_force[kept]
+    )
+    found = diagnosis.inertial_findings(diagnosis.diagnose_inertial(replace(recording, imu=holed)))
+    codes = {finding.code: finding.before for finding in found}
+    assert codes["imu_gaps"] == 1
+    assert codes["dropped_samples"] == pytest.approx(len(imu) / 50, abs=3)
+
+
+@pytest.mark.slow
+def test_utias_0027_starts_within_three_sigma_of_the_truth(recordings: Callable[[str], Path]) -> None:
+    """Velocity by the truth over two steps, attitude by the tie; the biases are near zero, as batch solutions find."""
+    sequence = data.read(
+        recordings("utias/2011_09_30_drive_0027_sync_KLT.mat"),
+        imu=recordings("imu/2011_09_30_drive_0027_imu0.csv"),
+        imu_calibration=recordings("imu/oxts_sensor.yaml"),
+    )
+    assert sequence.n_frames == 500
+    problem = diagnosis.calibrated(sequence)
+    start, truth = problem.start, problem.sequence.truth
+    assert start is not None
+    assert truth is not None
+    sigma = np.sqrt(np.diag(start.covariance))
+    true = truth.world_T_imu
+    velocity = (true[2, :3, 3] - true[0, :3, 3]) / (sequence.t[2] - sequence.t[0])
+    assert (np.abs(start.velocity - velocity) < 3.0 * sigma[strapdown.VELOCITY]).all()
+    tilt = so3.log_so3(problem.initial_pose[:3, :3].T @ true[0, :3, :3])
+    assert (np.abs(tilt) < 3.0 * sigma[strapdown.ROTATION]).all()
+    assert (np.abs(start.gyroscope_bias) < 3.0 * sigma[strapdown.GYROSCOPE_BIAS]).all()
+    assert (np.abs(start.accelerometer_bias) < 3.0 * sigma[strapdown.ACCELEROMETER_BIAS]).all()
+
+
+def test_the_commands_take_a_recording_with_samples(recording: data.Sequence, tmp_path: Path) -> None:
+    data.write_npz(recording, tmp_path / "turn.npz")
+    diagnosed = fgbaseline("diagnose", "turn.npz", "--out", "d", cwd=tmp_path)
+    assert diagnosed.returncode == 1, diagnosed.stderr  # its biases are findings
+    assert "gyro_bias" in diagnosed.stdout
+    report = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
+    assert report["imu"]["samples"] == len(recording.imu or ())
+    assert len(report["start"]["std"]) == strapdown.STATE
+    exported = fgbaseline("export", "turn.npz", "--out", "p", cwd=tmp_path)
+    assert exported.returncode == 0, exported.stderr
+    assert data.read_problem(tmp_path / "p").start is not None
+    refused = fgbaseline("run", "turn.npz", "--preset", "documented", "--out", "r", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "raw inertial data" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+def test_upside_down_is_a_problem_like_any_other() -> None:
+    found = diagnosis.calibrated(inertial_recording(upside_down, n_frames=40))
+    assert found.initial_pose[2, 2] < -0.9
+    assert faults(found) == []
