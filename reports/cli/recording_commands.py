@@ -1,4 +1,4 @@
-"""Commands on a recording: `run`, `diagnose`, `export` and `simulate`."""
+"""Commands on a recording: `run`, `track`, `diagnose`, `export` and `simulate`."""
 
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.as_recorded
 @options.imu
 @options.imu_calibration
+@options.images
 @options.time_unit
 @options.repairs
 @options.held_out
@@ -57,9 +58,14 @@ def run(
     landmarks: str,
     time_unit: str | None,
     rerun_file: Path | None,
+    topics: str | None,
+    settings: Path | None,
     **given: Any,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
+
+    SEQUENCE is a recording of tracks, or a folder or ROS bag of stereo images: their tracks are written into the
+    folder of the run, tracks.npz.
 
     Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
 
@@ -71,13 +77,34 @@ def run(
     from ..run.command import run as run_and_report
     from ..run.problem import RunSettings
 
-    settings = RunSettings(
+    chosen = RunSettings(
         estimators=tuple(name.strip() for name in estimators.split(",") if name.strip()),
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
+        topics=options.topic_names(topics),
+        tracker=settings,
         **given,
     )
-    return run_and_report(settings, out, force=force, rerun_file=rerun_file)
+    return run_and_report(chosen, out, force=force, rerun_file=rerun_file)
+
+
+@click.command(epilog="Example: fgbaseline track V1_01_easy --out out/tracks.npz")
+@click.argument("source", metavar="INPUT", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Npz to write.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@options.imu
+@options.imu_calibration
+@options.images
+def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
+    """Track the stereo images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
+
+    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. The
+    npz is a recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
+    """
+    from fgbaseline.data.tracking import ImageOptions
+    from ..run.images import write_tracks
+
+    return write_tracks(source, out, ImageOptions(topics=options.topic_names(topics), **given), settings, force=force)
 
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")

@@ -4,14 +4,16 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.data import Excluded, Problem
+from fgbaseline.data import Excluded, Problem, write_npz
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
+from fgbaseline.data.tracking import has_images
 
 from .problem import (
     MARK,
+    TRACKS,
     RunSettings,
     build_problem,
     check_estimators,
@@ -70,6 +72,8 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
     progress.print_line("writing the report")
     with atomic_folder(place, force=force, mark=MARK) as folder:
         summary = write_run(solved, folder, cores())
+        if settings.sequence is not None and has_images(settings.sequence):
+            write_npz(sequence, folder / TRACKS, flat=True)
         if rerun_file is not None:
             from .rerun import write_rerun
 
