@@ -10,9 +10,9 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..time_unit import TimeUnit
 from .bag_file import Bag, open_bag_file
 from .named_file import shown
+from .parsed_trajectory import ParsedTrajectory
 from .stamped_poses import require_rising, rotations_of_quaternions
 from .stamps import stamps_of
-from .parsed_trajectory import ParsedTrajectory
 
 TYPES = (
     "nav_msgs/Odometry",

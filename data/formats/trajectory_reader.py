@@ -90,7 +90,7 @@ def read_extrinsic(path: FilePath) -> FloatArray:
 def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
 ) -> ParsedTrajectory:
-    """Parsed trajectory file, or topic of a bag (`run.bag:/odom`), with what it leaves open. Raises as `read_trajectory`."""
+    """Parsed file, or topic of a bag (`run.bag:/odom`), with what it leaves open. Raises as `read_trajectory`."""
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
     if (in_bag := split_topic(path)) is not None:

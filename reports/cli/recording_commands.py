@@ -102,6 +102,7 @@ def track(source: Path, out: Path, force: bool, settings: Path | None, topics: s
     npz is a recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
     """
     from fgbaseline.data.tracking import ImageOptions
+
     from ..run.images import write_tracks
 
     return write_tracks(source, out, ImageOptions(topics=options.topic_names(topics), **given), settings, force=force)
