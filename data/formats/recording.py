@@ -8,15 +8,12 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ..sequence import Sequence
 from ..time_unit import TimeUnit, in_seconds
 from .course import read_course
 from .ground_truth import BodyFrame, attach_truth
-from .imu_arrays import assumed_noise
-from .imu_attachment import attach_imu
-from .imu_csv import read_imu_csv
-from .imu_yaml import ImuCalibration, read_imu_calibration
+from .imu_attachment import attach_imu, read_imu
+from .imu_yaml import assumed_calibration, read_imu_calibration
 from .mat_file import MatFile
 from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
@@ -67,12 +64,10 @@ def read(
 
 
 def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -> Sequence:
-    found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),))
-    if calibration is not None:
-        found = read_imu_calibration(calibration)
-    raw = read_imu_csv(imu, found.noise, found.gravity)
+    unknown = assumed_calibration("no imu-calibration is given")
+    raw = read_imu(imu, unknown if calibration is None else read_imu_calibration(calibration))
     with reading(imu):
-        return attach_imu(sequence, raw._replace(remarks=(*found.remarks, *raw.remarks)), shown(imu))
+        return attach_imu(sequence, raw, shown(imu))
 
 
 def _read(file: Path, source: str, given: FloatArray | None, *, moves: bool) -> Sequence:

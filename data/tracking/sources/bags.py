@@ -10,11 +10,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.bag_file import Bag, open_bag_file
-from ...formats.imu_arrays import assumed_noise
 from ...formats.imu_samples import RawSamples, imu_samples
-from ...formats.imu_yaml import read_imu_calibration
+from ...formats.imu_yaml import assumed_calibration, read_imu_calibration
 from ...formats.named_file import shown
-from ...imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ...observations import IntArray
 from .camera_yaml import read_rig
 from .image_files import EightBits, Raw, decoded
@@ -73,7 +71,6 @@ def open_bag(path: Path, calibration: Path | None, topics: tuple[str, ...]) -> I
         if len(each) < 2 or not (np.diff(each) > 0).all():
             raise InputError(f"{shown(path)}: {topic} has {len(each)} images; expected two or more with rising stamps")
     paired = pair(first, second, shown(path))
-    imu, remarks = _imu(samples, calibration)
     used = ", ".join(filter(None, chosen))
     return ImageRecording(
         name=path.stem,
@@ -84,9 +81,9 @@ def open_bag(path: Path, calibration: Path | None, topics: tuple[str, ...]) -> I
         left=rig.left,
         right=rig.right,
         extrinsic_known=rig.extrinsic_known,
-        imu=imu,
+        imu=_imu(samples, calibration),
         imu_source=f"{shown(path)}:{chosen.imu}",
-        remarks=(f"Topics: {used}.", *rig.remarks, *paired.remarks, *remarks),
+        remarks=(f"Topics: {used}.", *rig.remarks, *paired.remarks),
     )
 
 
@@ -158,20 +155,18 @@ def _image(message: Any, source: str, topic: str) -> Raw | None:
     return grey
 
 
-def _imu(samples: list[tuple[int, Any, Any]], calibration: Path) -> tuple[RawSamples | None, tuple[str, ...]]:
+def _imu(samples: list[tuple[int, Any, Any]], calibration: Path) -> RawSamples | None:
     """Inertial samples with the noise of the calibration, where it has it."""
     if not samples:
-        return None, ()
+        return None
     t = np.array([stamp / 10**9 for stamp, _, _ in samples])
     rate, force = (_vectors([sample[i] for sample in samples]) for i in (1, 2))
     try:
         found = read_imu_calibration(calibration)
-        noise, gravity, remarks = found.noise, found.gravity, found.remarks
     except InputError:
-        remark = assumed_noise(f"{shown(calibration)} states no noise of the IMU")
-        noise, gravity, remarks = ASSUMED_NOISE, STANDARD_GRAVITY, (remark,)
-    kept, findings = imu_samples(t, rate, force, noise, gravity)
-    return RawSamples(kept, (), findings), remarks
+        found = assumed_calibration(f"{shown(calibration)} states no noise of the IMU")
+    kept, findings = imu_samples(t, rate, force, found.noise, found.gravity)
+    return RawSamples(kept, found.remarks, findings)
 
 
 def _vectors(values: list[Any]) -> FloatArray:

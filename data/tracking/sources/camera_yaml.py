@@ -7,13 +7,11 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ...formats.fields import extrinsic
-from ...formats.kitti import nearest_rotations
-from ...formats.named_file import FilePath, reading, regular_file
+from ...formats.named_file import FilePath, reading
+from ...formats.yaml_file import pose, read_yaml
 from ..rig import CameraModel, Distortion
 
 MODELS = {"radtan": Distortion.RADTAN, "radial-tangential": Distortion.RADTAN, "equidistant": Distortion.EQUIDISTANT}
-MOST_BYTES = 2**20
 LONGEST_BASELINE = 5.0
 """m; a longer one is taken for millimeters"""
 COUNTS = {Distortion.RADTAN: (4, 5), Distortion.EQUIDISTANT: (4,), Distortion.NONE: (0,)}
@@ -30,51 +28,11 @@ class Rig(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
-def read_yaml(path: FilePath) -> dict[str, Any]:
-    """The keys of a YAML file, with OpenCV's matrices as arrays. Raises InputError (without the name: `reading`)."""
-    import yaml
-
-    class Loader(yaml.SafeLoader):  # type: ignore[misc]
-        pass
-
-    def matrix(loader: Any, node: Any) -> Any:
-        values = loader.construct_mapping(node, deep=True)
-        return np.array(values["data"], dtype=np.float64).reshape(int(values["rows"]), int(values["cols"]))
-
-    Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", matrix)
-    file = regular_file(path)
-    if file.stat().st_size > MOST_BYTES:
-        raise InputError("it is larger than 1 MiB, and no calibration; check the file")
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-        # OpenCV writes %YAML:1.0, which is no directive of YAML
-        lines = [line for line in text.splitlines() if not line.startswith("%")]
-        tree = yaml.load("\n".join(lines), Loader)
-    except (yaml.YAMLError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise InputError(f"it is no YAML ({' '.join(str(error).split())[:120]})") from error
-    if not isinstance(tree, dict):
-        raise InputError("it has no keys; give the calibration of the cameras")
-    return tree
-
-
 def read_sensor_yaml(path: Path) -> CameraModel:
     """Camera of EuRoC's `sensor.yaml`. Raises InputError naming file and key."""
     with reading(path):
         tree = read_yaml(path)
         return _camera(tree, "distortion_coefficients", pose(_value(tree, "T_BS"), "T_BS"))
-
-
-def pose(value: Any, key: str) -> FloatArray:
-    """Pose (4, 4) in a YAML file: nested lists, or EuRoC's `data`. Raises InputError naming the key."""
-    values = value.get("data") if isinstance(value, dict) else value
-    try:
-        matrix = np.array(values, dtype=np.float64).reshape(4, 4)
-    except (TypeError, ValueError):
-        raise InputError(f"{key}: expected a 4x4 matrix, got {str(values)[:60]}") from None
-    R = matrix[:3, :3]
-    if np.isfinite(matrix).all() and np.linalg.det(R) > 0.0 and np.abs(R @ R.T - np.eye(3)).max() < 1e-3:
-        R = nearest_rotations(R[None])[0]  # files have few digits
-    return extrinsic(key, R, matrix[:3, 3])
 
 
 def read_rig(path: FilePath, size: tuple[int, int] | None) -> Rig:

@@ -6,13 +6,11 @@ from pathlib import Path
 from fgbaseline.geometry import InputError, se3
 
 from ...formats.bag_file import is_bag
-from ...formats.imu_arrays import assumed_noise
-from ...formats.imu_csv import read_imu_csv
-from ...formats.imu_yaml import ImuCalibration, read_imu_calibration
+from ...formats.imu_attachment import read_imu
+from ...formats.imu_yaml import assumed_calibration, read_imu_calibration
 from ...formats.named_file import shown
 from ...formats.trajectory_reader import read_extrinsic
 from ...formats.velocity_csv import read_velocity_csv
-from ...imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from .bags import open_bag
 from .euroc import open_euroc
 from .image_recording import ImageRecording
@@ -98,12 +96,11 @@ def _with_motion(recording: ImageRecording, options: ImageOptions) -> ImageRecor
         return replace(recording, velocities=velocities, imu=None)
     if options.imu is None:
         return recording
-    found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),))
-    if options.imu_calibration is not None:
-        found = read_imu_calibration(options.imu_calibration)
-    raw = read_imu_csv(options.imu, found.noise, found.gravity)
-    raw = raw._replace(remarks=(*found.remarks, *raw.remarks))
-    return replace(recording, imu=raw, imu_source=shown(options.imu), velocities=None)
+    unknown = assumed_calibration("no imu-calibration is given")
+    known = None if options.imu_calibration is None else read_imu_calibration(options.imu_calibration)
+    return replace(
+        recording, imu=read_imu(options.imu, known or unknown), imu_source=shown(options.imu), velocities=None
+    )
 
 
 def _with_noise(recording: ImageRecording, calibration: Path) -> ImageRecording:

@@ -15,24 +15,20 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ...formats.imu_arrays import assumed_noise
-from ...formats.imu_csv import read_imu_csv
-from ...formats.imu_samples import RawSamples
-from ...formats.imu_yaml import ImuCalibration, read_imu_calibration
+from ...formats.imu_attachment import read_imu
+from ...formats.imu_yaml import ImuCalibration, assumed_calibration, read_imu_calibration
 from ...formats.named_file import reading, shown
-from ...imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ...observations import IntArray
 from ...plural import plural
-from .camera_yaml import Rig, pose, read_rig, read_sensor_yaml, read_yaml
+from .camera_yaml import Rig, read_rig, read_sensor_yaml
 from .image_files import file_pairs, image_files
 from .image_recording import ImageRecording, TruthFile
 from .pairing import pair, stamps_of_names
 
 CHAINS = ("camchain.yaml", "camchain-imucam.yaml", "dso/camchain.yaml")
 IMU_CONFIGS = ("imu_config.yaml", "dso/imu_config.yaml")
+IMU = "imu0/data.csv"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0")
-NOT_APPLIED = "Its pose in the body"
-"""beginning of a remark of the IMU's calibration that does not hold here"""
 
 
 def open_euroc(folder: Path) -> ImageRecording:
@@ -41,14 +37,14 @@ def open_euroc(folder: Path) -> ImageRecording:
     for name in ("cam0", "cam1"):
         if not (mav / name).is_dir():
             raise InputError(f"{shown(mav)}: the folder {name} is missing; a EuRoC folder has cam0 and cam1")
-    body_T_imu = _imu_pose(mav)
-    rig = _rig(mav)
+    calibration = _imu_calibration(mav)
+    body_T_imu = None if calibration is None else calibration.body_T_imu
+    rig = _rig(mav, body_T_imu)
     stamps, files, remarks = zip(*(_images(mav / name) for name in ("cam0", "cam1")), strict=True)
     paired = pair(stamps[0], stamps[1], shown(mav))
     both = [(files[0][a], files[1][b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)]
     truth = next((file for name in TRUTHS if (file := mav / name / "data.csv").is_file()), None)
-    imu, imu_remarks = _imu(mav)
-    place = folder.resolve()
+    samples, place = mav / IMU, folder.resolve()
     return ImageRecording(
         name=place.parent.name if place.name == "mav0" else place.name,
         form="euroc",
@@ -58,38 +54,26 @@ def open_euroc(folder: Path) -> ImageRecording:
         left=rig.left,
         right=rig.right,
         extrinsic_known=rig.extrinsic_known,
-        imu=imu,
-        imu_source=shown(mav / "imu0" / "data.csv"),
+        imu=None if calibration is None else read_imu(samples, calibration._replace(body_T_imu=None)),
+        imu_source=shown(samples),
         truth=None if truth is None else TruthFile(truth, "imu"),
         body_T_imu=body_T_imu,
-        remarks=(*rig.remarks, *remarks[0], *remarks[1], *paired.remarks, *imu_remarks),
+        remarks=(*rig.remarks, *remarks[0], *remarks[1], *paired.remarks),
     )
 
 
-def _rig(mav: Path) -> Rig:
+def _rig(mav: Path, body_T_imu: FloatArray | None) -> Rig:
     chain = next((file for place in (mav, mav.parent) for name in CHAINS if (file := place / name).is_file()), None)
     sensors = [mav / name / "sensor.yaml" for name in ("cam0", "cam1")]
     missing = next((file for file in sensors if not file.is_file()), None)
     if missing is None:
         left, right = (read_sensor_yaml(file) for file in sensors)
-        body_T_imu = _imu_pose(mav)
         if body_T_imu is not None:
             left, right = (camera.on(se3.inverse(body_T_imu)) for camera in (left, right))
         return Rig(left, right, extrinsic_known=True)
     if chain is None:
         raise InputError(f"{shown(missing)}: the file is missing; add it, or Kalibr's camchain.yaml beside mav0")
     return read_rig(chain, None)
-
-
-def _imu_pose(mav: Path) -> FloatArray | None:
-    """Pose of the IMU in the body (4, 4); None where it is the body."""
-    file = mav / "imu0" / "sensor.yaml"
-    if not file.is_file():
-        return None
-    with reading(file):
-        tree = read_yaml(file)
-        found = pose(tree["T_BS"], "T_BS") if "T_BS" in tree else np.eye(4)
-    return None if np.allclose(found, np.eye(4), atol=1e-9) else found
 
 
 def _images(folder: Path) -> tuple[IntArray, list[Path], tuple[str, ...]]:
@@ -121,17 +105,10 @@ def _rising(stamps: IntArray, files: list[Path], folder: Path) -> tuple[IntArray
     return stamps, files, ()
 
 
-def _imu(mav: Path) -> tuple[RawSamples | None, tuple[str, ...]]:
-    """Raw samples with the noise of the folder; None where there are none."""
-    table = mav / "imu0" / "data.csv"
-    if not table.is_file():
-        return None, ()
-    configs = [mav / "imu0" / "sensor.yaml", *(mav.parent / name for name in IMU_CONFIGS)]
-    config = next((file for file in configs if file.is_file()), None)
-    if config is None:
-        remark = assumed_noise(f"{shown(configs[0])} is missing")
-        found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (remark,))
-    else:
-        found = read_imu_calibration(config)
-    raw = read_imu_csv(table, found.noise, found.gravity)
-    return raw, tuple(remark for remark in found.remarks if not remark.startswith(NOT_APPLIED))
+def _imu_calibration(mav: Path) -> ImuCalibration | None:
+    """Calibration of the IMU; None where the folder has no samples."""
+    if not (mav / IMU).is_file():
+        return None
+    files = [mav / "imu0" / "sensor.yaml", *(mav.parent / name for name in IMU_CONFIGS)]
+    file = next((file for file in files if file.is_file()), None)
+    return assumed_calibration(f"{shown(files[0])} is missing") if file is None else read_imu_calibration(file)
