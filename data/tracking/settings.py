@@ -23,7 +23,7 @@ class TrackerSettings(BaseModel):
     """px between a new corner and every other track"""
     corner_quality: Annotated[float, Field(gt=0, lt=1)] = 0.002
     """smallest eigenvalue of a corner, as a share of that of the strongest corners of the image"""
-    window: Annotated[int, Field(ge=5, le=63)] = 15
+    window: Annotated[int, Field(ge=5, le=63)] = 17
     """px, side of the window of Lucas-Kanade"""
     pyramid_levels: Annotated[int, Field(ge=0, le=8)] = 4
     forward_backward: Pixels = 1.0

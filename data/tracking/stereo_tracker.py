@@ -13,6 +13,7 @@ from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
 from ..observations import BoolArray, IntArray
 from .corners import detect_corners
+from .local_contrast import equalized
 from .opencv import opencv
 from .settings import TrackerSettings
 
@@ -47,7 +48,10 @@ class Tracks:
 
 @dataclass(eq=False)
 class StereoTracker:
-    """Tracks of a recording, pair by pair; results depend on nothing but images, predictions and settings."""
+    """Tracks of a recording, pair by pair; results depend on nothing but images, predictions and settings.
+
+    Corners are found in the images, and tracked and matched in images of equalized local contrast.
+    """
 
     camera: StereoCamera
     settings: TrackerSettings = field(default_factory=TrackerSettings)
@@ -66,12 +70,14 @@ class StereoTracker:
         `rotation` (3, 3), new_R_previous of the left camera, predicts where points move, with the translation of the
         step before; without it both are those of the step before.
         """
+        even_left, even_right = equalized(left), equalized(right)
         if self._left is None:
             self.tracks = Tracks.none()
         elif len(self.tracks.number):
-            self.tracks = self._tracked(self._left, left, right, rotation)
-        self.tracks = self._with_new_corners(left, right)
-        self._left = left
+            self.tracks = self._tracked(self._left, even_left, even_right, rotation)
+        corners = self._new_corners(left)
+        self.tracks = self._with_matches(corners, even_left, even_right)
+        self._left = even_left
         return self.tracks
 
     def _tracked(self, before: Image, left: Image, right: Image, rotation: FloatArray | None) -> Tracks:
@@ -154,11 +160,14 @@ class StereoTracker:
         found &= (points[:, 0] - other[:, 0] > settings.min_disparity) & _inside(other, right)
         return other, found
 
-    def _with_new_corners(self, left: Image, right: Image) -> Tracks:
+    def _new_corners(self, left: Image) -> FloatArray:
+        """Corners (n, 2) of the left image away from the tracks; none where there is no room."""
+        room = self.settings.max_features - len(self.tracks.number)
+        return detect_corners(left, self.tracks.pixel[:, :2], self.settings) if room > 0 else np.empty((0, 2))
+
+    def _with_matches(self, corners: FloatArray, left: Image, right: Image) -> Tracks:
+        """The tracks with new ones of the corners (n, 2) that are found in the right image."""
         tracks, room = self.tracks, self.settings.max_features - len(self.tracks.number)
-        if room <= 0:
-            return tracks
-        corners = detect_corners(left, tracks.pixel[:, :2], self.settings)
         if len(corners) == 0:
             return tracks
         offset = np.zeros_like(corners)
