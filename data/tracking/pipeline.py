@@ -10,10 +10,12 @@ from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
 from ..estimate import Progress
 from ..formats.ground_truth import attach_truth
 from ..formats.imu_attachment import attach_imu
+from ..formats.inertial_truth import inertial_truth
 from ..formats.npz_writer import write_npz, write_tracks
 from ..observations import BoolArray, Observations
 from ..plural import plural
 from ..sequence import Sequence, Truth
+from .pictures import Pictures
 from .prediction import rotation_between
 from .rig import Image, rectify
 from .settings import TrackerSettings
@@ -79,7 +81,10 @@ class TrackedRecording:
         if isinstance(r.truth, TruthFile):
             sequence = attach_truth(sequence, r.truth.path, r.truth.body)
             if r.body_T_imu is not None and sequence.truth is not None:
-                own = replace(sequence.truth, world_T_imu=sequence.truth.world_T_imu @ r.body_T_imu)
+                # velocity and biases of the file are those of the body
+                poses, source = sequence.truth.world_T_imu @ r.body_T_imu, sequence.truth.source
+                inertial = sequence.imu is not None
+                own = inertial_truth(poses, source) if inertial else Truth.from_any_world(poses, source=source)
                 sequence = sequence.with_truth(own)
         return sequence
 
@@ -99,11 +104,12 @@ def track(
     progress: Progress | None = None,
     *,
     motion: bool = False,
+    pictures: Pictures | None = None,
 ) -> TrackedRecording:
     """Tracks of the recording of images at `path`; `progress` gets the number of pairs done, and of all.
 
-    Frames with an unreadable image are left out, counted and named. Raises InputError for what is missing; with
-    `motion` also where `sequence` would raise, before the images are read.
+    `pictures` gets the rectified pairs. Frames with an unreadable image are left out, counted and named. Raises
+    InputError for what is missing; with `motion` also where `sequence` would raise, before the images are read.
     """
     recording = open_recording(path, options)
     if motion:
@@ -122,6 +128,8 @@ def track(
         left, right = rectified(pair.left, pair.right)
         turn = rotation_between(recording, rectified.imu_T_cam[:3, :3], kept[-1], k) if kept else None
         points = tracker.step(left, right, turn)
+        if pictures is not None:
+            pictures.add(len(kept), float(recording.t[k]), left, right)
         kept.append(k)
         numbers.append(points.number)
         pixels.append(points.pixel.astype(np.float32))  # as OpenCV gives them

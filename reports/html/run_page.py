@@ -12,14 +12,20 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.data.tracking import Pictures
 
 from ..figures import EncodedFigure
 from ..figures.style import TRUTH, colors, on_dark
 from ..phrases.run import verdict
+from ..phrases.tracks import track_sentences
 from ..tables import run as tables
 from .environment import asset, environment, picture
-from .plot_data import TRUTH_LINE, embedded_json, page_data
+from .plot_data import TRUTH_LINE, embedded_json, image_data, page_data
 
+PAGE_BYTES = 20_000_000
+"""largest page with images; they are thinned to what its plots and figures leave"""
+MARKUP_BYTES = 500_000
+"""of tables, style and script, generously"""
 FIRST_SENTENCES = 3
 """of the verdict that stand above the table"""
 EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
@@ -30,14 +36,23 @@ SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js"
 """the page's script in the order of its dependencies"""
 
 
-def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
+def render(
+    run: Run,
+    summary: Mapping[str, Any],
+    figures: Mapping[str, Figure | EncodedFigure],
+    images: Pictures | None = None,
+) -> str:
     """`report.html`: one file that needs no other and makes no request.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
-    `figures.draw_and_write(run)` gave. All text that comes from files is escaped.
+    `figures.draw_and_write(run)` gave; `images` lie under the observations. All text that comes from files is escaped.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
-    data = page_data(run)
+    images = Pictures() if images is None else images
+    data = page_data(run, images.size)
+    rest = len(embedded_json(data)) + sum(len(each.source) for each in pictures.values()) + MARKUP_BYTES
+    images.thin(max(0, PAGE_BYTES - rest) * 3 // 4)  # base64 has four letters for three bytes
+    data["images"] = image_data(run, images)
     numbered = list(enumerate(data["charts"]))
     keys = {name: str(i) for i, name in enumerate(run.results)}
     estimators = summary.get("estimators", {})
@@ -56,6 +71,8 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             groups=[(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
             bookmarks=data["bookmarks"],
             frames_seen=data["observations"] is not None,
+            images=frames_of(images),
+            tracks=track_sentences(run.problem.sequence, (data["camera"]["width"], data["camera"]["height"])),
             classes={name: f"estimator-{key}" for name, key in keys.items()},
             shown=shown,
             run=run,
@@ -77,6 +94,11 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             stills=[p for name, p in pictures.items() if not name.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))],
         )
     )
+
+
+def frames_of(images: Pictures) -> str:
+    """Note on the frames whose images the page has; empty where all or none have one."""
+    return f"To keep the page small, every {images.step}th frame has its images." if images.step > 1 else ""
 
 
 @cache

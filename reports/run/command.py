@@ -9,7 +9,7 @@ from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
-from fgbaseline.data.tracking import has_images
+from fgbaseline.data.tracking import Pictures
 
 from .problem import (
     MARK,
@@ -32,7 +32,8 @@ UNWRAPPED = 120
 def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
     """Runs the estimators, writes the folder, prints the main results; returns 1 where an estimator failed, else 0."""
     check_estimators(settings.estimators)
-    sequence = read_sequence(settings)
+    pictures = Pictures()
+    sequence = read_sequence(settings, pictures)
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=MARK)
     if rerun_file is not None:
@@ -71,8 +72,8 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
             progress.print_line(f"{name} failed: {result.estimate.reason}")
     progress.print_line("writing the report")
     with atomic_folder(place, force=force, mark=MARK) as folder:
-        summary = write_run(solved, folder, cores())
-        if settings.sequence is not None and has_images(settings.sequence):
+        summary = write_run(solved, folder, cores(), pictures)
+        if pictures.size is not None:
             write_npz(sequence, folder / TRACKS, flat=True)
         if rerun_file is not None:
             from .rerun import write_rerun

@@ -9,17 +9,24 @@ from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.plural import plural
 from fgbaseline.data.toml_file import read_toml
-from fgbaseline.data.tracking import ImageOptions, TrackedRecording, TrackerSettings, has_images, track
+from fgbaseline.data.tracking import ImageOptions, Pictures, TrackedRecording, TrackerSettings, has_images, track
 from fgbaseline.data.tracking.sources.image_recording import TruthFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.progress import reporter
 
 
-def tracked(source: Path, options: ImageOptions, settings: Path | None, *, motion: bool = False) -> TrackedRecording:
+def tracked(
+    source: Path,
+    options: ImageOptions,
+    settings: Path | None,
+    *,
+    motion: bool = False,
+    pictures: Pictures | None = None,
+) -> TrackedRecording:
     """Tracks of a recording of images, with progress on standard error. Raises InputError."""
     chosen = TrackerSettings() if settings is None else read_toml(settings, TrackerSettings).content
     with reporter().estimator("tracking") as progress:
-        return track(source, options, chosen, progress, motion=motion)
+        return track(source, options, chosen, progress, motion=motion, pictures=pictures)
 
 
 def image_sequence(
@@ -28,10 +35,14 @@ def image_sequence(
     settings: Path | None,
     truth: Path | None,
     body: BodyFrame | None,
+    pictures: Pictures | None = None,
 ) -> Sequence:
-    """The recording of images as a run needs it, with the truth given or its own. Raises InputError."""
+    """Recording of images as a run needs it, with the truth given or its own; `pictures` gets its pairs.
+
+    Raises InputError.
+    """
     given = None if truth is None or body is None else TruthFile(truth, body)
-    return tracked(source, options, settings, motion=True).sequence(given)
+    return tracked(source, options, settings, motion=True, pictures=pictures).sequence(given)
 
 
 def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path | None, *, force: bool) -> int:

@@ -20,7 +20,7 @@ from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.solving import Watch, no_progress, solve_all
-from fgbaseline.data.tracking import ImageOptions, has_images
+from fgbaseline.data.tracking import ImageOptions, Pictures, has_images
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
@@ -126,8 +126,8 @@ def import_estimators(names: tuple[str, ...]) -> None:
             find_estimator(name)
 
 
-def read_sequence(settings: RunSettings) -> Sequence:
-    """Reads or simulates the recording with its ground truth. Raises InputError."""
+def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Sequence:
+    """Reads or simulates the recording with its ground truth; `pictures` gets its images. Raises InputError."""
     if settings.sequence is None:
         if settings.time_unit is not None:
             raise InputError("time-unit: the simulated drive has stamps in seconds; give a SEQUENCE with --time-unit")
@@ -146,7 +146,7 @@ def read_sequence(settings: RunSettings) -> Sequence:
     if settings.truth is None and settings.truth_frame is not None:
         raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
     if has_images(settings.sequence):
-        return _of_images(settings)
+        return _of_images(settings, pictures)
     _require_none(settings, IMAGES, "it belongs to a recording of images; leave it out")
     return read(
         settings.sequence,
@@ -160,7 +160,7 @@ def read_sequence(settings: RunSettings) -> Sequence:
     )
 
 
-def _of_images(settings: RunSettings) -> Sequence:
+def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
     from .images import image_sequence  # OpenCV is imported where there are images
 
     if settings.time_unit is not None:
@@ -168,7 +168,8 @@ def _of_images(settings: RunSettings) -> Sequence:
     assert settings.sequence is not None
     names = ("right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
     options = ImageOptions(**{name: getattr(settings, name) for name in names})
-    return image_sequence(settings.sequence, options, settings.tracker, settings.truth, settings.truth_frame)
+    truth, body = settings.truth, settings.truth_frame
+    return image_sequence(settings.sequence, options, settings.tracker, truth, body, pictures)
 
 
 def _require_none(settings: RunSettings, names: tuple[str, ...], advice: str) -> None:
