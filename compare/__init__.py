@@ -10,6 +10,7 @@ from .consistency.covariance import (
 )
 from .consistency.nees import body_error, nees, nees_table, sigma_ratio
 from .consistency.nis import NisSummary, nis_per_degree, nis_summary
+from .consistency.pose_sigma import PoseSigma, pose_sigma
 from .consistency.reference_nees import ReferenceNees, reference_nees
 from .consistency.state import quantity_summary, state_error, state_nees, velocity_and_bias_errors
 from .landmarks.dynamic_landmarks import dynamic_landmarks
@@ -82,7 +83,7 @@ from .trajectory.frame_conventions import (
 from .trajectory.path import distance_traveled
 from .trajectory.segments import SegmentErrors, segment_errors
 from .trajectory.time_offset import TimeOffset, time_offset
-from .trust import Trust, Verdict, trust
+from .trust import Criterion, Trust, Verdict, trust
 
 __all__ = [
     "MIN_COVERAGE",
@@ -94,6 +95,7 @@ __all__ = [
     "Association",
     "BodyRotation",
     "CovarianceState",
+    "Criterion",
     "ErrorDecomposition",
     "Exceedance",
     "HeldOutErrors",
@@ -102,6 +104,7 @@ __all__ = [
     "NisSummary",
     "PairedRanking",
     "PoseRelation",
+    "PoseSigma",
     "ReferenceNees",
     "RmseDifference",
     "SegmentErrors",
@@ -156,6 +159,7 @@ __all__ = [
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
+    "pose_sigma",
     "quantity_summary",
     "rankable",
     "reference_nees",

@@ -22,7 +22,7 @@ from .observations import Observations
 from .problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from .problem.documented import documented
 from .problem_export import read_problem, write_problem
-from .registry import estimator_names, find_estimator
+from .registry import estimator_names, estimator_summaries, find_estimator
 from .sequence import Sequence, Truth
 from .time_unit import TimeUnit
 from .trajectory import Trajectory
@@ -50,6 +50,7 @@ __all__ = [
     "attach_truth",
     "documented",
     "estimator_names",
+    "estimator_summaries",
     "find_estimator",
     "read",
     "read_kitti",

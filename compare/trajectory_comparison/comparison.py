@@ -16,6 +16,7 @@ from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.compare.trajectory_comparison.ranking import Ranking
 from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
 from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.geometry import FloatArray
 
@@ -66,6 +67,12 @@ class Result:
     def rmse(self) -> float:
         """RMSE of the positions over all paired poses, m."""
         return float(self.statistics["translation"]["value"]["rmse"])
+
+    @property
+    def resolution(self) -> dict[str, float]:
+        """Smallest difference that the files resolve, by its unit, `m` and `°`."""
+        paths = self.matched.reference.position, self.entry.trajectory.position
+        return {"m": position_resolution(*paths), "°": rotation_resolution_deg(*paths)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -115,7 +115,7 @@ def _compared(
 ) -> Result:
     reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
-    matched, offset = _matched(reference, entry, up, settings)
+    matched, offset = matched_poses(reference, entry, up, settings)
     absolute = compare.absolute_errors(matched)
     departure = compare.divergence_along_path(matched, up)
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
@@ -188,7 +188,7 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
         return None
 
 
-def _matched(
+def matched_poses(
     reference: Entry, entry: Entry, up: FloatArray, settings: Settings
 ) -> tuple[MatchedTrajectories, TimeOffset | None]:
     """Pairs of poses, aligned, and the time offset where it is searched for."""

@@ -17,20 +17,20 @@ from .npz_member import write_member
 from .observation_list import observation_arrays
 
 
-def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False) -> None:
+def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False, force: bool = True) -> None:
     """Writes a recording with its truth, all or nothing; `read` gives every array back bit by bit.
 
     The dense feature block is made and compressed a few landmarks at a time; `flat` writes the observations as a list
-    instead, for recordings of many short tracks. Raises InputError when the file cannot be written, or a pixel
-    coordinate is exactly -1, which in the block means 'not observed'.
+    instead, for recordings of many short tracks. Raises InputError when the file cannot be written, exists and `force`
+    is false, or a pixel coordinate is exactly -1, which in the block means 'not observed'.
     """
     if flat:
-        with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
+        with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
             _write(archive, _arrays(sequence) | observation_arrays(sequence.observations))
         return
     if (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
-    with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
         _write(archive, _arrays(sequence))
         if sequence.n_landmarks:
             shape = (4, sequence.n_landmarks, sequence.n_frames)
@@ -38,16 +38,22 @@ def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False) -> None
 
 
 def write_tracks(
-    path: FilePath, t: FloatArray, camera: StereoCamera, observations: Observations, imu_T_cam: FloatArray | None
+    path: FilePath,
+    t: FloatArray,
+    camera: StereoCamera,
+    observations: Observations,
+    imu_T_cam: FloatArray | None,
+    *,
+    force: bool = True,
 ) -> None:
     """Writes tracks of frames t (T,), s, without motion: `read` needs it, and `imu_T_cam` (4, 4), from elsewhere.
 
-    Raises InputError when the file cannot be written.
+    Raises InputError when the file cannot be written, or exists and `force` is false.
     """
     arrays = {"time_stamps": t[None, :], **_calibration(camera), **observation_arrays(observations)}
     if imu_T_cam is not None:
         arrays["imu_T_cam"] = imu_T_cam
-    with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
         _write(archive, arrays)
 
 

@@ -88,13 +88,16 @@ class TrackedRecording:
                 sequence = sequence.with_truth(own)
         return sequence
 
-    def write(self, path: Path) -> None:
-        """Writes the tracks as npz: a recording, or without motion what there is of it. Raises InputError."""
+    def write(self, path: Path, *, force: bool = True) -> None:
+        """Writes the tracks as npz: a recording, or without motion what there is of it.
+
+        Raises InputError, also where the file exists and `force` is false.
+        """
         if self.has_motion:
-            write_npz(self.sequence(), path, flat=True)
+            write_npz(self.sequence(), path, flat=True, force=force)
         else:
-            known = self.recording.extrinsic_known
-            write_tracks(path, self.recording.t, self.camera, self.observations, self.imu_T_cam if known else None)
+            imu_T_cam = self.imu_T_cam if self.recording.extrinsic_known else None
+            write_tracks(path, self.recording.t, self.camera, self.observations, imu_T_cam, force=force)
 
 
 def track(

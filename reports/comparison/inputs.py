@@ -30,9 +30,9 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     """Reads all inputs. Raises InputError with the file and its fault."""
     run = read_reference_run(Path(str(reference))) if _is_folder(reference) else None
     problem, held = load_problem(settings, run)
-    own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
+    own = [opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
     sources = own if run is None else [run.files.trajectory(run.reference), *own]
-    first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
+    first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
     beside = []
     if run is not None:
         first = replace(first, landmarks=run.files.landmarks(run.reference), trust=run.trust)
@@ -52,18 +52,19 @@ def _is_folder(given: Given) -> bool:
     return isinstance(given, str | Path) and Path(given).is_dir()
 
 
-def _opened(given: Given, settings: Settings) -> Source:
+def opened(given: Given, settings: Settings) -> Source:
+    """Trajectory of `[NAME=]FILE`, parsed. Raises InputError."""
     if isinstance(given, Trajectory):
         return given
     name, file = _split(str(given))
     return read_trajectory_file(file, settings.form, name)
 
 
-def _in_one_body(
+def in_one_body(
     every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
-    times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
+    times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
         Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
     ]
@@ -103,7 +104,7 @@ def _split(given: str) -> tuple[str | None, str]:
     return name, file
 
 
-def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
+def frame_times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         return [read_times(file, settings.unit) for file in settings.times]
@@ -145,11 +146,12 @@ def _named_apart(entries: list[Entry]) -> list[Entry]:
         names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
         taken.add(names[i])
     return [
-        replace(e, trajectory=replace(e.trajectory, name=_file_name(n))) for e, n in zip(entries, names, strict=True)
+        replace(e, trajectory=replace(e.trajectory, name=valid_file_name(n)))
+        for e, n in zip(entries, names, strict=True)
     ]
 
 
-def _file_name(name: str) -> str:
+def valid_file_name(name: str) -> str:
     """The name; raises InputError where a file cannot have it."""
     if "/" in name or "\\" in name or name.startswith(".") or not name:
         raise InputError(f"{name!r} cannot be a file name; give the trajectory another: NAME=FILE")

@@ -16,6 +16,7 @@ from fgbaseline.data.tracking import Pictures
 
 from ..figures import EncodedFigure
 from ..figures.style import TRUTH, colors, on_dark
+from ..phrases.evidence import FIRST
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
 from ..tables import run as tables
@@ -26,8 +27,6 @@ PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
 MARKUP_BYTES = 500_000
 """of tables, style and script, generously"""
-FIRST_SENTENCES = 3
-"""of the verdict that stand above the table"""
 EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
@@ -80,7 +79,8 @@ def render(
             sequence=summary.get("sequence", {}),
             problem=summary.get("problem", {}),
             verdict=verdict(run),
-            first=FIRST_SENTENCES,
+            first=FIRST,
+            criteria=tables.trust_table(run.trust.criteria),
             trust_in_reference=run.trust.verdict.name.lower(),
             table=tables.main_table(run, estimators),
             evidence=tables.evidence_table(run, estimators),

@@ -8,13 +8,14 @@ from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, di
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
-from ..formatting import MINUS, counted, interval, listed, number, per_cent
+from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolved
 from .evidence import (
+    BEYOND,
     DEGREES_OF_FREEDOM,
     held_out_sentences,
     reference_sentence,
     sample_requirement,
-    threshold,
+    threshold_sentences,
 )
 
 
@@ -33,20 +34,21 @@ def caption(comparison: Comparison) -> str:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """All sentences, in the order in which later ones rest on earlier ones."""
+    """All sentences, those of most consequence first."""
     parts: tuple[Callable[[Comparison], list[str]], ...] = (
         _too_little_data,
         _reference,
-        _file_remarks,
+        _reported_covariances,
         _position_rmse,
         _maximum_errors,
+        _resolution,
+        _file_remarks,
         _decompositions,
         _path_lengths,
         _time_offsets,
         _unpaired_poses,
         _undetermined_alignments,
         _rough_intervals,
-        _reported_covariances,
         _outside_recording,
         _reprojection,
         _maps,
@@ -128,7 +130,8 @@ def _over_common(comparison: Comparison) -> list[str]:
 
 
 def _order(comparison: Comparison) -> list[str]:
-    return significance_sentences(comparison.ranking.rivals[0], comparison.behind) if comparison.behind else []
+    behind = {n: d for n, d in comparison.behind.items() if not _is_unresolved(comparison.results[n])}
+    return significance_sentences(comparison.ranking.rivals[0], behind) if behind else []
 
 
 def significance_sentences(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
@@ -149,7 +152,9 @@ def _signed(meters: float) -> str:
 
 
 def _rmse(result: Result) -> str:
-    """Position RMSE with its interval: `0.52 m [0.41, 0.66]`."""
+    """Position RMSE with its interval, `0.52 m [0.41, 0.66]`; 0 below the resolution of the files."""
+    if _is_unresolved(result):
+        return f"{resolved(result.rmse, result.resolution['m'])} m"
     low, high = (float(result.statistics["translation"][bound]["rmse"]) for bound in ("low", "high"))
     value, mark, bounds = interval(result.rmse, low, high).partition(" [")
     return f"{value} m{mark}{bounds}"
@@ -157,29 +162,41 @@ def _rmse(result: Result) -> str:
 
 def _maximum_errors(comparison: Comparison) -> list[str]:
     """Largest position error of each estimate, and when it first exceeds the threshold."""
-    sentences = []
+    onset = {}
     for result in comparison.ranked:
-        most = float(result.departure["position"].max())
-        sentence = f"{result.name}: maximum position error {number(most)} m; {threshold(result.bound)}."
         if result.passing is not None:
             t = result.passing.t - float(result.matched.reference.t[0])
             when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
-            sentence += f" The threshold is first exceeded {when}, {number(result.passing.travelled)} m along the path."
-        sentences.append(sentence)
-    return sentences
+            onset[result.name] = f"{when}, {number(result.passing.travelled)} m along the path"
+    most = {
+        r.name: (r.bound, resolved(float(r.departure["position"].max()), r.resolution["m"])) for r in comparison.ranked
+    }
+    return threshold_sentences("position error", most, onset)
+
+
+def _resolution(comparison: Comparison) -> list[str]:
+    """States the resolution where a path is nearer to the reference than the files resolve."""
+    each = [f"{r.name} {number(r.resolution['m'])} m" for r in comparison.ranked if _is_unresolved(r)]
+    if not each:
+        return []
+    return [f"Nearer to {comparison.reference.name} than the decimals of the files resolve: {listed(each)}."]
+
+
+def _is_unresolved(result: Result) -> bool:
+    return result.rmse < result.resolution["m"]
 
 
 def _decompositions(comparison: Comparison) -> list[str]:
     """Shares of heading and scale in the squared position error."""
-    sentences = []
+    each = []
     for result in comparison.ranked:
-        if np.isfinite(result.shares.noise):
+        if np.isfinite(result.shares.noise) and not _is_unresolved(result):
             heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
-            sentences.append(
-                f"Squared position error of {result.name}: {heading} from heading, {scale} from scale (least-squares "
-                f"scale {1.0 + 0.01 * result.shares.scale_percent:.4f}) and {rest} from the rest."
+            each.append(
+                f"of {result.name} {heading} from heading, {scale} from scale (least-squares scale "
+                f"{1.0 + 0.01 * result.shares.scale_percent:.4f}) and {rest} from the rest"
             )
-    return sentences
+    return [f"Squared position error: {'; '.join(each)}."] if each else []
 
 
 def _share(result: Result, name: str) -> str:
@@ -191,33 +208,30 @@ def _share(result: Result, name: str) -> str:
 
 def _path_lengths(comparison: Comparison) -> list[str]:
     """Length of each path over the paired poses, before alignment, against the reference's."""
-    sentences = []
+    each = []
     for result in comparison.results.values():
         matched = result.matched
         own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
         path = float(distance_traveled(matched.reference.position)[-1])
         if path > 0.0 and number(own) != number(path):
-            sentences.append(
-                f"The path of {result.name} over the paired poses is {number(own)} m long, "
-                f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'} than the "
-                "reference's."
-            )
-    return sentences
+            share = f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'}"
+            each.append(f"{result.name} {number(own)} m, {share}")
+    return [f"Length of the path over the paired poses against the reference's: {'; '.join(each)}."] if each else []
 
 
 def _time_offsets(comparison: Comparison) -> list[str]:
-    sentences = []
+    each = []
     for result in comparison.results.values():
         found = result.offset
         if found is None:
             continue
         where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
-        text = (
-            f"The stamps of {result.name} fit best {'as they are' if found.seconds == 0 else where} "
-            f"(shifts of {1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
+        determined = "" if found.determined else "; the path does not determine it"
+        each.append(
+            f"{result.name} {'as they are' if found.seconds == 0 else where} (shifts of {1e3 * found.low:+.3g} to "
+            f"{1e3 * found.high:+.3g} ms fit nearly as well{determined})"
         )
-        sentences.append(text + ("." if found.determined else "; the path does not determine it."))
-    return sentences
+    return [f"The stamps fit best: {listed(each)}."] if each else []
 
 
 def _unpaired_poses(comparison: Comparison) -> list[str]:
@@ -250,8 +264,9 @@ def _rough_intervals(comparison: Comparison) -> list[str]:
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
-    """Consistency of the covariances in the files of estimates."""
-    sentences = []
+    """Consistency of the covariances in the files of estimates, the overconfident ones first."""
+    sentences, measured, bad = [], dict[str, float](), []
+    remarks = dict[str, str]()
     for result in comparison.results.values():
         reported = result.reported_covariance
         if reported is None:
@@ -260,17 +275,29 @@ def _reported_covariances(comparison: Comparison) -> list[str]:
             continue
         known = reported.nees[~np.isnan(reported.nees)]
         if len(known):
-            mean = float(np.mean(known))
-            sentences.append(
-                f"Normalized error RMS of {result.name} (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): "
-                f"{number(float(np.sqrt(mean / DEGREES_OF_FREEDOM)))} (NEES {number(mean)} over "
-                f"{counted(len(known), 'pose')}{'; ' if reported.remark else ''}{reported.remark})."
+            measured[result.name] = float(np.mean(known))
+            remarks[result.name] = (
+                f"over {counted(len(known), 'pose')}{'; ' if reported.remark else ''}{reported.remark}"
             )
         if reported.not_positive_definite:
+            n = number(reported.not_positive_definite)
+            bad.append(f"{n} of the {counted(len(reported.nees), 'covariance')} of {result.name}")
+    for word, those in (
+        ("Overconfident", [name for name, mean in measured.items() if mean > BEYOND]),
+        ("Not overconfident", [name for name, mean in measured.items() if mean <= BEYOND]),
+    ):
+        each = listed(
+            f"{name} {number(float(np.sqrt(measured[name] / DEGREES_OF_FREEDOM)))} (NEES {number(measured[name])} "
+            f"{remarks[name]})"
+            for name in those
+        )
+        if those:
             sentences.append(
-                f"{number(reported.not_positive_definite)} of the {counted(len(reported.nees), 'covariance')} of "
-                f"{result.name} are not positive definite; NEES leaves them out."
+                f"{word}, by the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): "
+                f"{each}."
             )
+    if bad:
+        sentences.append(f"Not positive definite, and left out by NEES: {listed(bad)}.")
     return sentences
 
 

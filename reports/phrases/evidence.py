@@ -4,13 +4,17 @@ from collections.abc import Iterable, Mapping
 
 import pandas as pd
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, Trust, Verdict
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, Trust, Verdict, chi_square_bounds
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 
 from ..formatting import listed, number, per_cent
 
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
+FIRST = 6
+"""sentences of a verdict that stand above the table"""
+BEYOND = float(chi_square_bounds(DEGREES_OF_FREEDOM)[1])
+"""NEES that a single pose of a consistent estimator exceeds with 2.5 %"""
 MEANING: Mapping[str, str] = {
     "doubtful": "a small divergence from it counts, a large one may be its own error",
     "untrusted": "divergence from it does not measure accuracy",
@@ -38,6 +42,34 @@ def threshold(bound: float) -> str:
         f"threshold {number(bound)} m"
         if bound >= FAR
         else f"threshold {per_cent(FAR_SHARE)} of the path, {number(bound)} m"
+    )
+
+
+def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:
+    """Largest `quantity` of all estimators and the exceedances, in a sentence for each threshold.
+
+    `most` has threshold and maximum by name, m; `onset` says when the threshold is first exceeded, where it is.
+    """
+    names: dict[str, list[str]] = {}
+    for name, (bound, _) in most.items():
+        names.setdefault(threshold(bound), []).append(name)
+    sentences = []
+    for text, those in names.items():
+        each = listed(f"{name} {most[name][1]} m" for name in those)
+        beyond = "; ".join(f"by {name} {onset[name]}" for name in those if name in onset)
+        exceeded = f" The threshold is first exceeded {beyond}." if beyond else ""
+        sentences.append(f"Maximum {quantity}: {each}; {text}.{exceeded}")
+    return sentences
+
+
+def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> str:
+    """1-sigma of the reference by `PoseSigma` of the results: its possible distance from the truth."""
+    along, final, turn, final_turn = (
+        number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
+    )
+    return (
+        f"1-sigma of {name} itself: {along} m (RMS along the path), {final} m at the end; rotation {turn}° and "
+        f"{final_turn}° (under the problem's noise model, first pose fixed, unaligned)."
     )
 
 

@@ -28,7 +28,7 @@ from .evidence import (
     summarize_evidence,
 )
 from .metrics import MEASURED, measured, with_measured
-from .statistics import INFINITE, Divergence, Number, Part, Reprojection, Spread, nulls
+from .statistics import INFINITE, Divergence, Number, Part, PoseSigma, Reprojection, Spread, nulls
 
 
 class Component(Part):
@@ -66,7 +66,7 @@ class EstimatorSummary(Part):
 
     status: Literal["ok", "recovered", "failed"]
     reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
-    seconds: Annotated[float, Field(description="computation time of the estimate, s")]
+    seconds: Annotated[Number, Field(description="computation time of the estimate, s; null of a trajectory file")]
     reprojection: Annotated[Reprojection, Field(description="over all observations of its landmarks")]
     reprojection_used: Annotated[Reprojection, Field(description="over the observations it used")]
     reprojection_common: Annotated[Reprojection, Field(description="over the observations that every estimator used")]
@@ -87,6 +87,7 @@ class EstimatorSummary(Part):
     nees: NeesInDetail | None
     covariance: CovarianceCount | None
     nees_reference: ReferenceNees | None
+    sigma: PoseSigma | None
     sigma_ratio: SigmaRatio | None
     nis: Nis | None
     whitened: Whitened

@@ -152,6 +152,7 @@ def _frames_per_second(run: Run, result: Result) -> float:
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
 REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
 NEES, REFERENCE_NEES, RESIDUALS, COST = "NEES", "reference NEES", "residuals of tracks", "cost"
+SIGMA, CONSISTENCY = "1-sigma", "consistency"
 COMMON = "RMSE over common frames"
 NO_TRUTH = "no frame has both a pose and truth"
 NO_LANDMARK = "no observed landmark was estimated"
@@ -168,7 +169,17 @@ METRICS = (
         uneven_only=True,
         measure=_coverage,
     ),
-    Metric(("ate", "rmse"), ATE, "RMSE", "m", LOWER, MAIN | TERMINAL, absent=NO_TRUTH),
+    Metric(("ate", "rmse"), ATE, "RMSE, aligned", "m", LOWER, MAIN | TERMINAL, brief="ATE, aligned", absent=NO_TRUTH),
+    Metric(
+        ("ate_unaligned", "rmse"),
+        ATE,
+        "RMSE, unaligned",
+        "m",
+        LOWER,
+        MAIN | TERMINAL,
+        brief="unaligned",
+        absent=NO_TRUTH,
+    ),
     Metric(
         ("ate_common", "rmse"),
         ATE,
@@ -181,13 +192,13 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("ate", "max"), ATE, "max", "m", LOWER, MAIN, absent=NO_TRUTH),
+    Metric(("ate", "max"), ATE, "max, aligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
+    Metric(("ate_unaligned", "final"), ATE, "final, unaligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
     Metric(("translation", "rmse"), ATE, "RMSE", "m", LOWER, COMPARISON),
     Metric(("common", "rmse"), ATE, "RMSE over common moments", "m", LOWER, COMPARISON, same_data=True),
     Metric(("behind",), ATE, "RMSE above the smallest", "m", tables=COMPARISON),
     Metric(("translation", "max"), ATE, "max", "m", LOWER, COMPARISON),
     Metric(("rotation_deg", "rmse"), ATE, "rotation RMSE", "°", LOWER, COMPARISON),
-    Metric(("nees", "median"), NEES, "median", tables=MAIN, absent="no positive definite covariance"),
     Metric(("divergence", "rmse"), DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
     Metric(
         ("divergence_common", "rmse"),
@@ -201,8 +212,20 @@ METRICS = (
         uneven_only=True,
     ),
     Metric(("divergence", "max"), DIVERGENCE, "max", "m", LOWER, MAIN),
-    Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, MAIN),
-    Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, MAIN),
+    Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, EVIDENCE),
+    Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed 1-sigma"),
+    Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),
+    Metric(("sigma_ratio", "position"), CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
+    Metric(("nees", "median"), CONSISTENCY, "NEES", tables=MAIN, term=NEES, absent="no positive definite covariance"),
+    Metric(
+        ("nees_reference", "median"),
+        CONSISTENCY,
+        "reference NEES",
+        tables=MAIN,
+        term=REFERENCE_NEES,
+        name="nees_reference",
+    ),
     Metric(("relative", DELTA, "translation", "rmse"), RPE, "RMSE", "m", LOWER, COMPARISON),
     Metric(("relative", DELTA, "rotation_deg", "rmse"), RPE, "rotation RMSE", "°", LOWER, COMPARISON),
     Metric(("drift", "translation"), "drift", "translation", "%", LOWER, COMPARISON),
@@ -219,7 +242,7 @@ METRICS = (
         name="reprojection",
         absent=NO_LANDMARK,
     ),
-    Metric(("reprojection", "p95"), REPROJECTION, "95th percentile", "px", LOWER, MAIN, absent=NO_LANDMARK),
+    Metric(("reprojection", "p95"), REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE, absent=NO_LANDMARK),
     Metric(
         ("reprojection", "under_3px"),
         REPROJECTION,
@@ -265,7 +288,7 @@ METRICS = (
         "rate",
         "frames/s",
         HIGHER,
-        MAIN,
+        EVIDENCE,
         same_data=True,
         absent="it took no measurable time",
         measure=_frames_per_second,
@@ -284,13 +307,13 @@ METRICS = (
     Metric(("held_out", "behind"), HELD_OUT, "above the best", "px", tables=EVIDENCE),
     Metric(("held_out", "behind_low"), HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
     Metric(("nees", "mean"), NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
-    Metric(("nees_reference", "median"), REFERENCE_NEES, "median", tables=EVIDENCE, name="nees_reference"),
+    Metric(("nees_reference", "mean"), REFERENCE_NEES, "mean", tables=EVIDENCE),
     Metric(("nees_reference", "left_out"), REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
-    Metric(("nis", "per_degree"), "consistency", "NIS per row", tables=EVIDENCE, term="NIS per row"),
-    Metric(("sigma_ratio", "position"), "consistency", "sigma ratio, position", tables=EVIDENCE, term="sigma ratio"),
+    Metric(("nis", "per_degree"), CONSISTENCY, "NIS per row", tables=EVIDENCE, term="NIS per row"),
+    Metric(("sigma_ratio", "rotation"), CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"),
     Metric(
         ("covariance", "not_positive_definite"),
-        "consistency",
+        CONSISTENCY,
         "covariances not positive definite",
         tables=EVIDENCE,
         term=NEES,
@@ -305,8 +328,11 @@ METRICS = (
 )
 TERMS: Mapping[str, str] = {
     "coverage": "Share of the recording's time (in a comparison: of the reference's) in which an estimator has poses.",
-    ATE: "Distance of the positions from ground truth after SE(3) alignment, m; with raw inertial data after "
-    "alignment in yaw and position; in a comparison from the reference, after the alignment that was asked for.",
+    ATE: "Distance of the positions from ground truth, m. Aligned: after SE(3) alignment, with raw inertial data after "
+    "alignment in yaw and position. Unaligned: both start at one pose, as in the charts over time. In a comparison: "
+    "from the reference, after the alignment that was asked for.",
+    SIGMA: "Standard deviation of the positions by an estimator's own covariances, m, under the problem's noise model, "
+    "with the first pose fixed, unaligned. A consistent estimator's error is as large.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
     RPE: "Error of the motion between two poses a delta apart, m and °.",
     "drift": "Relative error per meter (or second) over a tenth of the path.",
@@ -319,7 +345,8 @@ TERMS: Mapping[str, str] = {
     NEES: "Normalized estimation error squared of a pose, e^T P^-1 e with e = log(T^-1 T_true): 6 is expected of a "
     "consistent estimator, 5.35 in the median. A larger figure means that it is overconfident.",
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "
-    "in the median. Frames where P − P_ref is not positive definite are left out.",
+    "in the median. Frames where P − P_ref is not positive definite are left out. An estimator is overconfident where "
+    "its P is smaller than P_ref in a direction, in most frames.",
     "NIS per row": "Squared innovations of a filter over their covariance, per degree of freedom: 1 is expected.",
     "sigma ratio": "Sigma of an estimator over that of the reference, median of the frames: a filter's is above 1.",
     RESIDUALS: "Squared residuals of a track over the noise assumed, per degree of freedom: 1 is expected. A point is "

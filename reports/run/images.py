@@ -6,6 +6,7 @@ import click
 
 from fgbaseline.data import Sequence
 from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.formats.atomic_write import require_new
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.plural import plural
 from fgbaseline.data.toml_file import read_toml
@@ -49,10 +50,9 @@ def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path 
     """Tracks the images in `source` and writes `out`; prints what was found. Raises InputError."""
     if not has_images(source):
         raise InputError(f"{shown(source)}: this is no folder of images and no bag; check the path")
-    if out.exists() and not force:
-        raise InputError(f"{shown(out)}: the file exists; choose another, or replace it with --force")
+    require_new(out, force=force)
     found = tracked(source, options, settings)
-    found.write(out)
+    found.write(out, force=force)
     o, T = found.observations, len(found.recording.t)
     for remark in found.recording.remarks:
         click.echo(remark)

@@ -316,3 +316,16 @@ def test_a_disparity_of_one_pixel_is_not_above_it() -> None:
     problem = plain_problem(with_pixels(sequence, pixel))
     nothing = replace(problem, excluded=np.full_like(problem.excluded, data.Excluded.DISPARITY))
     assert expected_observations(nothing)[:4].tolist() == [False, True, True, False]
+
+
+def test_the_worst_criterion_decides_the_verdict_and_each_has_its_value_beside_its_limits() -> None:
+    answer = compare.trust(clean(), reference())
+    assert {c.code for c in answer.criteria} <= set(TrustLimits.__dataclass_fields__)
+    assert answer.verdict >= max(c.verdict for c in answer.criteria)
+    for c in answer.criteria:
+        beyond = (c.value < c.doubtful) if c.at_least else (c.value > c.doubtful)
+        assert beyond == (c.verdict is not Verdict.TRUSTED), c
+    tight = compare.trust(clean(), reference(), limits=TrustLimits(pixel_scale=(0.0, 0.1)))
+    pixel = next(c for c in tight.criteria if c.code == "pixel_scale")
+    assert tight.verdict is pixel.verdict is Verdict.UNTRUSTED
+    assert pixel.value == pytest.approx(pixel_scale(clean(), reference()))

@@ -21,7 +21,8 @@ from ..builders.synthetic import drive, matched
 def problems() -> dict[str, Problem]:
     """One with a mask and a kernel, one with priors and a fixed number of features."""
     sequence = drive(wrong=0.05)
-    return {"calibrated": matched(sequence), "documented": data.documented(sequence, 40)}
+    calibrated = replace(matched(sequence), pixel_inflation=2.5)
+    return {"calibrated": calibrated, "documented": data.documented(sequence, 40)}
 
 
 def assert_equal(expected: Any, actual: Any, where: str) -> None:
@@ -125,6 +126,7 @@ def put(index: Any, value: float) -> Any:
         ({"imu_T_cam": put((0, 0), 3.0)}, "imu_T_cam: its 3x3 block .* is no rotation"),
         ({"pixel_variance": np.array(-1.0)}, "pixel_variance: expected a positive number"),
         ({"pixel_variance": np.ones(2)}, "pixel_variance: expected shape"),
+        ({"pixel_inflation": np.array(0.0)}, "pixel_inflation: expected a positive number"),
         ({"huber_threshold": np.array(-1.0)}, "huber_threshold: expected a positive number"),
     ],
 )

@@ -122,7 +122,7 @@ def test_an_offset_is_found_and_told(files: Path) -> None:
     data.write_tum(files / "late.tum", t + 0.25, poses)
     result = compare(files / "truth.tum", files / "late.tum", search_offset=0.5, association="interpolated")
     assert result.results["late"].matched.offset == pytest.approx(-0.25, abs=1e-3)
-    assert any("fit best 250 ms earlier" in sentence for sentence in result.verdict)
+    assert any("fit best: late 250 ms earlier" in sentence for sentence in result.verdict)
 
 
 def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:
@@ -267,7 +267,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     covariance[3] = -covariance[3]
     data.write_trajectory_npz(files / "bad.npz", t, poses @ se3.exp(error), covariance)
     bad = compare(files / "truth.tum", files / "bad.npz", align="none")
-    assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
+    assert any(f"left out by NEES: 1 of the {len(t)} covariances of bad" in s for s in bad.verdict)
     aligned = compare(files / "truth.tum", files / "mine.npz").summary.estimates["mine"]
     assert aligned.nees is not None
     assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)

@@ -225,7 +225,7 @@ def test_the_keyboard_is_enough(opened: Opened) -> None:
     assert opened.attribute("#path-view .line.estimator-1", "d") == before
     reached = {""}
     opened.page.focus(".skip")
-    for _ in range(60):
+    for _ in range(90):
         opened.page.keyboard.press("Tab")
         reached.add(str(opened.page.evaluate("document.activeElement.id || document.activeElement.dataset.do || ''")))
     assert {"solid", "landmarks", "ellipses", "in", "out", "reset", "frame", "play"} <= reached

@@ -54,15 +54,15 @@ def test_a_departure_is_dated_to_the_first_frame_beyond_the_limit() -> None:
     assert limit < 5.0
     assert table["position"][left.frame] > limit
     assert (table["position"][: left.frame] <= limit).all()
-    said = told(run, "ekf: maximum divergence")
-    assert f"threshold 1 % of the path, {limit:.3g} m. The threshold is first exceeded at {left.seconds:.1f} s " in said
-    assert f"(frame {left.frame}), and in all frames from then on." in said
+    said = told(run, "Maximum divergence: ")
+    assert f"; threshold 1 % of the path, {limit:.3g} m. The threshold is first exceeded by ekf at " in said
+    assert f"by ekf at {left.seconds:.1f} s (frame {left.frame}), and in all frames from then on; by dead" in said
 
 
 def test_whoever_stays_near_is_said_to_stay() -> None:
     problem = plain_problem(scene())
     run = run_of(problem, answer(problem, "ekf", (0.0, 0.1, 0.0)), answer(problem, "isam2"))
-    said = told(run, "ekf: maximum divergence 0.100 m; threshold 1 % of the path, ")
+    said = told(run, "Maximum divergence: ekf 0.100 m; threshold 1 % of the path, ")
     assert "exceeded" not in said
 
 
@@ -70,16 +70,16 @@ def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> Non
     problem = plain_problem(scene())
     frame = problem.sequence.observations.frame
     run = run_of(problem, answer(problem, "ekf", (0.0, 3.0, 0.0)), answer(problem, "isam2"))
-    assert "mask" not in told(run, "ekf: maximum divergence")
+    assert not [s for s in verdict(run) if "mask" in s]
     left = divergence_onset(run, run.results["ekf"])
     assert left is not None
     excluded = np.where(frame == left.frame, Excluded.PREDICTION, Excluded.NO).astype(np.uint8)
     t = problem.sequence.t
     around = np.sum(np.abs(t - t[left.frame]) <= 1.0)
     masked = replace(run, problem=replace(problem, excluded=excluded))
-    sentence = told(masked, "ekf: maximum divergence")
+    sentence = told(masked, "Share of the observations that the mask excluded")
     whole = f"({100 / 60:.3g} % in the whole recording)"
-    assert f"excluded {100 / around:.3g} % of the observations as wrong matches {whole}" in sentence
+    assert f"as wrong matches within 1 s of that: {100 / around:.3g} % for ekf {whole}" in sentence
 
 
 def test_a_reference_worse_than_the_filter_is_called_so() -> None:

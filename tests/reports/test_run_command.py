@@ -18,7 +18,8 @@ import pytest
 from fgbaseline import data
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence, solve
+from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence
+from fgbaseline.reports.run.solution import solve
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
@@ -83,7 +84,10 @@ def test_the_folder_holds_what_was_promised_and_nothing_else(finished: Finished)
     expected |= {f"trajectories/{name}.tum" for name in ESTIMATORS}
     expected |= {f"landmarks/{name}.csv" for name in ESTIMATORS}
     expected |= {f"series/{name}.csv" for name in ESTIMATORS}
-    expected |= {"tables", *(f"tables/{name}.csv" for name in ("map_by_depth", "moved_points", "reprojection_classes"))}
+    expected |= {
+        "tables",
+        *(f"tables/{name}.csv" for name in ("map_by_depth", "moved_points", "reprojection_classes", "trust")),
+    }
     expected |= {f"figures/{name}.{kind}" for name in figures for kind in ("png", "svg")}
     assert everything_in(finished.out) == expected
     assert everything_in(finished.folder) == {"out", *(f"out/{name}" for name in expected)}

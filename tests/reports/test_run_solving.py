@@ -13,6 +13,7 @@ from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress,
 from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
+from fgbaseline.reports.run.solution import batch_is_added, solve
 
 from ..builders.synthetic import Scene, plain_problem
 
@@ -185,3 +186,19 @@ def test_the_simulated_drive_is_another_one_with_another_seed() -> None:
     one, other = (read_sequence(RunSettings(seed=seed)) for seed in (0, 1))
     assert one.n_frames == other.n_frames == 600
     assert not np.array_equal(one.linear_velocity, other.linear_velocity)
+
+
+@pytest.mark.parametrize("estimators", [("isam2",), ("isam2", "batch"), ("ekf",)])
+def test_batch_is_added_up_to_a_number_of_observations_where_it_has_the_answer_of_isam2(
+    estimators: tuple[str, ...],
+) -> None:
+    n = int(PROBLEM.mask.sum())
+    asked = RunSettings(estimators=estimators, batch_up_to=n)
+    assert batch_is_added(PROBLEM, asked) == (estimators == ("isam2",))
+    assert not batch_is_added(PROBLEM, replace(asked, batch_up_to=n - 1))
+    run = solve(PROBLEM, asked)
+    expected = ["isam2", "batch"] if "isam2" in estimators else ["ekf"]
+    assert list(run.results) == expected
+    assert run.settings["estimators"] == ",".join(expected)
+    events = {str(event.kind) for event in run.results["batch"].estimate.events} if "batch" in run.results else set()
+    assert ("started at isam2's answer only" in events) == (estimators == ("isam2",))

@@ -6,7 +6,7 @@ import gtsam
 import numpy as np
 import pytest
 
-from fgbaseline import data, smoother
+from fgbaseline import compare, data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray
@@ -138,6 +138,23 @@ def test_without_an_answer_of_isam2_there_is_one_start_and_batch_says_so() -> No
     assert "one start only" in kinds(estimate)
     assert estimate.used.all()
     np.testing.assert_allclose(estimate.world_T_imu, smoother.isam2(problem).world_T_imu, rtol=0, atol=1e-3)
+
+
+def test_started_at_isam2_alone_it_reaches_the_minimum_of_both_starts_unless_isam2_failed() -> None:
+    problem = PROBLEMS["plain"]
+    given = {"isam2": smoother.isam2(problem)}
+    both, one = smoother.batch(problem, given=given), smoother.batch(problem, given=given, from_dead_reckoning=False)
+    (event,) = one.events
+    assert event.kind == "started at isam2's answer only"
+    assert "dead reckoning" not in event.reason
+    assert one.status is Status.OK
+    np.testing.assert_allclose(one.world_T_imu, both.world_T_imu, rtol=0, atol=1e-5)
+    verdict = compare.trust(problem, given["isam2"], one)
+    assert any("started at isam2's answer agrees" in reason for reason in verdict.reasons)
+
+    failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
+    alone = smoother.batch(problem, given={"isam2": failed}, from_dead_reckoning=False)
+    assert "one start only" in kinds(alone)
 
 
 def test_a_landmark_behind_the_cameras_is_given_up() -> None:
