@@ -178,7 +178,7 @@ class Estimate(Displayed):
         return f"Estimate {self.name}: {self.status}" + (f", {self.reason}" if self.reason else "")
 
     def _facts(self) -> Mapping[str, str]:
-        known = np.isfinite(self.world_T_imu).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(self.world_T_imu).all(axis=(1, 2)))
         length = path_length(self.world_T_imu[:, :3, 3])
         facts = {
             "poses": f"{known.sum():,} of {plural(len(known), 'frame')}, path {length:.1f} m",

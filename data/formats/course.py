@@ -6,7 +6,7 @@
 | `linear_velocity` | (3, T) m/s | all, unless there are raw inertial samples |
 | `angular_velocity` | (3, T) rad/s | later, own, unless there are raw inertial samples |
 | `rotational_velocity` | (3, T) rad/s | 2020 |
-| `features` | (4, N, T) px, -1 unobserved; may be absent | all |
+| `features` | (4, N, T) px, -1 unobserved; may be absent, or a list (`observation_list`) | all |
 | `K`, `b` | (3, 3) px, scalar m | all |
 | `imu_T_cam` | (4, 4) | later, own |
 | `cam_T_imu` | (4, 4): rotation IMU to camera, translation the camera's position in the IMU frame | 2020 |
@@ -29,8 +29,9 @@ from .frame_stamps import read_stamps
 from .imu_arrays import STAMPS, read_imu_arrays, read_state_truth
 from .imu_attachment import attach_imu
 from .npz_archive import NpzArchive
+from .observation_list import FRAME, read_observation_list
 
-OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS})
+OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS, FRAME})
 VELOCITY_KEYS = frozenset({"linear_velocity", "angular_velocity", "rotational_velocity"})
 EXACT = 1e-9
 """how far from 0 or 1 the entries may be that have to be 0 or 1"""
@@ -44,8 +45,14 @@ _ODD_EXTRINSIC = (
 _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can be run on it."
 
 
-def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
-    """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
+def read_course(
+    archive: NpzArchive, name: str, source: str, given: FloatArray | None = None, *, moves: bool = False
+) -> Sequence:
+    """The recording in an open npz of either course form or of our own. Raises InputError naming the key.
+
+    `given` (4, 4) stands in for `imu_T_cam`. `moves` is whether the motion is from another file: then the velocities
+    may be absent, and are zero.
+    """
     form = course_form(archive.keys)
     inertial = STAMPS in archive.keys
     stamps = read_stamps("time_stamps", archive.array("time_stamps"))
@@ -53,7 +60,9 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
     observations, n_landmarks = Observations.none(), 0
     remarks, findings = [], stamps.findings
-    if "features" in archive.keys:
+    if FRAME in archive.keys:
+        observations, n_landmarks = read_observation_list(archive, T)
+    elif "features" in archive.keys:
         with archive.stream("features") as stream:
             observations, n_landmarks, zeros = read_features(stream, T)
         findings += zeros
@@ -65,7 +74,9 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     if moved:
         remarks.append(moved)
     velocity, turned = np.zeros((T, 3)), np.zeros((T, 3))
-    if not inertial or archive.keys & VELOCITY_KEYS:
+    if FRAME in archive.keys and not (inertial or moves or archive.keys & VELOCITY_KEYS):
+        raise InputError("it has tracks and no motion; add --imu CSV or --velocities CSV")
+    if archive.keys & VELOCITY_KEYS or not (inertial or moves):
         velocity = vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))
         turned = vectors(rate, _shaped(archive, rate, (3, T)))
     sequence = Sequence(
@@ -74,7 +85,7 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
         linear_velocity=velocity[stamps.kept],
         angular_velocity=turned[stamps.kept],
         camera=_camera(archive),
-        imu_T_cam=_extrinsic(archive, form),
+        imu_T_cam=_extrinsic(archive, form) if given is None else given,
         observations=stamps.observations(observations),
         n_landmarks=n_landmarks,
         truth=stamps.truth(truth),
@@ -132,6 +143,8 @@ def _camera(archive: NpzArchive) -> StereoCamera:
 
 def _extrinsic(archive: NpzArchive, form: str) -> FloatArray:
     key = "cam_T_imu" if form == "course-2020" else "imu_T_cam"
+    if key not in archive.keys and FRAME in archive.keys:
+        raise InputError("the pose of its left camera on the IMU is not known; add --extrinsic FILE")
     matrix = _shaped(archive, key, (4, 4))
     if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         raise InputError(f"{key}: its last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]")

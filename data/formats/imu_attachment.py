@@ -10,9 +10,18 @@ from ..finding import Finding
 from ..observations import BoolArray, Observations
 from ..plural import plural
 from ..sequence import Sequence
+from .imu_csv import read_imu_csv
 from .imu_samples import RawSamples
+from .imu_yaml import ImuCalibration
+from .named_file import FilePath
 
 MIN_FRAMES = 2
+
+
+def read_imu(samples: FilePath, calibration: ImuCalibration) -> RawSamples:
+    """The samples of a CSV with the noise of a calibration, and the remarks of both. Raises as `read_imu_csv`."""
+    raw = read_imu_csv(samples, calibration.noise, calibration.gravity)
+    return raw._replace(remarks=(*calibration.remarks, *raw.remarks))
 
 
 def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: bool = True) -> Sequence:

@@ -4,11 +4,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ..imu import STANDARD_GRAVITY, ImuNoise
+from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY, ImuNoise
 from .fields import positive
-from .named_file import FilePath, reading, regular_file
+from .imu_arrays import assumed_noise
+from .named_file import FilePath, reading
+from .yaml_file import pose, read_yaml
 
 KEYS = {
     "gyroscope_density": "gyroscope_noise_density",
@@ -18,23 +20,35 @@ KEYS = {
 }
 """those of EuRoC and Kalibr, by the fields of `ImuNoise`"""
 GRAVITY = ("gravity_magnitude", "gravity")
-MOST_BYTES = 2**20
+NOT_APPLIED = "Its pose in the body is not the identity and is not applied: imu_T_cam has to be that of the IMU itself."
 
 
 class ImuCalibration(NamedTuple):
-    """Noise densities, and gravity's magnitude in m/s^2."""
+    """Noise densities, gravity's magnitude in m/s^2 and, where it is not the body, the IMU's pose in the body."""
 
     noise: ImuNoise
     gravity: float
-    remarks: tuple[str, ...]
+    body_T_imu: FloatArray | None = None
+    """(4, 4)"""
+    assumed: str = ""
+    """remark where the noise is not that of the unit"""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks for samples whose pose in the body is not applied."""
+        turned = () if self.body_T_imu is None else (NOT_APPLIED,)
+        return (self.assumed, *turned) if self.assumed else turned
+
+
+def assumed_calibration(why: str) -> ImuCalibration:
+    """Stands in for a calibration that is missing."""
+    return ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, assumed=assumed_noise(why))
 
 
 def read_imu_calibration(path: FilePath) -> ImuCalibration:
     """The noise in a YAML file, at its top level or under `imu0`. Raises InputError naming file and key."""
     with reading(path):
-        tree = _tree(path)
-        if not isinstance(tree, dict):
-            raise InputError("it has no keys; give EuRoC's sensor.yaml of the IMU, or Kalibr's imu.yaml")
+        tree = read_yaml(path)
         unit = tree.get("imu0", tree)
         if not isinstance(unit, dict) or not set(KEYS.values()) & set(unit):
             raise InputError(
@@ -43,21 +57,18 @@ def read_imu_calibration(path: FilePath) -> ImuCalibration:
         noise = ImuNoise(**{field: _number(unit, key) for field, key in KEYS.items()})
         found = next((key for key in GRAVITY if key in unit), None)
         gravity = STANDARD_GRAVITY if found is None else positive(found, np.array(_number(unit, found)), "m/s^2")
-        return ImuCalibration(noise, gravity, tuple(_remarks(unit)))
+        return ImuCalibration(noise, gravity, _pose(unit))
 
 
-def _tree(path: FilePath) -> Any:
-    import yaml
-
-    file = regular_file(path)
-    if file.stat().st_size > MOST_BYTES:
-        raise InputError("it is larger than 1 MiB, and no calibration; check the file")
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-        # OpenCV writes %YAML:1.0, which is no directive of YAML
-        return yaml.safe_load("\n".join(line for line in text.splitlines() if not line.startswith("%")))
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise InputError(f"it is no YAML ({' '.join(str(error).split())[:120]})") from error
+def _pose(unit: dict[str, Any]) -> FloatArray | None:
+    """EuRoC's T_BS, or the inverse of Kalibr's T_i_b; None where it is absent or the identity."""
+    key = next((key for key in ("T_BS", "T_i_b") if unit.get(key) is not None), None)
+    if key is None:
+        return None
+    found = pose(unit[key], key)
+    if np.allclose(found, np.eye(4), atol=1e-9):
+        return None
+    return found if key == "T_BS" else se3.inverse(found)
 
 
 def _number(unit: dict[str, Any], key: str) -> float:
@@ -67,16 +78,3 @@ def _number(unit: dict[str, Any], key: str) -> float:
         return float(unit[key])  # YAML 1.1 has 1e-3 as a text
     except (TypeError, ValueError) as error:
         raise InputError(f"{key}: expected a number, got {str(unit[key])[:60]!r}") from error
-
-
-def _remarks(unit: dict[str, Any]) -> list[str]:
-    """A remark where the samples are not those of the body to which the calibration refers."""
-    pose = unit.get("T_BS", unit.get("T_i_b"))
-    values = pose.get("data") if isinstance(pose, dict) else pose
-    try:
-        matrix = np.array(values, dtype=np.float64).reshape(4, 4)
-    except (TypeError, ValueError):
-        return []
-    if np.allclose(matrix, np.eye(4), atol=1e-9):
-        return []
-    return ["Its pose in the body is not the identity and is not applied: imu_T_cam has to be that of the IMU itself."]

@@ -5,40 +5,75 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry import FloatArray, InputError, StereoCamera
 
-from ..observations import IntArray
+from ..observations import IntArray, Observations
 from ..sequence import Sequence
 from .atomic_write import atomic_write
 from .feature_block import CHUNK, UNOBSERVED
 from .imu_arrays import imu_arrays, state_truth_arrays
 from .named_file import FilePath
 from .npz_member import write_member
+from .observation_list import observation_arrays
 
 
-def write_npz(sequence: Sequence, path: FilePath, *, force: bool = True) -> None:
+def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False, force: bool = True) -> None:
     """Writes a recording with its truth, all or nothing; `read` gives every array back bit by bit.
 
-    The dense feature block is made and compressed a few landmarks at a time. Raises InputError when the file cannot be
-    written, exists and `force` is false, or a pixel coordinate is exactly -1, which in the file means 'not observed'.
+    The dense feature block is made and compressed a few landmarks at a time; `flat` writes the observations as a list
+    instead, for recordings of many short tracks. Raises InputError when the file cannot be written, exists and `force`
+    is false, or a pixel coordinate is exactly -1, which in the block means 'not observed'.
     """
+    if flat:
+        with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
+            _write(archive, _arrays(sequence) | observation_arrays(sequence.observations))
+        return
     if (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
     with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
-        for key, array in _arrays(sequence).items():
-            write_member(archive, key, array.shape, [array])
+        _write(archive, _arrays(sequence))
         if sequence.n_landmarks:
             shape = (4, sequence.n_landmarks, sequence.n_frames)
             write_member(archive, "features", shape, _feature_chunks(sequence))
 
 
+def write_tracks(
+    path: FilePath,
+    t: FloatArray,
+    camera: StereoCamera,
+    observations: Observations,
+    imu_T_cam: FloatArray | None,
+    *,
+    force: bool = True,
+) -> None:
+    """Writes tracks of frames t (T,), s, without motion: `read` needs it, and `imu_T_cam` (4, 4), from elsewhere.
+
+    Raises InputError when the file cannot be written, or exists and `force` is false.
+    """
+    arrays = {"time_stamps": t[None, :], **_calibration(camera), **observation_arrays(observations)}
+    if imu_T_cam is not None:
+        arrays["imu_T_cam"] = imu_T_cam
+    with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
+        _write(archive, arrays)
+
+
+def _write(archive: zipfile.ZipFile, arrays: dict[str, FloatArray]) -> None:
+    for key, array in arrays.items():
+        write_member(archive, key, array.shape, [array])
+
+
+def _calibration(camera: StereoCamera) -> dict[str, FloatArray]:
+    return {
+        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
+        "b": np.array(camera.baseline),
+    }
+
+
 def _arrays(s: Sequence) -> dict[str, FloatArray]:
-    camera = s.camera
     arrays = {
         "time_stamps": s.t[None, :],
         **_measured(s),
-        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
-        "b": np.array(camera.baseline),
+        **_calibration(s.camera),
         "imu_T_cam": s.imu_T_cam,
         "up_imu": s.up if s.up_imu is None else s.up_imu,
     }

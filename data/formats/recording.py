@@ -1,25 +1,25 @@
 """Reader of recordings in all known forms, detected from the content and never from the file name."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import FloatArray, InputError
 
-from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ..sequence import Sequence
 from ..time_unit import TimeUnit, in_seconds
 from .course import read_course
 from .ground_truth import BodyFrame, attach_truth
-from .imu_arrays import assumed_noise
-from .imu_attachment import attach_imu
-from .imu_csv import read_imu_csv
-from .imu_yaml import ImuCalibration, read_imu_calibration
+from .imu_attachment import attach_imu, read_imu
+from .imu_yaml import assumed_calibration, read_imu_calibration
 from .mat_file import MatFile
 from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
+from .trajectory_reader import read_extrinsic
 from .utias import read_utias
+from .velocity_csv import read_velocity_csv
 
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -34,18 +34,28 @@ def read(
     time_unit: TimeUnit | None = None,
     imu: FilePath | None = None,
     imu_calibration: FilePath | None = None,
+    velocities: FilePath | None = None,
+    extrinsic: FilePath | None = None,
 ) -> Sequence:
     """The recording in the file `path`: a course file, one of our own, or a UTIAS `.mat`.
 
     `time_unit` is that of its stamps; without it they are in seconds, unless they show another unit (`time_unit.py`).
 
-    `imu` is a CSV of raw inertial samples, `imu_calibration` the YAML of their noise: they replace the velocities.
+    `imu` is a CSV of raw inertial samples, `imu_calibration` the YAML of their noise: they replace the velocities, as
+    does a CSV of other `velocities`. `extrinsic` is a file with imu_T_cam in one line of 12 numbers.
 
     `truth` is a KITTI or TUM file with the poses of `truth_frame`, "camera" or "imu" (see `attach_truth`); without it
     the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
     """
     with reading(path), np.errstate(all="ignore"):  # absurd numbers are judged, not computed with
-        sequence = in_seconds(_read(regular_file(path), os.fspath(path)), time_unit)
+        given = None if extrinsic is None else read_extrinsic(extrinsic)
+        moves = imu is not None or velocities is not None
+        sequence = in_seconds(_read(regular_file(path), os.fspath(path), given, moves=moves), time_unit)
+    if imu is not None and velocities is not None:
+        raise InputError("imu: a recording has raw inertial samples or velocities; leave out --imu or --velocities")
+    if velocities is not None:
+        linear, angular = read_velocity_csv(velocities, sequence.t)
+        sequence = replace(sequence, linear_velocity=linear, angular_velocity=angular, imu=None)
     if imu is not None:
         sequence = _with_imu(sequence, imu, imu_calibration)
     elif imu_calibration is not None:
@@ -54,25 +64,24 @@ def read(
 
 
 def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -> Sequence:
-    found = ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, (assumed_noise("no imu-calibration is given"),))
-    if calibration is not None:
-        found = read_imu_calibration(calibration)
-    raw = read_imu_csv(imu, found.noise, found.gravity)
+    unknown = assumed_calibration("no imu-calibration is given")
+    raw = read_imu(imu, unknown if calibration is None else read_imu_calibration(calibration))
     with reading(imu):
-        return attach_imu(sequence, raw._replace(remarks=(*found.remarks, *raw.remarks)), shown(imu))
+        return attach_imu(sequence, raw, shown(imu))
 
 
-def _read(file: Path, source: str) -> Sequence:
+def _read(file: Path, source: str, given: FloatArray | None, *, moves: bool) -> Sequence:
     with file.open("rb") as opened:
         head = opened.read(1024)
     if head.startswith(ZIP):
         with NpzArchive(file) as archive:
-            return read_course(archive, file.stem, source)
+            return read_course(archive, file.stem, source, given, moves=moves)
     if head.startswith(b"MATLAB") and head[MATLAB_HEADER - 2 : MATLAB_HEADER] in (b"IM", b"MI"):
         if HDF5 in head:
             raise InputError("this is a MATLAB 7.3 file (HDF5), which is not supported; save it with save(..., '-v7')")
         with MatFile(file) as mat:
-            return read_utias(mat, file.stem, source)
+            sequence = read_utias(mat, file.stem, source)
+        return sequence if given is None else replace(sequence, imu_T_cam=given)
     raise InputError(f"{_what(head)}; expected an .npz of the course or of fgbaseline, or a UTIAS .mat")
 
 

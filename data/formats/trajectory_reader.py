@@ -10,6 +10,8 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
+from .bag_file import split_topic
+from .bag_trajectory import read_bag_trajectory
 from .columns import Columns, Order, counted_columns, named_columns
 from .named_file import FilePath, reading, regular_file, shown
 from .number_table import Lines, read_lines
@@ -76,12 +78,23 @@ def read_kitti(path: FilePath) -> FloatArray:
     return read_trajectory(path, "kitti").world_T_body
 
 
+def read_extrinsic(path: FilePath) -> FloatArray:
+    """The pose (4, 4) of the left camera on the IMU, in one line of 12 numbers. Raises InputError."""
+    poses = read_kitti(path)
+    with reading(path):
+        if len(poses) != 1:
+            raise InputError(f"expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
+    return np.asarray(poses[0], dtype=np.float64)
+
+
 def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
 ) -> ParsedTrajectory:
-    """Parsed trajectory file, with what it leaves open. Raises as `read_trajectory`."""
+    """Parsed file, or topic of a bag (`run.bag:/odom`), with what it leaves open. Raises as `read_trajectory`."""
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
+    if (in_bag := split_topic(path)) is not None:
+        return read_bag_trajectory(*in_bag, name)
     with reading(path), np.errstate(all="ignore"):
         file = regular_file(path)
         empty = ParsedTrajectory(name or file.stem.removesuffix(".txt"), shown(path), np.empty((0, 3)), None)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -129,3 +130,33 @@ held_out = click.option(
     metavar="SHARE",
     help="Share of the tracks that diagnosis and estimators do not use; they rank the paths.",
 )
+_IMAGES = (
+    click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
+    click.option(
+        "--calibration", type=PATH, metavar="YAML", help="Images: cameras of two folders or a bag, Kalibr or OpenCV."
+    ),
+    click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of two folders, a line for each image."),
+    click.option("--topics", metavar="LEFT,RIGHT[,IMU]", help="Images: topics of a bag.  [default: by their types]"),
+    click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
+)
+_MOTION = (
+    click.option(
+        "--velocities",
+        type=PATH,
+        metavar="CSV",
+        help="Body velocities: stamp, vx, vy, vz, wx, wy, wz, in place of the motion of SEQUENCE.",
+    ),
+    click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
+)
+
+
+def images(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of recordings of images, and of motion given beside them."""
+    for option in reversed((*_MOTION, *_IMAGES)):
+        command = option(command)
+    return command
+
+
+def topic_names(text: str | None) -> tuple[str, ...]:
+    """Names separated by commas."""
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())

@@ -1,4 +1,4 @@
-"""Commands on a recording: `run`, `diagnose`, `export` and `simulate`; `estimators` lists what can run on it."""
+"""Commands on a recording: `run`, `track`, `diagnose`, `export`, `simulate`; `estimators` lists what can run on it."""
 
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.as_recorded
 @options.imu
 @options.imu_calibration
+@options.images
 @options.time_unit
 @options.repairs
 @options.held_out
@@ -85,9 +86,14 @@ def run(
     landmarks: str,
     time_unit: str | None,
     rerun_file: Path | None,
+    topics: str | None,
+    settings: Path | None,
     **given: Any,
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
+
+    SEQUENCE is a recording of tracks, or a folder or ROS bag of stereo images: their tracks are written into the
+    folder of the run, tracks.npz.
 
     Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
 
@@ -103,15 +109,37 @@ def run(
     functions = load_all(user_estimators)
     asked = DEFAULT_ESTIMATORS if estimators is None else estimators
     names = [name.strip() for name in asked.split(",") if name.strip()]
-    settings = RunSettings(
+    chosen = RunSettings(
         estimators=(*names, *(name for name in functions if name not in names)),
         batch_up_to=BATCH_OBSERVATIONS if estimators is None else 0,
         functions=functions,
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
+        topics=options.topic_names(topics),
+        tracker=settings,
         **given,
     )
-    return run_and_report(settings, out, force=force, rerun_file=rerun_file, opened=opened)
+    return run_and_report(chosen, out, force=force, rerun_file=rerun_file, opened=opened)
+
+
+@click.command(epilog="Example: fgbaseline track V1_01_easy --out out/tracks.npz")
+@click.argument("source", metavar="INPUT", type=PATH)
+@click.option("--out", type=PATH, required=True, help="Npz to write.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@options.imu
+@options.imu_calibration
+@options.images
+def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
+    """Track the stereo images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
+
+    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. The
+    npz is a recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
+    """
+    from fgbaseline.data.tracking import ImageOptions
+
+    from ..run.images import write_tracks
+
+    return write_tracks(source, out, ImageOptions(topics=options.topic_names(topics), **given), settings, force=force)
 
 
 @click.command(epilog="Example: fgbaseline estimators")
@@ -135,6 +163,7 @@ def estimators() -> None:
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
 @options.imu
 @options.imu_calibration
+@options.images
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 @options.open_page
@@ -143,11 +172,12 @@ def diagnose(
     out: Path | None,
     as_json: bool,
     write_repairs: Path | None,
-    imu: Path | None,
-    imu_calibration: Path | None,
     time_unit: str | None,
     force: bool,
     opened: bool,
+    topics: str | None,
+    settings: Path | None,
+    **given: Any,
 ) -> int:
     """Detect the faults of SEQUENCE and estimate its noise.
 
@@ -156,12 +186,16 @@ def diagnose(
 
     Exits 0 without findings, 1 with findings, 2 when the diagnosis is undecided, and on bad input.
     """
-    from fgbaseline.data import TimeUnit, read
+    from fgbaseline.data import TimeUnit
 
     from ..run.diagnose import print_diagnosis
+    from ..run.problem import RunSettings, read_sequence
 
     unit = None if time_unit is None else TimeUnit(time_unit)
-    recording = read(sequence, time_unit=unit, imu=imu, imu_calibration=imu_calibration)
+    chosen = RunSettings(
+        sequence=sequence, time_unit=unit, topics=options.topic_names(topics), tracker=settings, **given
+    )
+    recording = read_sequence(chosen)
     return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force, opened=opened)
 
 
@@ -173,13 +207,14 @@ def diagnose(
 @options.features
 @options.imu
 @options.imu_calibration
+@options.images
 @options.as_recorded
 @options.repairs
 @options.held_out
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice of held-out tracks."
 )
-def export(out: Path, force: bool, **given: Any) -> int:
+def export(out: Path, force: bool, topics: str | None, settings: Path | None, **given: Any) -> int:
     """Write the problem that `fgbaseline run` would solve on SEQUENCE: npz, CSV and JSON.
 
     The files hold repaired velocities, increments with covariances, observations with the mask, noise, kernel,
@@ -191,7 +226,8 @@ def export(out: Path, force: bool, **given: Any) -> int:
     from ..run.command import export as export_problem
     from ..run.problem import RunSettings
 
-    return export_problem(RunSettings(**given), out, force=force)
+    chosen = RunSettings(topics=options.topic_names(topics), tracker=settings, **given)
+    return export_problem(chosen, out, force=force)
 
 
 @click.command(epilog="Example: fgbaseline simulate drive.npz --path loop --duration 120 --burst 20:22:0.5 --seed 7")

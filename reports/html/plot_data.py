@@ -15,6 +15,7 @@ from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.top_view import TopView
+from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
 from fgbaseline.reports.tables.run import REASONS
@@ -186,8 +187,11 @@ EDGE = 8.0
 """px between the outermost observations and the frame drawn around them"""
 
 
-def page_data(run: Run) -> dict[str, Any]:
-    """Everything in the coordinates of the view from above: x ahead of the start, y to its left, z up, m."""
+def page_data(run: Run, image_size: tuple[int, int] | None = None) -> dict[str, Any]:
+    """Everything in the coordinates of the view from above: x ahead of the start, y to its left, z up, m.
+
+    `image_size` is width and height, px, where they are known.
+    """
     view, sequence = TopView.of(run.problem), run.problem.sequence
     axes = np.stack([view.ahead, view.left, view.up])
     truth = sequence.truth
@@ -201,7 +205,7 @@ def page_data(run: Run) -> dict[str, Any]:
         "reference": run.reference,
         "estimators": [_estimator(run, r, axes) for r in run.results.values()],
         "truth": None if truth is None else floats(truth.world_T_imu[:, :3, 3] @ axes.T),
-        "camera": _camera(run),
+        "camera": _camera(run, image_size),
         "observations": _observations(run),
         "reasons": {str(int(Excluded[key.upper().replace(" ", "_")])): text for key, text in REASONS.items()},
         "charts": charts(run),
@@ -239,13 +243,22 @@ def _position_covariance(estimate: Estimate, axes: FloatArray) -> str | None:
     return floats(P[:, row, column])
 
 
-def _camera(run: Run) -> dict[str, Any]:
-    """Intrinsics, and the size of the image as far as it is known: what the observations reach to."""
+def image_data(run: Run, images: Pictures) -> dict[str, list[str]]:
+    """Left and right image by the number of their frame, as data URIs."""
+    return {
+        str(k): [f"data:image/jpeg;base64,{b64encode(image).decode('ascii')}" for image in (pair.left, pair.right)]
+        for k, pair in images.by_frame(run.problem.sequence.t).items()
+    }
+
+
+def _camera(run: Run, size: tuple[int, int] | None) -> dict[str, Any]:
+    """Intrinsics, and the size of the image, px; where it is not known, what the observations reach to."""
     camera, pixel = run.problem.sequence.camera, run.problem.sequence.observations.pixel
     reach = pixel.max(axis=0) if len(pixel) else np.zeros(4)
     width, height = (max(c, float(reach[i::2].max()) + EDGE) for i, c in enumerate((camera.cu, camera.cv)))
     intrinsics = {name: float(getattr(camera, name)) for name in ("fu", "fv", "cu", "cv", "baseline")}
-    return {**intrinsics, "width": round(width), "height": round(height)}
+    width, height = size or (round(width), round(height))
+    return {**intrinsics, "width": width, "height": height}
 
 
 def _observations(run: Run) -> dict[str, Any] | None:

@@ -6,31 +6,48 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.data.tracking import Pictures
 
 from ..figures import EncodedFigure
 from ..figures.style import colors
 from ..formatting import counted, number
 from ..phrases.run import verdict
+from ..phrases.tracks import track_sentences
 from ..tables import Table
 from ..tables import run as tables
 from .environment import Picture, picture
 from .page import Block, Folded, Grid, Live, Note, Page, Section, Sentences, render_page
-from .plot_data import page_data
+from .plot_data import embedded_json, image_data, page_data
 
+PAGE_BYTES = 20_000_000
+"""largest page with images; they are thinned to what its plots and figures leave"""
+MARKUP_BYTES = 500_000
+"""of tables, style and script, generously"""
 EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "image_regions", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_distribution",)
 """figures that stand beside the interactive charts, because they show what these do not; the others are folded away"""
 
 
-def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
+def render(
+    run: Run,
+    summary: Mapping[str, Any],
+    figures: Mapping[str, Figure | EncodedFigure],
+    images: Pictures | None = None,
+) -> str:
     """`report.html` of a run.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
-    `figures.draw_and_write(run)` gave.
+    `figures.draw_and_write(run)` gave; `images` lie under the observations.
     """
     pictures = {name: picture(name, figure) for name, figure in figures.items()}
-    plots = page_data(run) if run.answered or run.problem.sequence.truth is not None else None
+    images = Pictures() if images is None else images
+    plots = None
+    if run.answered or run.problem.sequence.truth is not None:
+        plots = page_data(run, images.size)
+        rest = len(embedded_json(plots)) + sum(len(each.source) for each in pictures.values()) + MARKUP_BYTES
+        images.thin(max(0, PAGE_BYTES - rest) * 3 // 4)  # base64 has four letters for three bytes
+        plots["images"] = image_data(run, images)
     sequence, problem = summary["sequence"], summary["problem"]
     table = Grid(tables.main_table(run, summary["estimators"]))
     remarks = [*sequence["remarks"], *problem["remarks"]]
@@ -42,7 +59,7 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             about=_about(run, sequence, problem),
             verdict=verdict(run),
             table=Section("table", "Every estimator", [table, *_notes(run)], "Table"),
-            sections=_sections(run, summary, pictures, plots),
+            sections=_sections(run, summary, pictures, plots, images),
             record=[Note("Remarks on the recording and the problem", is_heading=True), Sentences(remarks, "remarks")]
             if remarks
             else [],
@@ -69,7 +86,11 @@ def _notes(run: Run) -> list[Block]:
 
 
 def _sections(
-    run: Run, summary: Mapping[str, Any], pictures: Mapping[str, Picture], plots: Mapping[str, Any] | None
+    run: Run,
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, Picture],
+    plots: Mapping[str, Any] | None,
+    images: Pictures,
 ) -> list[Section]:
     """The sections below table and paths; those without blocks are left out."""
     estimators = summary["estimators"]
@@ -86,13 +107,14 @@ def _sections(
     ]
     live = plots is not None
     seen = plots is not None and plots["observations"] is not None
+    frame: list[Block] = [Live("frame")]
+    if images.step > 1:
+        frame.insert(0, Note(f"To keep the page small, every {images.step}th frame has its images."))
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
-        Section("behind", "What stands behind the numbers", _behind(run), "Findings"),
+        Section("behind", "What stands behind the numbers", _behind(run, plots), "Findings"),
         Section("over-time", "Over time", [Live("charts"), *figure_blocks(pictures, CHART_FIGURES)] if live else []),
-        Section(
-            "one-frame", "One frame in the images", [Live("frame")] if seen else [], "One frame", needs_script=True
-        ),
+        Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
             "evidence",
             "Beyond the paths: held-out tracks, consistency, residuals, map",
@@ -105,12 +127,15 @@ def _sections(
     ]
 
 
-def _behind(run: Run) -> list[Block]:
-    """Trust in the reference with its criteria, and the diagnosis with its findings and repairs."""
+def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
+    """Trust in the reference with its criteria, the tracks, and the diagnosis with its findings and repairs."""
     blocks: list[Block] = []
     if run.reference is not None:
         blocks.append(trust(run.reference, run.trust.verdict.name.lower(), run.trust.reasons, run.trust.criteria))
     problem = run.problem
+    size = None if plots is None else (plots["camera"]["width"], plots["camera"]["height"])
+    if size is not None and (tracks := track_sentences(problem.sequence, size)):
+        blocks += [Note("The recording", is_heading=True), Sentences(tracks, "tracks")]
     findings = tables.findings_table(problem.findings)
     if not (problem.diagnosed or findings.rows or problem.repairs):
         return blocks

@@ -4,15 +4,17 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.data import Excluded, Problem
+from fgbaseline.data import Excluded, Problem, write_npz
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
+from fgbaseline.data.tracking import Pictures
 
 from ..announced import announce
 from .problem import (
     MARK,
+    TRACKS,
     RunSettings,
     build_problem,
     check_estimators,
@@ -32,7 +34,8 @@ def run(
 ) -> int:
     """Runs the estimators, writes the folder, prints the main results; returns 1 where an estimator failed, else 0."""
     check_estimators(settings.estimators, settings.functions)
-    sequence = read_sequence(settings)
+    pictures = Pictures()
+    sequence = read_sequence(settings, pictures)
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=MARK)
     if rerun_file is not None:
@@ -83,7 +86,9 @@ def run(
             progress.print_line(f"{name} failed: {result.estimate.reason}")
     progress.print_line("writing the report")
     with atomic_folder(place, force=force, mark=MARK) as folder:
-        summary = write_run(solved, folder, cores())
+        summary = write_run(solved, folder, cores(), pictures)
+        if pictures.size is not None:
+            write_npz(sequence, folder / TRACKS, flat=True)
         if rerun_file is not None:
             from .rerun import write_rerun
 

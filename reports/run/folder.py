@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.compare import CovarianceState, reprojection_by
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, write_tum
+from fgbaseline.data.tracking import Pictures
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.run import Summary, summarize
@@ -24,17 +25,18 @@ from fgbaseline.reports.tables.run import main_table, main_values, metrics_table
 TRUTH_FILE = "truth.tum"
 
 
-def write_run(run: Run, folder: Path, processes: int = 1) -> Summary:
+def write_run(run: Run, folder: Path, processes: int = 1, pictures: Pictures | None = None) -> Summary:
     """Writes all files of a run into an existing, empty folder; returns the summary.
 
-    `processes` draw the figures in parallel; a caller that is itself one of several processes leaves it at one.
+    `processes` draw the figures in parallel; a caller that is itself one of several processes leaves it at one. The
+    page shows the `pictures`.
     """
     with figures.drawn_in_background(run, processes) as finished:
         summary = write_numbers(run, folder)
         drawn = finished()
     (folder / "figures").mkdir()
     figures.save(drawn, folder / "figures")
-    write_page(run, summary, folder, drawn)
+    write_page(run, summary, folder, drawn, pictures)
     return summary
 
 
@@ -73,9 +75,15 @@ def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**text)
 
 
-def write_page(run: Run, summary: Summary, folder: Path, drawn: Mapping[str, Figure | figures.EncodedFigure]) -> None:
-    """Writes `report.html` with the given figures."""
-    (folder / "report.html").write_text(render(run, as_dict(summary), drawn), encoding="utf-8")
+def write_page(
+    run: Run,
+    summary: Summary,
+    folder: Path,
+    drawn: Mapping[str, Figure | figures.EncodedFigure],
+    pictures: Pictures | None = None,
+) -> None:
+    """Writes `report.html` with the given figures and images."""
+    (folder / "report.html").write_text(render(run, as_dict(summary), drawn, pictures), encoding="utf-8")
 
 
 def as_dict(summary: Summary) -> dict[str, Any]:

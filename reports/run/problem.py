@@ -22,12 +22,18 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
+from fgbaseline.data.tracking import ImageOptions, Pictures, has_images
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
+BESIDE = ("velocities", "extrinsic")
+IMAGES = ("right", "calibration", "times", "tracker")
+"""settings that only recordings of images have"""
+TRACKS = "tracks.npz"
+"""of a run on images, in its folder"""
 MARK = "summary.json"
 """the file that marks a run's folder"""
 
@@ -58,6 +64,20 @@ class RunSettings:
     """CSV of raw inertial samples, in place of the recording's velocities"""
     imu_calibration: Path | None = None
     """YAML of their noise"""
+    velocities: Path | None = None
+    """CSV of body velocities, in place of the recording's motion"""
+    extrinsic: Path | None = None
+    """imu_T_cam of the left camera, in place of the recording's"""
+    right: Path | None = None
+    """folder of right images, where the sequence is that of the left ones"""
+    calibration: Path | None = None
+    """YAML of the cameras of two folders or a bag"""
+    times: Path | None = None
+    """stamps of the images of two folders"""
+    topics: tuple[str, ...] = ()
+    """of a bag: left, right and, if any, the IMU"""
+    tracker: Path | None = None
+    """TOML file of the settings of the tracker"""
     repairs: Path | None = None
     """TOML file of user-specified repairs"""
     functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
@@ -87,10 +107,11 @@ class RunSettings:
             "held_out": self.held_out,
             "repairs": None if self.repairs is None else str(self.repairs),
             **{
-                name: str(path)
-                for name, path in (("imu", self.imu), ("imu_calibration", self.imu_calibration))
-                if path is not None
+                name: str(getattr(self, name))
+                for name in (*BESIDE, "imu", "imu_calibration", *IMAGES)
+                if getattr(self, name) is not None
             },
+            **({"topics": ",".join(self.topics)} if self.topics else {}),
             "functions": ",".join(f"{name}={_source(function)}" for name, function in self.functions.items()) or None,
             "add": ",".join(t.name if isinstance(t, Trajectory) else t for t in self.add) or None,
             "add_body": self.add_body,
@@ -129,13 +150,14 @@ def import_estimators(names: tuple[str, ...]) -> None:
             find_estimator(name)
 
 
-def read_sequence(settings: RunSettings) -> Sequence:
-    """Reads or simulates the recording with its ground truth. Raises InputError."""
+def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Sequence:
+    """Reads or simulates the recording with its ground truth; `pictures` gets its images. Raises InputError."""
     if settings.sequence is None:
         if settings.time_unit is not None:
             raise InputError("time-unit: the simulated drive has stamps in seconds; give a SEQUENCE with --time-unit")
         if settings.truth is not None or settings.truth_frame is not None:
             raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
+        _require_none(settings, (*BESIDE, *IMAGES), "give a SEQUENCE with it")
         if settings.imu is not None or settings.imu_calibration is not None:
             raise InputError("imu: the simulated drive has its own motion; give a SEQUENCE with --imu")
         from fgbaseline.data.simulate import Simulation, simulate
@@ -147,6 +169,9 @@ def read_sequence(settings: RunSettings) -> Sequence:
         )
     if settings.truth is None and settings.truth_frame is not None:
         raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
+    if has_images(settings.sequence):
+        return _of_images(settings, pictures)
+    _require_none(settings, IMAGES, "it belongs to a recording of images; leave it out")
     return read(
         settings.sequence,
         settings.truth,
@@ -154,7 +179,28 @@ def read_sequence(settings: RunSettings) -> Sequence:
         settings.time_unit,
         settings.imu,
         settings.imu_calibration,
+        settings.velocities,
+        settings.extrinsic,
     )
+
+
+def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
+    from .images import image_sequence  # OpenCV is imported where there are images
+
+    if settings.time_unit is not None:
+        raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
+    assert settings.sequence is not None
+    names = ("right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
+    options = ImageOptions(**{name: getattr(settings, name) for name in names})
+    truth, body = settings.truth, settings.truth_frame
+    return image_sequence(settings.sequence, options, settings.tracker, truth, body, pictures)
+
+
+def _require_none(settings: RunSettings, names: tuple[str, ...], advice: str) -> None:
+    """Raises InputError for the first of these settings that is given."""
+    for name in names:
+        if getattr(settings, name) is not None:
+            raise InputError(f"{name}: {getattr(settings, name)} is given without need; {advice}")
 
 
 def hold_out_tracks(sequence: Sequence, settings: RunSettings) -> tuple[Sequence, HeldOut | None]:

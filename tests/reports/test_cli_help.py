@@ -10,7 +10,19 @@ import pytest
 
 from ..builders.commands import COMMAND, environment, fgbaseline, installed
 
-COMMANDS = ("run", "compare", "estimators", "diagnose", "check", "bench", "export", "figures", "reproduce", "simulate")
+COMMANDS = (
+    "run",
+    "track",
+    "compare",
+    "estimators",
+    "diagnose",
+    "check",
+    "bench",
+    "export",
+    "figures",
+    "reproduce",
+    "simulate",
+)
 FOR_GOOD_INPUT = ("scipy", "pandas", "gtsam", "matplotlib", "jinja2", "rich", "fgbaseline.data.simulate")
 HEAVY = ("numpy", "pandas", "scipy", "gtsam", "matplotlib", "pydantic", "jinja2", "rich", "fgbaseline.data")
 

@@ -45,6 +45,16 @@ const observations = run.observations && {
   excluded: bytes(run.observations.excluded),
 };
 
+// For each observation the one before of the same landmark, or -1: the tail of a track.
+if (observations) {
+  const last = new Map();
+  observations.previous = Int32Array.from(observations.landmark, (landmark, i) => {
+    const before = last.has(landmark) ? last.get(landmark) : -1;
+    last.set(landmark, i);
+    return before;
+  });
+}
+
 const isReference = key => key !== TRUTH && run.estimators[Number(key)].name === run.reference;
 const isBit = (flags, i) => flags !== null && ((flags[i >> 3] >> (i & 7)) & 1) === 1;
 

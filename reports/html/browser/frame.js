@@ -29,7 +29,7 @@ class FrameView {
       const predicted = trajectory ? this.predict(trajectory, observations.landmark[i]) : null;
       const error = predicted ? Math.hypot(...measured.map((value, row) => value - predicted[row])) : NaN;
       const fate = observations.excluded[i] ? "excluded" : trajectory && isBit(trajectory.used, i) ? "used" : "rejected";
-      seen.push({ landmark: observations.landmark[i], measured, predicted, error, fate, reason: observations.excluded[i] });
+      seen.push({ index: i, landmark: observations.landmark[i], measured, predicted, error, fate, reason: observations.excluded[i] });
     }
     return seen;
   }
@@ -61,9 +61,13 @@ class FrameView {
     const height = scale * run.camera.height;
     image.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(1)}`);
     const parts = [];
+    const under = run.images[chosen.frame];
+    if (under) parts.push(svg("image", { href: under[side], width, height, preserveAspectRatio: "none" }));
     for (const one of seen) {
       const [x, y] = [2 * side, 2 * side + 1].map(row => scale * one.measured[row]);
       const group = svg("g", { class: `observation ${one.fate} estimator-${key}` });
+      const tail = this.tail(one.index, side, scale);
+      if (tail) group.append(svg("path", { class: "tail", d: tail }));
       if (one.predicted) {
         const [px, py] = [2 * side, 2 * side + 1].map(row => scale * one.predicted[row]);
         group.append(svg("path", { class: "error", d: `M${x.toFixed(1)} ${y.toFixed(1)}L${bounded(px)} ${bounded(py)}` }));
@@ -75,6 +79,15 @@ class FrameView {
       parts.push(group);
     }
     image.replaceChildren(...parts);
+  }
+
+  // The track of an observation in the frames before, in one image.
+  tail(index, side, scale) {
+    const at = [];
+    for (let i = index; i >= 0 && at.length <= TAIL; i = observations.previous[i]) {
+      at.push([2 * side, 2 * side + 1].map(row => scale * observations.pixel[4 * i + row] / observations.parts));
+    }
+    return at.length > 1 ? polyline(at.length, k => at[k]) : null;
   }
 
   about(one, key) {
@@ -114,6 +127,9 @@ class FrameView {
       + (why.length ? ` Excluded: ${why.join(", ")}.` : "");
   }
 }
+
+// Observations of a track before the chosen frame that its tail shows.
+const TAIL = 10;
 
 // Relative paths around a measured point, distinguished by shape and not by color alone.
 const MARKS = {

@@ -1,0 +1,58 @@
+"""Observations in an npz as a list, in place of the dense block `features`.
+
+| key | shape |
+|---|---|
+| `observation_frame`, `observation_landmark` | (n,) whole numbers from 0 |
+| `observation_pixel` | (4, n) px, rows uL, vL, uR, vR |
+"""
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ..observations import IntArray, Observations
+from .npz_archive import NpzArchive
+
+FRAME, LANDMARK, PIXEL = "observation_frame", "observation_landmark", "observation_pixel"
+LARGEST_INDEX = 2**40
+
+
+def observation_arrays(observations: Observations) -> dict[str, FloatArray]:
+    """The arrays of observations, by their keys."""
+    return {
+        FRAME: observations.frame.astype(np.float64),
+        LANDMARK: observations.landmark.astype(np.float64),
+        PIXEL: observations.pixel.T,
+    }
+
+
+def read_observation_list(archive: NpzArchive, T: int) -> tuple[Observations, int]:
+    """Observations over T frames, and the number of landmarks. Raises InputError naming the key."""
+    if "features" in archive.keys:
+        raise InputError(f"features and {FRAME} are both in the file; keep one of them")
+    frame, landmark = (_indices(archive, key) for key in (FRAME, LANDMARK))
+    pixel = archive.array(PIXEL)
+    n = len(frame)
+    if landmark.shape != (n,) or pixel.shape != (4, n):
+        raise InputError(
+            f"{PIXEL}: expected shape (4, {n}) and {LANDMARK} of shape ({n},), got {pixel.shape} and {landmark.shape}"
+        )
+    if n and frame.max() >= T:
+        raise InputError(f"{FRAME}: frame {int(frame.max())} is named, but there are {T} time stamps")
+    if not np.isfinite(pixel).all():
+        raise InputError(f"{PIXEL}: it has values that are not finite; leave out what was not observed")
+    order = np.lexsort((landmark, frame))
+    if _repeats(frame[order], landmark[order]):
+        raise InputError(f"{FRAME}: a landmark is observed twice in one frame; keep one of the observations")
+    return Observations.sort(frame, landmark, pixel.T), int(landmark.max()) + 1 if n else 0
+
+
+def _repeats(frame: IntArray, landmark: IntArray) -> bool:
+    return bool(((np.diff(frame) == 0) & (np.diff(landmark) == 0)).any())
+
+
+def _indices(archive: NpzArchive, key: str) -> IntArray:
+    values = archive.array(key)
+    if values.ndim != 1 or not ((values >= 0) & (values < LARGEST_INDEX) & (values == np.floor(values))).all():
+        raise InputError(f"{key}: expected one row of whole numbers from 0, got shape {values.shape}")
+    return values.astype(np.int64)

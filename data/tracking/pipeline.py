@@ -1,0 +1,186 @@
+"""Images to tracks: pairs are read, rectified and tracked one at a time."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
+
+from ..estimate import Progress
+from ..formats.ground_truth import attach_truth
+from ..formats.imu_attachment import attach_imu
+from ..formats.inertial_truth import inertial_truth
+from ..formats.npz_writer import write_npz, write_tracks
+from ..observations import BoolArray, Observations
+from ..plural import plural
+from ..sequence import Sequence, Truth
+from .pictures import Pictures
+from .prediction import rotation_between
+from .rig import Image, rectify
+from .settings import TrackerSettings
+from .sources import ImageOptions, ImageRecording, open_recording
+from .sources.image_recording import TruthFile
+from .stereo_tracker import StereoTracker
+
+NAMED = 4
+"""unreadable images that a remark names"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TrackedRecording:
+    """Tracks of a recording of images, over the frames whose pair could be read."""
+
+    recording: ImageRecording
+    """with t, velocities and truth of these frames"""
+    camera: StereoCamera
+    """rectified"""
+    imu_T_cam: FloatArray
+    """(4, 4) of the rectified left camera, where the recording's extrinsic is known"""
+    observations: Observations
+    n_landmarks: int
+    left_out: tuple[int, ...] = ()
+    """frames without a readable pair"""
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether there is all that a run needs."""
+        r = self.recording
+        return r.extrinsic_known and (r.velocities is not None or r.imu is not None)
+
+    def sequence(self, truth: TruthFile | None = None) -> Sequence:
+        """The recording with its motion, and the truth of a file or else its own.
+
+        Raises InputError where it has no motion, or the pose of the camera on the IMU is not known.
+        """
+        r = self.recording
+        _require_motion(r)
+        T = len(r.t)
+        linear, angular = (np.zeros((T, 3)), np.zeros((T, 3))) if r.velocities is None else r.velocities
+        sequence = Sequence(
+            name=r.name,
+            t=r.t,
+            linear_velocity=linear,
+            angular_velocity=angular,
+            camera=self.camera,
+            imu_T_cam=self.imu_T_cam,
+            observations=self.observations,
+            n_landmarks=self.n_landmarks,
+            truth=r.truth if isinstance(r.truth, Truth) else None,
+            up_imu=r.up_imu,
+            form=r.form,
+            source=r.source,
+            remarks=r.remarks,
+            time_unit_given=True,
+            left_out=self.left_out,
+        )
+        if r.imu is not None:
+            sequence = attach_imu(sequence, r.imu, r.imu_source, velocities=False)
+        if truth is not None:
+            return attach_truth(sequence, truth.path, truth.body)
+        if isinstance(r.truth, TruthFile):
+            sequence = attach_truth(sequence, r.truth.path, r.truth.body)
+            if r.body_T_imu is not None and sequence.truth is not None:
+                # velocity and biases of the file are those of the body
+                poses, source = sequence.truth.world_T_imu @ r.body_T_imu, sequence.truth.source
+                inertial = sequence.imu is not None
+                own = inertial_truth(poses, source) if inertial else Truth.from_any_world(poses, source=source)
+                sequence = sequence.with_truth(own)
+        return sequence
+
+    def write(self, path: Path, *, force: bool = True) -> None:
+        """Writes the tracks as npz: a recording, or without motion what there is of it.
+
+        Raises InputError, also where the file exists and `force` is false.
+        """
+        if self.has_motion:
+            write_npz(self.sequence(), path, flat=True, force=force)
+        else:
+            imu_T_cam = self.imu_T_cam if self.recording.extrinsic_known else None
+            write_tracks(path, self.recording.t, self.camera, self.observations, imu_T_cam, force=force)
+
+
+def track(
+    path: Path,
+    options: ImageOptions = ImageOptions(),  # noqa: B008
+    settings: TrackerSettings = TrackerSettings(),  # noqa: B008
+    progress: Progress | None = None,
+    *,
+    motion: bool = False,
+    pictures: Pictures | None = None,
+) -> TrackedRecording:
+    """Tracks of the recording of images at `path`; `progress` gets the number of pairs done, and of all.
+
+    `pictures` gets the rectified pairs. Frames with an unreadable image are left out, counted and named. Raises
+    InputError for what is missing; with `motion` also where `sequence` would raise, before the images are read.
+    """
+    recording = open_recording(path, options)
+    if motion:
+        _require_motion(recording)
+    rectified = rectify(recording.left, recording.right)
+    tracker = StereoTracker(rectified.camera, settings)
+    T = len(recording.t)
+    kept: list[int] = []
+    unreadable: list[str] = []
+    numbers, pixels = [], []
+    for k, pair in enumerate(recording.pairs()):
+        if pair.left is None or pair.right is None:
+            unreadable.append(pair.name)
+            continue
+        _require_size(pair.left, pair.right, recording, pair.name)
+        left, right = rectified(pair.left, pair.right)
+        turn = rotation_between(recording, rectified.imu_T_cam[:3, :3], kept[-1], k) if kept else None
+        points = tracker.step(left, right, turn)
+        if pictures is not None:
+            pictures.add(len(kept), float(recording.t[k]), left, right)
+        kept.append(k)
+        numbers.append(points.number)
+        pixels.append(points.pixel.astype(np.float32))  # as OpenCV gives them
+        if progress is not None:
+            progress(k + 1, T)
+    if len(kept) < 2:
+        raise InputError(f"{recording.source}: {plural(len(kept), 'pair')} of {T} can be read; check the images")
+    frame = np.repeat(np.arange(len(kept)), [len(number) for number in numbers])
+    number = np.concatenate(numbers)
+    chosen = np.bincount(number, minlength=1)[number] > 1  # what is seen once says nothing of the motion
+    track_number, landmark = np.unique(number[chosen], return_inverse=True)
+    observations = Observations.sort(frame[chosen], landmark, np.concatenate(pixels)[chosen].astype(np.float64))
+    is_kept = np.zeros(T, dtype=np.bool_)
+    is_kept[kept] = True
+    left_out = tuple(np.flatnonzero(~is_kept).tolist())
+    recording = _of_frames(recording, is_kept)
+    if unreadable:
+        names = ", ".join(unreadable[:NAMED]) + (" and more" if len(unreadable) > NAMED else "")
+        text = f"{plural(len(unreadable), 'pair')} of {T} cannot be read and are left out: {names}."
+        recording = replace(recording, remarks=(*recording.remarks, text))
+    return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, observations, len(track_number), left_out)
+
+
+def _require_motion(r: ImageRecording) -> None:
+    """Raises InputError where a recording has no motion, or the pose of the camera on the IMU is not known."""
+    if r.velocities is None and r.imu is None:
+        raise InputError(f"{r.source}: it has images and no motion; add --imu CSV or --velocities CSV")
+    if not r.extrinsic_known:
+        raise InputError(f"{r.source}: the pose of its left camera on the IMU is not known; add --extrinsic FILE")
+
+
+def _require_size(left: Image, right: Image, recording: ImageRecording, name: str) -> None:
+    for image, camera in ((left, recording.left), (right, recording.right)):
+        height, width = image.shape
+        if (width, height) != camera.size:
+            raise InputError(
+                f"{name}: the image has {width}x{height} px and the calibration {camera.size[0]}x{camera.size[1]}; "
+                "give the calibration of these images"
+            )
+
+
+def _of_frames(recording: ImageRecording, kept: BoolArray) -> ImageRecording:
+    truth = recording.truth
+    if isinstance(truth, Truth) and not kept.all():
+        truth = truth.of_frames(kept)
+        if recording.imu is None and truth.known[0]:
+            truth = truth.transformed(se3.inverse(truth.world_T_imu[0]))  # the world is the IMU at the first frame
+    velocities = recording.velocities
+    if velocities is not None:
+        velocities = velocities[0][kept], velocities[1][kept]
+    return replace(recording, t=recording.t[kept], velocities=velocities, truth=truth)

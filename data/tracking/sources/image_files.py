@@ -1,0 +1,94 @@
+"""Image files as 8-bit grey images, read pair by pair."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fgbaseline.geometry import InputError
+
+from ...formats.named_file import reading, shown
+from ..opencv import opencv
+from ..rig import Image
+from .image_recording import ImagePair
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".bmp")
+ENDS = {b"\x89PNG": b"IEND", b"\xff\xd8\xff": b"\xff\xd9"}
+"""marks near the end of a complete file, by its first bytes: decoders fill in what is missing"""
+TAIL = 64
+BITS = (8, 10, 12, 14, 16)
+"""of cameras, in images of 16 bits"""
+Raw = NDArray[Any]
+
+
+def image_files(folder: Path) -> list[Path]:
+    """Image files of a folder, by name. Raises InputError where there is none."""
+    with reading(folder):
+        found = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
+        if not found:
+            raise InputError(f"there is no image in it; expected files that end in {', '.join(SUFFIXES)}")
+    return found
+
+
+def decoded(data: bytes) -> Raw | None:
+    """Grey image (height, width) of 8 or 16 bits in the bytes of a file; None where it is damaged."""
+    cv2 = opencv()
+    end = next((end for start, end in ENDS.items() if data.startswith(start)), b"")
+    if not data or end not in data[-TAIL:]:
+        return None
+    try:
+        image: Raw | None = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYDEPTH)
+    except cv2.error:
+        return None
+    return image
+
+
+class EightBits:
+    """Conversion of one camera's images to 8 bits; the first of them decides the shift, and all others keep it."""
+
+    def __init__(self) -> None:
+        self._shift: int | None = None
+
+    def __call__(self, image: Raw | None) -> Image | None:
+        """The image in 8 bits; None stays None."""
+        if image is None or image.dtype == np.uint8:
+            return image
+        if self._shift is None:
+            self._shift = next(bits for bits in BITS if int(image.max()) < 2**bits) - 8
+        eight: Image = np.minimum(image >> self._shift, 255).astype(np.uint8)
+        return eight
+
+
+def size_of(file: Path) -> tuple[int, int]:
+    """Width and height, px, from the head of a file. Raises InputError."""
+    from PIL import Image as Pillow
+    from PIL import UnidentifiedImageError
+
+    with reading(file):
+        try:
+            with Pillow.open(file) as image:
+                return image.size
+        except UnidentifiedImageError:
+            raise InputError("it is no image; check the file") from None
+
+
+def file_pairs(files: Sequence[tuple[Path, Path]]) -> Callable[[], Iterator[ImagePair]]:
+    """Reader of pairs of files."""
+
+    def pairs() -> Iterator[ImagePair]:
+        convert = EightBits(), EightBits()
+        for both in files:
+            left, right = (to(_image(file)) for to, file in zip(convert, both, strict=True))
+            name = shown(both[0] if left is None or right is not None else both[1])
+            yield ImagePair(left, right, name)
+
+    return pairs
+
+
+def _image(file: Path) -> Raw | None:
+    try:
+        return decoded(file.read_bytes())
+    except OSError:
+        return None

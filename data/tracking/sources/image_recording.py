@@ -1,0 +1,55 @@
+"""Recording of stereo images: stamps, cameras and motion, with pairs that are read one at a time."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from fgbaseline.geometry import FloatArray
+
+from ...formats.ground_truth import BodyFrame
+from ...formats.imu_samples import RawSamples
+from ...sequence import Truth
+from ..rig import CameraModel, Image
+
+
+class ImagePair(NamedTuple):
+    """Grey images of one instant; None where one cannot be read."""
+
+    left: Image | None
+    right: Image | None
+    name: str
+    """of the pair in messages"""
+
+
+class TruthFile(NamedTuple):
+    """Trajectory file with the truth, and the body whose poses it has."""
+
+    path: Path
+    body: BodyFrame
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ImageRecording:
+    """T stereo pairs with their calibration and, where it is known, the motion of the IMU."""
+
+    name: str
+    form: str
+    source: str
+    t: FloatArray
+    """(T,) s, in the clock of the motion"""
+    pairs: Callable[[], Iterator[ImagePair]]
+    """reads the T pairs in order, one at a time"""
+    left: CameraModel
+    right: CameraModel
+    extrinsic_known: bool = True
+    """whether `left.imu_T_cam` is that of an IMU; otherwise both poses are relative to the left camera"""
+    velocities: tuple[FloatArray, FloatArray] | None = None
+    """linear (T, 3) m/s and angular (T, 3) rad/s, in the IMU's frame"""
+    imu: RawSamples | None = None
+    imu_source: str = ""
+    up_imu: FloatArray | None = None
+    truth: Truth | TruthFile | None = None
+    body_T_imu: FloatArray | None = None
+    """(4, 4) where a truth file has the poses of another body than the IMU"""
+    remarks: tuple[str, ...] = ()

@@ -1,0 +1,58 @@
+"""Two folders of images with a calibration: Kalibr's camera chain or OpenCV's stereo calibration."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fgbaseline.geometry import FloatArray, InputError
+
+from ...formats.kitti import read_times
+from ...formats.named_file import shown
+from .camera_yaml import read_rig
+from .image_files import file_pairs, image_files, size_of
+from .image_recording import ImageRecording
+from .pairing import pair, stamps_of_names
+
+
+def open_two_folders(left: Path, right: Path, calibration: Path | None, times: Path | None) -> ImageRecording:
+    """The recording in two folders. Images are named by their stamps, or `times` has one line for each name.
+
+    Raises InputError that names what is missing.
+    """
+    if calibration is None:
+        raise InputError(f"{shown(left)}: two folders need a calibration; add --calibration YAML (Kalibr or OpenCV)")
+    both = [image_files(folder) for folder in (left, right)]
+    rig = read_rig(calibration, size_of(both[0][0]))
+    stamps = [stamps_of_names(files) for files in both]
+    remarks: tuple[str, ...] = ()
+    t: FloatArray
+    if times is not None:
+        t = read_times(times)
+        if len(t) != len(both[0]):
+            raise InputError(f"{shown(times)}: it has {len(t)} stamps for {len(both[0])} images in {shown(left)}")
+        partner = {file.stem: file for file in both[1]}
+        kept = [k for k, file in enumerate(both[0]) if file.stem in partner]
+        files = [(both[0][k], partner[both[0][k].stem]) for k in kept]
+        alone = len(both[0]) + len(both[1]) - 2 * len(files)
+        if len(files) < 2:
+            raise InputError(f"{shown(right)}: {len(files)} of its images have the name of one in {shown(left)}")
+        remarks = (f"{alone} images have no partner of their name: skipped.",) if alone else ()
+        t = t[kept]
+    elif stamps[0] is not None and stamps[1] is not None:
+        paired = pair(stamps[0], stamps[1], shown(left))
+        remarks = paired.remarks
+        t = np.array([stamp / 10**9 for stamp in paired.stamp.tolist()])
+        files = [(both[0][a], both[1][b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)]
+    else:
+        raise InputError(f"{shown(left)}: the images' names are no stamps; add --times FILE with a line for each image")
+    return ImageRecording(
+        name=left.resolve().parent.name,
+        form="two-folders",
+        source=shown(left),
+        t=t + rig.time_shift,
+        pairs=file_pairs(files),
+        left=rig.left,
+        right=rig.right,
+        extrinsic_known=rig.extrinsic_known,
+        remarks=(*rig.remarks, *remarks),
+    )

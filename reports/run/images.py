@@ -1,0 +1,67 @@
+"""Images to tracks for a run and for `fgbaseline track`, with progress."""
+
+from pathlib import Path
+
+import click
+
+from fgbaseline.data import Sequence
+from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.formats.atomic_write import require_new
+from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.plural import plural
+from fgbaseline.data.toml_file import read_toml
+from fgbaseline.data.tracking import ImageOptions, Pictures, TrackedRecording, TrackerSettings, has_images, track
+from fgbaseline.data.tracking.sources.image_recording import TruthFile
+from fgbaseline.geometry import InputError
+from fgbaseline.reports.progress import reporter
+
+
+def tracked(
+    source: Path,
+    options: ImageOptions,
+    settings: Path | None,
+    *,
+    motion: bool = False,
+    pictures: Pictures | None = None,
+) -> TrackedRecording:
+    """Tracks of a recording of images, with progress on standard error. Raises InputError."""
+    chosen = TrackerSettings() if settings is None else read_toml(settings, TrackerSettings).content
+    with reporter().estimator("tracking") as progress:
+        return track(source, options, chosen, progress, motion=motion, pictures=pictures)
+
+
+def image_sequence(
+    source: Path,
+    options: ImageOptions,
+    settings: Path | None,
+    truth: Path | None,
+    body: BodyFrame | None,
+    pictures: Pictures | None = None,
+) -> Sequence:
+    """Recording of images as a run needs it, with the truth given or its own; `pictures` gets its pairs.
+
+    Raises InputError.
+    """
+    given = None if truth is None or body is None else TruthFile(truth, body)
+    return tracked(source, options, settings, motion=True, pictures=pictures).sequence(given)
+
+
+def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path | None, *, force: bool) -> int:
+    """Tracks the images in `source` and writes `out`; prints what was found. Raises InputError."""
+    if not has_images(source):
+        raise InputError(f"{shown(source)}: this is no folder of images and no bag; check the path")
+    require_new(out, force=force)
+    found = tracked(source, options, settings)
+    found.write(out, force=force)
+    o, T = found.observations, len(found.recording.t)
+    for remark in found.recording.remarks:
+        click.echo(remark)
+    click.echo(
+        f"{found.recording.name}: {plural(T, 'frame')}, {plural(found.n_landmarks, 'track')}, "
+        f"{len(o) / T:.0f} observations a frame, {len(o) / max(found.n_landmarks, 1):.1f} frames a track"
+    )
+    if not found.has_motion:
+        click.echo("It has no motion of an IMU: fgbaseline run needs --imu or --velocities, and --extrinsic where the "
+                   "pose of the camera on the IMU is not known.")  # fmt: skip
+    click.echo(f"The tracks are in {out}")
+    return 0

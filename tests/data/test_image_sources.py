@@ -1,0 +1,264 @@
+"""Recordings of images in every form that is read, written from rendered images: what is found, and what is refused."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from fgbaseline.data import Sequence, read
+from fgbaseline.data.formats import write_npz
+from fgbaseline.data.tracking import ImageOptions, track
+from fgbaseline.data.tracking.sources import ImageRecording, open_recording
+from fgbaseline.geometry import InputError
+from fgbaseline.reports.cli.main import group
+
+from ..builders.rendered import CAMERA, IMU_T_CAM, START_NS, Room, camchain_yaml, displaced, sensor_yaml
+
+cv2 = pytest.importorskip("cv2")
+N = 6
+
+
+@pytest.fixture(scope="module")
+def room() -> Room:
+    return Room(N)
+
+
+@pytest.fixture(scope="module")
+def written(room: Room, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return room.write_euroc(tmp_path_factory.mktemp("room") / "room_01")
+
+
+@pytest.fixture
+def euroc(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "room_01"))
+
+
+def tum_vi(euroc: Path, shift: float = 0.0) -> Path:
+    for i in (0, 1):
+        (euroc / "mav0" / f"cam{i}" / "sensor.yaml").unlink()
+    (euroc / "dso").mkdir()
+    (euroc / "dso" / "camchain.yaml").write_text(camchain_yaml(shift))
+    (euroc / "mav0" / "state_groundtruth_estimate0").rename(euroc / "mav0" / "mocap0")
+    return euroc
+
+
+def kitti_odometry(euroc: Path, folder: Path) -> Path:
+    for i in (0, 1):
+        (folder / f"image_{i}").mkdir(parents=True)
+        for k, file in enumerate(sorted((euroc / "mav0" / f"cam{i}" / "data").iterdir())):
+            shutil.copy(file, folder / f"image_{i}" / f"{k:06d}.png")
+    row = f"{CAMERA.fu} 0 {CAMERA.cu} {{}} 0 {CAMERA.fv} {CAMERA.cv} 0 0 0 1 0"
+    (folder / "calib.txt").write_text(f"P0: {row.format(0)}\nP1: {row.format(-CAMERA.fu * CAMERA.baseline)}\n")
+    (folder / "times.txt").write_text("\n".join(str(k / 20) for k in range(N)))
+    return folder
+
+
+def check(recording: ImageRecording, room: Room) -> None:
+    np.testing.assert_allclose(recording.t, np.array(room.stamps) / 1e9, atol=1e-6)
+    np.testing.assert_allclose(recording.left.imu_T_cam, IMU_T_CAM, atol=1e-9)
+    np.testing.assert_allclose(recording.right.imu_T_cam, displaced(1), atol=1e-9)
+    pairs = list(recording.pairs())
+    assert len(pairs) == N
+    assert pairs[2].left is not None
+    assert pairs[2].right is not None
+    assert (pairs[2].left == room.image(2)).all()
+    assert (pairs[2].right == room.image(2, right=True)).all()
+
+
+@pytest.mark.parametrize("inside", ["", "mav0"])
+def test_euroc(euroc: Path, room: Room, inside: str) -> None:
+    recording = open_recording(euroc / inside)
+    assert recording.name == "room_01"
+    assert recording.remarks == ()
+    check(recording, room)
+    sequence = track(euroc / inside).sequence()
+    assert sequence.imu is not None
+    assert sequence.truth is not None
+    true = room.world_T_imu
+    np.testing.assert_allclose(sequence.truth.world_T_imu, true, atol=1e-12)
+
+
+def test_tracks_read_back_as_they_were_written(euroc: Path, tmp_path: Path) -> None:
+    found = track(euroc)
+    found.write(tmp_path / "tracks.npz")
+    sequence, back = found.sequence(), read(tmp_path / "tracks.npz")
+    assert_equal_tracks(back, sequence)
+    assert back.imu is not None
+    assert sequence.imu is not None
+    assert back.imu.angular_velocity.tobytes() == sequence.imu.angular_velocity.tobytes()
+    track(euroc).write(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "tracks.npz").read_bytes()
+    write_npz(sequence, tmp_path / "dense.npz")
+    assert_equal_tracks(read(tmp_path / "dense.npz"), back)
+
+
+def assert_equal_tracks(first: Sequence, second: Sequence) -> None:
+    assert first.t.tobytes() == second.t.tobytes()
+    for name in ("frame", "landmark", "pixel"):
+        assert getattr(first.observations, name).tobytes() == getattr(second.observations, name).tobytes()
+
+
+def test_truth_that_starts_late(euroc: Path, room: Room) -> None:
+    file = euroc / "mav0" / "state_groundtruth_estimate0" / "data.csv"
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([lines[0], *lines[3:]]))
+    truth = track(euroc).sequence().truth
+    assert truth is not None
+    assert truth.known.tolist() == [False, False, *[True] * (N - 2)]
+
+
+def test_tum_vi(euroc: Path, room: Room) -> None:
+    """16-bit images, an equidistant chain under dso/, and stamps of the cameras moved by its time shift."""
+    for i in (0, 1):
+        for file in (euroc / "mav0" / f"cam{i}" / "data").iterdir():
+            cv2.imwrite(str(file), cv2.imread(str(file), 0).astype(np.uint16) * 257)
+    recording = open_recording(tum_vi(euroc, shift=0.0123))
+    assert any("+12.300 ms" in remark for remark in recording.remarks)
+    unshifted = recording.t - 0.0123
+    assert unshifted[0] == pytest.approx(START_NS / 1e9, abs=1e-6)
+    pair = next(recording.pairs())
+    assert pair.left is not None
+    assert (pair.left == room.image(0)).all()
+    assert recording.imu is not None
+    assert track(euroc).sequence().truth is not None
+
+
+def test_a_time_shift_is_added_to_the_cameras_stamps(euroc: Path) -> None:
+    """Kalibr: t_imu = t_cam + timeshift_cam_imu."""
+    before = open_recording(euroc).t
+    np.testing.assert_allclose(open_recording(tum_vi(euroc, -0.02)).t, before - 0.02, atol=1e-6)
+
+
+def test_kitti_odometry_has_no_motion(euroc: Path, tmp_path: Path, room: Room) -> None:
+    folder = kitti_odometry(euroc, tmp_path / "06")
+    with pytest.raises(InputError, match="images and no motion; add --imu CSV or --velocities"):
+        track(folder, motion=True)
+    found = track(folder)
+    found.write(tmp_path / "06.npz")
+    with pytest.raises(InputError, match="tracks and no motion"):
+        read(tmp_path / "06.npz")
+    velocities = tmp_path / "velocities.csv"
+    velocities.write_text("\n".join(f"{k / 20},0.6,0,0,0,0,{0.16 * np.cos(k / 10)}" for k in range(N)))
+    with pytest.raises(InputError, match="not known; add --extrinsic"):
+        read(tmp_path / "06.npz", velocities=velocities)
+    extrinsic = tmp_path / "imu_T_cam.txt"
+    extrinsic.write_text(" ".join(map(repr, IMU_T_CAM[:3].ravel().tolist())))
+    sequence = read(tmp_path / "06.npz", velocities=velocities, extrinsic=extrinsic)
+    options = ImageOptions(velocities=velocities, extrinsic=extrinsic)
+    assert sequence.linear_velocity[:, 0].tolist() == [0.6] * N
+    direct = track(folder, options, motion=True).sequence()
+    np.testing.assert_array_equal(direct.imu_T_cam, sequence.imu_T_cam)
+    np.testing.assert_array_equal(direct.linear_velocity, sequence.linear_velocity)
+
+
+def test_kitti_raw(recordings: Callable[[str], Path]) -> None:
+    """Velocities and poses of one unit agree with each other, and with the cameras."""
+    file = "kitti_images/raw_2011_09_26_drive_0002/2011_09_26/calib_cam_to_cam.txt"
+    sequence = track(recordings(file).parent).sequence()
+    assert any("one unit" in remark or "both from the OXTS unit" in remark for remark in sequence.remarks)
+    assert sequence.truth is not None
+    steps = np.diff(sequence.truth.world_T_imu[:, :3, 3], axis=0)
+    predicted = np.einsum("tij,tj->ti", sequence.truth.world_T_imu[:-1, :3, :3], sequence.linear_velocity[:-1])
+    np.testing.assert_allclose(steps, predicted * sequence.dt[:, None], atol=0.015)
+    assert abs(sequence.imu_T_cam[0, 3] - 1.08) < 0.02  # the camera is 1.08 m ahead of the unit
+
+
+@pytest.mark.parametrize("form", ["kalibr", "opencv"])
+def test_two_folders(euroc: Path, room: Room, tmp_path: Path, form: str) -> None:
+    file = tmp_path / "calibration.yaml"
+    if form == "kalibr":
+        file.write_text(camchain_yaml())
+    else:
+        storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)
+        K = np.array([[CAMERA.fu, 0, CAMERA.cu], [0, CAMERA.fv, CAMERA.cv], [0, 0, 1]])
+        T = np.array([[-CAMERA.baseline], [0], [0]])
+        for key, value in (("M1", K), ("D1", np.zeros((1, 14))), ("M2", K), ("D2", np.zeros((1, 5)))):
+            storage.write(key, value)
+        storage.write("R", np.eye(3))
+        storage.write("T", T)
+        storage.release()
+    left, right = (euroc / "mav0" / f"cam{i}" / "data" for i in (0, 1))
+    recording = open_recording(left, ImageOptions(right=right, calibration=file))
+    assert recording.extrinsic_known == (form == "kalibr")
+    baseline = np.linalg.inv(recording.left.imu_T_cam) @ recording.right.imu_T_cam
+    np.testing.assert_allclose(baseline[:3, 3], [CAMERA.baseline, 0, 0], atol=1e-12)
+    assert len(list(recording.pairs())) == N
+    for file in (*left.iterdir(), *right.iterdir()):
+        file.rename(file.with_name(f"frame_{int(file.stem) - START_NS}.png"))
+    with pytest.raises(InputError, match="no stamps; add --times"):
+        open_recording(left, ImageOptions(right=right, calibration=tmp_path / "calibration.yaml"))
+
+
+def test_damaged_and_missing_images_are_counted_and_named(euroc: Path, room: Room) -> None:
+    left, right = (sorted((euroc / "mav0" / f"cam{i}" / "data").iterdir()) for i in (0, 1))
+    left[1].write_bytes(left[1].read_bytes()[:2000])
+    right[3].unlink()
+    found = track(euroc)
+    remarks = " ".join(found.recording.remarks)
+    assert f"1 pair of {N - 1} cannot be read and are left out: {left[1]}" in remarks
+    assert "1 image that are not there" in remarks
+    assert "have no partner: skipped" in remarks
+    kept = [0, 2, 4, 5]
+    np.testing.assert_allclose(found.recording.t, np.array(room.stamps)[kept] / 1e9, atol=1e-6)
+    truth = found.sequence().truth
+    assert truth is not None
+    np.testing.assert_allclose(truth.world_T_imu, room.world_T_imu[kept], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("missing", "sentence"),
+    [
+        ("cam1", "the folder cam1 is missing"),
+        ("cam0/sensor.yaml", r"cam0/sensor.yaml: the file is missing; add it, or Kalibr's camchain.yaml"),
+        ("cam1/data", "cam1/data: it cannot be read"),
+        ("imu0", "images and no motion; add --imu"),
+    ],
+)
+def test_what_is_almost_euroc_is_refused_with_what_is_missing(euroc: Path, missing: str, sentence: str) -> None:
+    place = euroc / "mav0" / missing
+    shutil.rmtree(place) if place.is_dir() else place.unlink()
+    with pytest.raises(InputError, match=sentence):
+        track(euroc, motion=True)
+
+
+@pytest.mark.parametrize("missing", ["image_1", "calib.txt", "times.txt"])
+def test_what_is_almost_kitti_is_refused_with_what_is_missing(euroc: Path, tmp_path: Path, missing: str) -> None:
+    place = kitti_odometry(euroc, tmp_path / "06") / missing
+    shutil.rmtree(place) if place.is_dir() else place.unlink()
+    with pytest.raises(InputError, match=f"{missing} is missing"):
+        open_recording(tmp_path / "06")
+
+
+def test_a_calibration_of_other_images_is_refused(euroc: Path) -> None:
+    for i in (0, 1):
+        text = sensor_yaml(displaced(i)).replace("[320, 240]", "[640, 480]")
+        (euroc / "mav0" / f"cam{i}" / "sensor.yaml").write_text(text)
+    with pytest.raises(InputError, match="the image has 320x240 px and the calibration 640x480"):
+        track(euroc)
+
+
+def test_other_folders_are_refused_with_the_forms(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no recording in this folder; expected a EuRoC folder"):
+        open_recording(tmp_path)
+
+
+def test_without_opencv_one_sentence_says_what_to_install(euroc: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "cv2", None)
+    with pytest.raises(InputError, match=r"pip install 'fgbaseline\[images\]'"):
+        track(euroc)
+
+
+def test_track_writes_a_recording(euroc: Path, tmp_path: Path) -> None:
+    out = tmp_path / "tracks.npz"
+    settings = tmp_path / "tracker.toml"
+    settings.write_text("max_features = 50\n")
+    arguments = ["track", str(euroc), "--out", str(out), "--settings", str(settings)]
+    result = CliRunner().invoke(group, arguments)
+    assert result.exit_code == 0, result.output
+    assert "frames a track" in result.output
+    assert np.bincount(read(out).observations.frame).max() <= 50
+    again = CliRunner().invoke(group, arguments)
+    assert isinstance(again.exception, InputError)
