@@ -22,6 +22,7 @@ MIN_LANDMARKS = 10
 """of a class that has a median in sigmas: few of them have a covariance of the difference"""
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
 PAPER_BAND = "95 % if consistent"
+OVER_BAND, BELOW_ONE = "overconfident above the band", "overconfident below 1"
 
 
 def nees(run: RunData) -> Figure | None:
@@ -44,13 +45,12 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
         ]
         return time_panels(run, panels, "", style)
     panels = [
-        Panel("reference NEES", "nees_reference", 1.75, 5.0, _pose_band(CONSISTENT)),
-        Panel("NIS per row", "nis_per_row", 1.75, 5.0, _innovation_band(CONSISTENT)),
-        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.75, 5.0, _one),
-        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.75, 5.0, _one),
+        Panel("reference NEES", "nees_reference", 1.95, 5.0, _pose_band(CONSISTENT), OVER_BAND),
+        Panel("NIS per row", "nis_per_row", 1.95, 5.0, _innovation_band(CONSISTENT), OVER_BAND),
+        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, _one, BELOW_ONE),
+        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, _one, BELOW_ONE),
     ]
-    title = "Consistency without truth: overconfident above the band, conservative below it"
-    return time_panels(run, panels, title, style, linewidth=1.0)
+    return time_panels(run, panels, "Consistency without truth", style, linewidth=1.0)
 
 
 def _pose_band(label: str, width: float = 0.9) -> Expected:

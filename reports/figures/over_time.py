@@ -46,6 +46,7 @@ class Panel:
     decades: float | None = None
     """of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
     expected: Expected | None = None
+    title: str = ""
 
 
 def time_panels(
@@ -72,6 +73,7 @@ def time_panels(
         if not style.titled and on.get_yscale() == "log":
             few_ticks(on)
         on.set_ylabel(panel.label)
+        on.set_title(panel.title)
     time_axis(run, axes, style)
     title_and_legend(figure, title, handles, style)
     return figure

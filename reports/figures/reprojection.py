@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from fgbaseline.compare import evaluated_rows, track_chi_square
+from fgbaseline.compare.residuals.patterns import COLUMNS, REGION, ROWS
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
@@ -16,7 +18,7 @@ from fgbaseline.geometry import FloatArray
 from .over_time import Panel, time_axis, time_panels
 from .panels import Line, fit_log, log_where_positive, plot_series, short
 from .run_data import RunData, RunDetails
-from .style import GRAY, GREEN, SCREEN, Style, stacked_panels, swatch, title_and_legend
+from .style import GRAY, GREEN, SCREEN, Style, label, stacked_panels, swatch, title_and_legend
 
 SMALL_ERROR = 3.0
 """px, a column of the tables"""
@@ -25,8 +27,10 @@ COARSE = (Excluded.DISPARITY, Excluded.SHORT)
 BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
+HEAT = "Blues"
+"""color map of lightness, which color-blind readers can read too"""
 DASHED: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
-CLASSES = {"distance": "by distance", "track age": "by age of the track, frames", "region": "by place in the image"}
+CLASSES = {"distance": "by distance", "track age": "by age of the track, frames"}
 
 
 def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None:
@@ -78,17 +82,18 @@ def distribution(
     figure, (axes,) = stacked_panels(4.2)
     handles: list[Any] = []
     for name, known in errors.items():
-        handles += axes.plot(GRID, 100.0 * share_within(known, GRID), **line(name))
+        handles += axes.plot(GRID, 100.0 * share_within(known, GRID), **{**line(name), "linestyle": "solid"})
         if name in dashed:
             axes.plot(GRID, 100.0 * share_within(dashed[name], GRID), **{**line(name), **DASHED, "label": None})
     axes.set_xscale("log")
+    first = min(float(np.nanpercentile(known, 1)) for known in errors.values())
     last = max(float(np.nanpercentile(known, 99)) for known in errors.values())
-    axes.set_xlim(GRID[0], float(np.clip(last, 30.0, GRID[-1])))
+    axes.set_xlim(float(np.clip(first, GRID[0], 0.5)), float(np.clip(last, 30.0, GRID[-1])))
     axes.set_ylim(0.0, 101.0)
     axes.set_xlabel("reprojection error, px (norm of the four differences)")
     axes.set_ylabel("share of observations, %")
-    for label, look in zip(labels, ({}, DASHED), strict=False):
-        handles += axes.plot([], [], color=GRAY, label=label, **look)
+    for text, look in zip(labels, ({}, DASHED), strict=False):
+        handles += axes.plot([], [], color=GRAY, label=text, **look)
     title_and_legend(figure, "Share of observations below a reprojection error", handles)
     return figure
 
@@ -97,17 +102,52 @@ def reprojection_classes(run: RunData) -> Figure | None:
     """Median error of each class, and the probabilities of tracks, uniform where the noise is as assumed."""
     if run.observed is None or not run.observed.classes:
         return None
-    figure = Figure(figsize=(SCREEN.width, 5.8))
-    panels = figure.subplots(2, 2).ravel()
+    figure = Figure(figsize=(SCREEN.width, 3.8))
+    panels = figure.subplots(1, 3).ravel()
     handles: list[Any] = []
     for panel, (by, title) in zip(panels, CLASSES.items(), strict=False):
-        handles += _medians(panel, run.observed.classes, by, run.line())
+        tables = {n: c.loc[c["by"] == by].set_index("of")["median"] for n, c in run.observed.classes.items()}
+        handles += medians_by_class(panel, tables, run.line())
         panel.set_title(title)
         log_where_positive(panel)
-        panel.set_ylabel("median error, px")
-    handles += _probabilities(panels[3], run.observed, run.line())
+    panels[0].set_ylabel("median error, px")
+    handles += _probabilities(panels[2], run.observed, run.line())
     title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
     return figure
+
+
+def image_regions(run: RunData) -> Figure | None:
+    """Median error in each ninth of the image as a map of 3 x 3, a panel for each estimator; None without any."""
+    tables = {} if run.observed is None else run.observed.classes
+    maps = {name: _ninths(table) for name, table in tables.items()}
+    positive = np.concatenate([m[m > 0.0] for m in maps.values()] or [np.empty(0)])
+    if len(positive) == 0:
+        return None
+    columns = min(5, len(maps))
+    rows = -(-len(maps) // columns)
+    figure = Figure(figsize=(SCREEN.width, 0.75 + 1.25 * rows))
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    scale = LogNorm(float(positive.min()), 1.001 * float(positive.max()))
+    for panel, (name, medians) in zip(panels, maps.items(), strict=False):
+        panel.imshow(medians, cmap=HEAT, norm=scale, aspect="auto")
+        for (row, column), value in np.ndenumerate(medians):
+            if np.isfinite(value):
+                color = "white" if value > 0.0 and scale(value) > 0.55 else "black"
+                text = f"{value:#.3g}".rstrip(".")
+                panel.text(column, row, text, ha="center", va="center", fontsize=8, color=color)
+        panel.set_title(label(name, run.reference), fontsize=9)
+        panel.set(xticks=[], yticks=[])
+        panel.grid(visible=False)
+    for panel in panels[len(maps) :]:
+        panel.set_visible(False)
+    title_and_legend(figure, "Median reprojection error by place in the left image, px")
+    return figure
+
+
+def _ninths(classes: pd.DataFrame) -> FloatArray:
+    """(3, 3) median error of each ninth of the image; NaN for one without an observation."""
+    medians = classes.loc[classes["by"] == REGION].set_index("of")["median"]
+    return medians.reindex([f"{row} {column}" for row in ROWS for column in COLUMNS]).to_numpy(np.float64).reshape(3, 3)
 
 
 def medians_by_class(
@@ -149,11 +189,6 @@ def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
     return np.searchsorted(known, limits, side="right") / max(1, len(errors))
 
 
-def _medians(panel: Axes, classes: Mapping[str, pd.DataFrame], by: str, line: Line) -> list[Any]:
-    tables = {name: table.loc[table["by"] == by].set_index("of")["median"] for name, table in classes.items()}
-    return medians_by_class(panel, tables, line, label=str if by == "region" else short)
-
-
 def _probabilities(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
     """Share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
     for name in observed.classes:
@@ -164,9 +199,9 @@ def _probabilities(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
     diagonal = panel.plot([0, 1], [0, 100], color=GREEN, linewidth=1.0, linestyle=":", label="noise as assumed")
     panel.set_xlim(0.0, 1.0)
     panel.set_ylim(0.0, 100.0)
-    panel.set_xlabel("probability of a track's residuals, or larger")
+    panel.set_xlabel("probability of larger residuals")
     panel.set_ylabel("share of tracks, %")
-    panel.set_title("by chi-square of each track")
+    panel.set_title("tracks by chi-square")
     return list(diagonal)
 
 

@@ -14,7 +14,7 @@ from .evidence import consistency, held_out, map_difference, nees, three_sigma
 from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
 from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
-from .reprojection import reprojection_classes, reprojection_distribution, reprojection_over_time
+from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
 from .saving import EncodedFigure, encode_figure
 from .style import PAPER, in_style
@@ -34,6 +34,7 @@ OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
     held_out,
     consistency,
     reprojection_classes,
+    image_regions,
     map_difference,
 )
 """each gives None where the run has no data for it"""

@@ -1,17 +1,20 @@
 """Two styles of all figures, for the screen and for paper: colors, sheets, lines, legends and safe text.
 
-An estimator has one color in every figure and on the page: Okabe and Ito's, distinct to the color-blind.
+An estimator has one color and dash in every figure and on the page: Okabe and Ito's colors, and dashes where
+color-blind readers could confuse two of them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain, cycle
+from itertools import chain, cycle, pairwise
 from typing import Any
 
+import numpy as np
 from matplotlib import style as rc_style
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
@@ -34,15 +37,23 @@ ESTIMATOR_COLORS: Mapping[str, str] = {
 
 EXTRA_COLORS = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
 """for estimators of other packages, once the colors are used up that this run leaves"""
-COLORS_ON_DARK: Mapping[str, str] = {
-    REFERENCE: "#FFFFFF",
-    TRUTH: "#A8A8A8",
-    "#0072B2": "#2E96D3",
-    "#882255": "#C2457F",
-    "#661100": "#B5533C",
-    "#332288": "#8273D9",
+DASHED, DASH_DOT, DASH_DOT_DOT = (6.0, 3.0), (8.0, 2.5, 1.5, 2.5), (8.0, 2.0, 1.5, 2.0, 1.5, 2.0)
+"""lengths of dashes and gaps, px on the page"""
+DASHES: Mapping[str, tuple[float, ...]] = {
+    TRUTH: DASHED,
+    "#0072B2": DASHED,
+    "#CC79A7": DASH_DOT,
+    "#B3A100": DASHED,
+    "#44AA99": DASH_DOT_DOT,
+    "#999933": DASH_DOT,
+    "#661100": DASHED,
+    "#6699CC": DASHED,
+    "#AA4499": DASH_DOT,
+    "#332288": DASH_DOT_DOT,
 }
-"""colors that dark ground would swallow: the same hue, lighter"""
+"""of the lines of a color, solid where it has none: two colors that color-blind readers may confuse differ in these"""
+DARK_GROUND, DARK_INK, DARK_CHROMA = "#1d2126", "#edf0f2", 1.15
+"""ground and black ink of a figure on a dark page, and by how much colors are stronger there"""
 
 MAX_NAME = 48
 """characters of a name that a figure has room for"""
@@ -172,8 +183,19 @@ def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
 
 
 def on_dark(color: str) -> str:
-    """Color in place of `color` where the ground is dark."""
-    return COLORS_ON_DARK.get(color, color)
+    """Color in place of `color` where the ground is dark: as `dark_matrix` makes it of a still figure."""
+    matrix = np.array(dark_matrix())
+    rgb = np.clip(matrix[:, :3] @ to_rgb(color) + matrix[:, 3], 0.0, 1.0)
+    return to_hex((float(rgb[0]), float(rgb[1]), float(rgb[2]))).upper()
+
+
+@cache
+def dark_matrix() -> tuple[tuple[float, ...], ...]:
+    """Affine map (3, 4) of sRGB values in [0, 1]: white becomes the dark ground, black light ink, hues stay."""
+    luma = np.tile([0.2126, 0.7152, 0.0722], (3, 1))
+    ground, ink = np.array(to_rgb(DARK_GROUND)), np.array(to_rgb(DARK_INK))
+    linear = DARK_CHROMA * (np.eye(3) - luma) + (ground - ink)[:, None] * luma
+    return tuple(tuple(round(float(v), 4) for v in (*row, at)) for row, at in zip(linear, ink, strict=True))
 
 
 def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
@@ -194,16 +216,30 @@ def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), st
     figure.set_label(title)
     if not style.titled and not by_label:
         return
-    rows = -(-sum(len(text) + style.spare for text in by_label) // style.letters)
     bold: dict[str, Any] = {"title": title, "title_fontproperties": {"weight": "bold", "size": 11.5}}
     legend = figure.legend(
         list(by_label.values()),
         list(by_label),
         loc="outside upper left",
-        ncols=-(-len(by_label) // max(1, rows)) or 1,
+        ncols=_legend_columns([len(text) + style.spare for text in by_label], style.letters),
         **({"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}),
     )
     legend.get_title().set_color("#222222")
+
+
+def _legend_columns(widths: Sequence[int], room: int) -> int:
+    """Most columns that fit into the room; entries of these widths fill a legend column by column."""
+    for columns in range(len(widths), 1, -1):
+        each, longer = divmod(len(widths), columns)
+        ends = np.cumsum([0] + [each + (i < longer) for i in range(columns)])
+        if sum(max(widths[i:j]) for i, j in pairwise(ends.tolist())) <= room:
+            return columns
+    return 1
+
+
+def linestyle(color: str) -> str | tuple[float, tuple[float, ...]]:
+    """Matplotlib's line style of a color."""
+    return (0.0, tuple(0.6 * length for length in DASHES[color])) if color in DASHES else "solid"
 
 
 def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
@@ -211,6 +247,7 @@ def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
     thick = name == reference
     return {
         "color": color,
+        "linestyle": linestyle(color),
         "linewidth": 2.6 if thick else 1.3,
         "zorder": 2.0 if thick else 2.5,
         "label": label(name, reference),
@@ -219,7 +256,7 @@ def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
 
 def marked_line(name: str, color: str, reference: str | None, others: Sequence[str], points: int) -> dict[str, Any]:
     """Look of an estimator's line of so many points on paper: the reference thick and lowest, the `others` marked."""
-    look: dict[str, Any] = {"color": color, "label": label(name, reference)}
+    look: dict[str, Any] = {"color": color, "linestyle": linestyle(color), "label": label(name, reference)}
     if name == reference:
         return look | {"linewidth": 1.6, "zorder": 2.0}
     number, apart = others.index(name), max(1, points // MARKS_PER_LINE)

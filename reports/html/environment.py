@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.reports.figures import EncodedFigure, encoded
 
+from ..figures.style import dark_matrix
 from ..formatting import counted, number
 from ..results.metrics import TERMS
 from ..results.provenance import creation
@@ -41,8 +42,10 @@ CAPTIONS: Mapping[str, str] = {
     "can still be separated: the table has the paired difference from the best.",
     "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
     "time-correlated. The sigma ratio of a filter is expected above 1.",
-    "reprojection_classes": "Flat lines: errors do not depend on the place of a point or the age of its track. The "
+    "reprojection_classes": "Flat lines: errors do not depend on the distance of a point or the age of its track. The "
     "dotted diagonal is expected where the noise is as assumed; above it residuals are larger, below it smaller.",
+    "image_regions": "Errors that grow towards an edge indicate distortion or a wrong rectification. All panels share "
+    "one logarithmic scale.",
     "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "
     "in the camera frames do not.",
     "time_per_frame": "Below the dotted line an estimator runs in real time.",
@@ -87,6 +90,7 @@ def environment() -> Environment:
         loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     jinja.filters |= {"number": number, "counted": counted, "flattened": flattened, "anchor": anchor}
+    jinja.globals |= {"dark_matrix": " ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3]))}
     jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
     jinja.globals |= {"classes": {}, "creation": creation}
     return jinja

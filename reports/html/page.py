@@ -1,24 +1,18 @@
 """Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
 
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
 from itertools import groupby
 from typing import Any, ClassVar
 
 from markupsafe import Markup
 
-from ..figures.style import on_dark
+from ..figures.style import TRUTH
 from ..phrases.evidence import FIRST
 from ..tables import Table
 from .environment import NO_SCRIPT, Picture, asset, environment
+from .explore import line_rules, policy, script
 from .plot_data import TRUTH_LINE, embedded_json
-
-SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
-"""the page's script in the order of its dependencies"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +105,8 @@ class Page:
 def render_page(page: Page) -> str:
     """HTML of a page: one file that needs no other and makes no request. All text that comes from files is escaped."""
     plots, keys = page.plots, {name: str(i) for i, name in enumerate(page.colors)}
-    styles = asset("report.css") + ("" if plots is None else asset("explore.css"))
+    styles = asset("report.css") + (asset("explore.css") if page.colors else "")
+    titles = {title: key for name, key in keys.items() for title in (name, f"{name} (reference)")}
     sections = [section for section in (page.table, *page.sections) if section.blocks]
     return (
         environment()
@@ -121,8 +116,8 @@ def render_page(page: Page) -> str:
             most=FIRST,
             sections=sections,
             css=Markup(styles),
-            color_rules=_color_rules({keys[name]: color for name, color in page.colors.items()}),
-            classes={name: f"estimator-{key}" for name, key in keys.items()},
+            line_rules=line_rules({**page.colors, TRUTH_LINE: TRUTH}, {**keys, TRUTH_LINE: TRUTH_LINE}),
+            classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
             **({} if plots is None else _interactive(plots)),
         )
@@ -140,26 +135,3 @@ def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
         "has": {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")},
         "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
     }
-
-
-@cache
-def script() -> Markup:
-    """The page's own script, as it stands between its tags."""
-    folder = files("fgbaseline.reports.html").joinpath("browser")
-    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
-
-
-def policy() -> Markup:
-    """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
-    digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
-    return Markup(f"{NO_SCRIPT}; script-src 'sha256-{digest}'")  # nosec: it is our own
-
-
-def _color_rules(colors: Mapping[str, str]) -> Markup:
-    """`.estimator-KEY` sets `--estimator`, the color of a key on light and on dark ground."""
-    rules = [
-        "\n".join(f".estimator-{key} {{ --estimator: {color}; }}" for key, color in ground.items())
-        for ground in (colors, {key: on_dark(color) for key, color in colors.items()})
-    ]
-    return Markup(f"{rules[0]}\n@media screen and (prefers-color-scheme: dark) {{\n{rules[1]}\n}}")  # nosec: our own

@@ -70,7 +70,7 @@ def _text(array: np.ndarray) -> str:
 
 TRUTH_LINE = "truth"
 """key of ground truth among the lines of a chart; those of estimators are numbers"""
-OUTLIER = 30.0
+OUTLIER = 10.0
 """times farther than every other line: then one line alone would flatten all others on a linear axis"""
 
 Lines = Mapping[str, FloatArray]
@@ -195,7 +195,6 @@ def page_data(run: Run) -> dict[str, Any]:
         "frames": sequence.n_frames,
         "step": "frame",
         "stamped": True,
-        "start": "common start",
         "axes": ["ahead", "left", "up"],
         "t": floats(sequence.t - sequence.t[0]),
         "reference": run.reference,
@@ -272,7 +271,9 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
             text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
             bookmarks.append({"frame": left.frame, "text": text})
     worst = _most_excluded(run.problem)
-    return bookmarks if worst is None else [*bookmarks, {"frame": worst, "text": "most wrong matches"}]
+    if worst is not None:
+        bookmarks.append({"frame": worst, "text": "most wrong matches"})
+    return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))
 
 
 def _most_excluded(problem: Problem) -> int | None:

@@ -17,10 +17,15 @@ from .environment import Picture, picture
 from .page import Block, Folded, Grid, Live, Note, Page, Section, Sentences, render_page
 from .plot_data import page_data
 
-EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
-"""beginnings of the names of the figures that stand beside the evidence"""
-CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
-"""figures that stand beside the interactive charts, because they show what these do not"""
+SHOWN_FIGURES = (
+    "reprojection_distribution",
+    "held_out",
+    "three_sigma_",
+    "reprojection_classes",
+    "image_regions",
+    "map_difference",
+)
+"""beginnings of the names of the figures that show what no interactive chart does; the others are folded away"""
 
 
 def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | EncodedFigure]) -> str:
@@ -76,12 +81,12 @@ def _sections(
     evidence, components = tables.evidence_table(run, estimators), tables.components_table(estimators)
     excluded, events = tables.exclusions_table(summary), tables.events_tables(run)
     bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
-    stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
+    stills = figure_blocks(pictures, [n for n in pictures if not n.startswith(SHOWN_FIGURES)])
     beyond: list[Block] = [
         Grid(evidence),
         *figure_blocks(pictures, ["held_out"]),
         *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
-        *figure_blocks(pictures, ["reprojection_classes", "map_difference"]),
+        *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
         *(folded(table) for table in tables.long_tables(run)),
     ]
     live = plots is not None
@@ -89,7 +94,11 @@ def _sections(
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
         Section("behind", "What stands behind the numbers", _behind(run), "Findings"),
-        Section("over-time", "Over time", [Live("charts"), *figure_blocks(pictures, CHART_FIGURES)] if live else []),
+        Section(
+            "over-time",
+            "Over time",
+            [Live("charts"), *figure_blocks(pictures, ["reprojection_distribution"])] if live else [],
+        ),
         Section(
             "one-frame", "One frame in the images", [Live("frame")] if seen else [], "One frame", needs_script=True
         ),

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from math import isfinite, nan
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 from fgbaseline.compare.limits import Better
 
@@ -139,21 +139,81 @@ def print_table(
     spaced: bool = False,
     wrap_names: bool = True,
 ) -> None:
-    """Prints the table; `styles` has rich's style for the rows of a status, `spaced` leaves a line between rows."""
+    """Prints the table; `styles` has rich's style for the rows of a status, `spaced` leaves a line between rows.
+
+    Columns that do not fit side by side stand in several tables below one another: figures, intervals and words are
+    never broken.
+    """
     from rich.console import Console
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    shown = RichTable(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0) if spaced else (0, 1))
-    shown.add_column(table.name, overflow="fold", no_wrap=not wrap_names)
-    for column in table.columns:
-        shown.add_column(Text(column.heading), justify="left" if column.words else "right", overflow="fold")
-    for row in table.rows:
-        name = f"{row.group}: {row.name}" if row.group else row.name
-        style = (styles or {}).get(row.status, "")
-        shown.add_row(*map(Text, (name, *_texts(table, row))), style=style)
-    console = Console()
-    Console(width=None if console.is_terminal else max(console.width, width), highlight=False).print(shown)
+    console = Console(highlight=False)
+    room = console.width if console.is_terminal else max(console.width, width)
+    names = [f"{row.group}: {row.name}" if row.group else row.name for row in table.rows]
+    texts = [[cell.text for cell in row.cells] or [""] * len(table.columns) for row in table.rows]
+    first = _Width.of([table.name, *names], wrapped=wrap_names)
+    cells = [
+        _Width.of([text[i] for text in texts], wrapped=column.words) | _Width.of([column.heading], wrapped=True)
+        for i, column in enumerate(table.columns)
+    ]
+    gap = 1 if spaced else 2
+    for number, block in enumerate(_blocks(cells, room - first.least, gap) or [[]]):
+        if number:
+            console.print()
+        widths = _grown([first, *(cells[i] for i in block)], room - gap * len(block))
+        shown = RichTable(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 1, 0) if spaced else (0, 1))
+        shown.add_column(table.name, width=widths[0], overflow="fold")
+        for i, fitted in zip(block, widths[1:], strict=True):
+            column = table.columns[i]
+            justify: Literal["left", "right"] = "left" if column.words else "right"
+            shown.add_column(Text(column.heading), justify=justify, width=fitted, overflow="fold")
+        for row, name, text in zip(table.rows, names, texts, strict=True):
+            shown.add_row(*map(Text, (name, *(text[i] for i in block))), style=(styles or {}).get(row.status, ""))
+        console.print(shown, width=room)
+    for row, name in zip(table.rows, names, strict=True):
+        if row.reason and not row.cells:
+            console.print(Text(f"{name}: {row.reason}"), width=room, soft_wrap=True)
+
+
+class _Width(NamedTuple):
+    """Characters of a column: so that no word breaks, and so that no line does."""
+
+    least: int
+    full: int
+
+    @classmethod
+    def of(cls, texts: Sequence[str], *, wrapped: bool) -> Self:
+        full = max((len(line) for text in texts for line in text.split("\n")), default=0)
+        words = max((len(word) for text in texts for word in text.replace(" ", "\n").split("\n")), default=0)
+        return cls(words if wrapped else full, full)
+
+    def __or__(self, other: Self) -> "_Width":
+        return _Width(max(self.least, other.least), max(self.least, other.least, self.full))
+
+
+def _blocks(columns: Sequence[_Width], room: int, gap: int) -> list[list[int]]:
+    """Numbers of the columns that stand side by side in the room, block by block; one at least in each."""
+    blocks: list[list[int]] = []
+    left = 0
+    for i, column in enumerate(columns):
+        if not blocks or left < column.least + gap:
+            blocks.append([])
+            left = room
+        blocks[-1].append(i)
+        left -= column.least + gap
+    return blocks
+
+
+def _grown(columns: Sequence[_Width], room: int) -> list[int]:
+    """Widths of the columns, of which the first ones use what the least widths leave of the room."""
+    left = max(0, room - sum(column.least for column in columns))
+    widths = []
+    for least, full in columns:
+        more = min(left, full - least)
+        left -= more
+        widths.append(least + more)
+    return widths
 
 
 def markdown(table: Table) -> str:
@@ -203,9 +263,3 @@ def latex(table: Table) -> str:
 
 def _name(row: Row) -> str:
     return f"{row.name} (reference)" if row.reference else row.name
-
-
-def _texts(table: Table, row: Row) -> list[str]:
-    if row.reason and not row.cells:
-        return [row.reason, *[""] * (len(table.columns) - 1)]
-    return [cell.text for cell in row.cells]

@@ -75,6 +75,7 @@ def test_every_figure_of_a_full_run_is_there_in_the_order_of_the_page() -> None:
         "time_per_frame",
         "consistency",
         "reprojection_classes",
+        "image_regions",
         "map_difference",
         "three_sigma_dead-reckoning",
         "three_sigma_ekf",

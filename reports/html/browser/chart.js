@@ -1,5 +1,7 @@
-// A quantity over time: a line for each estimator, the cursor of the page, and values beside the pointer.
+// A quantity over time: a line for each estimator, the cursor and the zoom of the page, and values beside the pointer.
 const ROOM = { left: 50, right: 10, top: 8, bottom: 24 };
+const HEIGHT = 190;
+const SHORTEST_DRAG = 6;  // px; anything shorter is a click
 
 class TimeChart {
   constructor(place, chart) {
@@ -9,8 +11,7 @@ class TimeChart {
     this.svg = svg("svg", { role: "img", "aria-label": chart.title + " over time" });
     this.place.append(this.svg);
     const button = place.querySelector("button");
-    const signed = [...chart.lines.values()].some(line => line.some(value => value < 0));
-    button.hidden = signed;
+    button.hidden = [...chart.lines.values()].some(line => line.some(value => value < 0));
     press(button, this.log);
     button.addEventListener("click", () => {
       this.log = !this.log;
@@ -20,32 +21,52 @@ class TimeChart {
     this.listen();
     whenResized(this.place, () => this.draw());
     onShown.push(() => this.draw());
-    onFrame.push(() => this.moveCursor());
+    onSpan.push(() => this.draw());
+    onFrame.push(() => this.moveLine(this.cursor, seconds[chosen.frame]));
+    onPointed.push(time => this.moveLine(this.hairline, time));
   }
 
+  // A click moves the cursor, a drag zooms all charts to the range, a double click shows all of the time again.
   listen() {
-    const frame = event => frameAt(this.timeAt(event.clientX - this.svg.getBoundingClientRect().left));
+    let from = null;
+    const time = event => this.timeAt(event.clientX - this.svg.getBoundingClientRect().left);
+    const dragged = event => from !== null && Math.abs(event.clientX - from.x) >= SHORTEST_DRAG;
     this.svg.addEventListener("pointerdown", event => {
-      if (event.pointerType !== "mouse") return;
-      this.svg.setPointerCapture(event.pointerId);
-      goTo(frame(event));
+      from = { x: event.clientX, time: time(event) };
     });
-    this.svg.addEventListener("click", event => goTo(frame(event)));
     this.svg.addEventListener("pointermove", event => {
-      const at = frame(event);
-      if (event.pointerType === "mouse" && event.buttons === 1) goTo(at);
+      const at = frameAt(time(event));
+      onPointed.forEach(move => move(time(event)));
+      if (dragged(event)) {
+        this.svg.setPointerCapture(event.pointerId);
+        this.mark(from.time, time(event));
+      }
       showHint(event, [[momentOf(at), null], ...this.shown().map(([key, line]) =>
         [`${trajectories.get(key).name} ${quantity(line[at], this.chart.unit)}`, key])]);
     });
-    this.svg.addEventListener("pointerleave", hideHint);
+    this.svg.addEventListener("pointerup", event => {
+      if (dragged(event)) zoom([from.time, time(event)].sort((a, b) => a - b));
+      else if (from !== null) goTo(frameAt(time(event)));
+      from = null;
+    });
+    this.svg.addEventListener("pointercancel", () => {
+      from = null;
+      this.draw();
+    });
+    this.svg.addEventListener("pointerleave", () => {
+      hideHint();
+      onPointed.forEach(move => move(null));
+    });
+    this.svg.addEventListener("dblclick", () => zoom(null));
   }
 
+  // The reference lies below the others.
   shown() {
-    return [...this.chart.lines].filter(([key]) => chosen.shown.has(key));
+    return [...this.chart.lines].filter(([key]) => chosen.shown.has(key)).sort(([a], [b]) => isReference(b) - isReference(a));
   }
 
-  // Over what is shown, and the band where there is one.
-  range() {
+  // Over what is shown in the span, and the band where there is one.
+  range([first, last]) {
     let low = Infinity;
     let high = -Infinity;
     const take = value => {
@@ -53,7 +74,7 @@ class TimeChart {
       low = Math.min(low, value);
       high = Math.max(high, value);
     };
-    this.shown().forEach(([, line]) => line.forEach(take));
+    this.shown().forEach(([, line]) => line.subarray(first, last + 1).forEach(take));
     if (this.chart.band) this.chart.band.forEach(take);
     if (this.chart.middle !== null) take(this.chart.middle);
     if (low > high) return this.log ? [0.1, 10] : [0, 1];
@@ -67,29 +88,31 @@ class TimeChart {
   }
 
   timeAt(x) {
+    const [from, until] = span();
     const share = (x - ROOM.left) / (this.width - ROOM.left - ROOM.right);
-    return Math.max(0, Math.min(1, share)) * seconds[run.frames - 1];
+    return from + Math.max(0, Math.min(1, share)) * (until - from);
   }
 
   x(time) {
-    return ROOM.left + (this.width - ROOM.left - ROOM.right) * time / (seconds[run.frames - 1] || 1);
+    const [from, until] = span();
+    return ROOM.left + (this.width - ROOM.left - ROOM.right) * (time - from) / (until - from || 1);
   }
 
   draw() {
     this.width = Math.round(this.place.clientWidth);
     if (this.width === 0) return;
-    const height = 190;
-    const [low, high] = this.range();
+    const [from, until] = span();
+    const frames = [Math.max(0, frameAt(from) - 1), Math.min(run.frames - 1, frameAt(until) + 1)];
+    const [low, high] = this.range(frames);
     const to = this.log ? Math.log : value => value;
-    const scale = (height - ROOM.top - ROOM.bottom) / (to(high) - to(low));
-    const y = value => height - ROOM.bottom - scale * (to(this.log ? Math.max(value, low) : value) - to(low));
-    this.svg.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
+    const scale = (HEIGHT - ROOM.top - ROOM.bottom) / (to(high) - to(low));
+    const y = value => HEIGHT - ROOM.bottom - scale * (to(this.log ? Math.max(value, low) : value) - to(low));
+    const inner = { x: ROOM.left, width: Math.max(0, this.width - ROOM.left - ROOM.right) };
+    this.svg.setAttribute("viewBox", `0 0 ${this.width} ${HEIGHT}`);
     const parts = [];
     if (this.chart.band) {
-      const [from, until] = this.chart.band.map(y);
-      parts.push(svg("rect", {
-        class: "band", x: ROOM.left, y: until, width: this.width - ROOM.left - ROOM.right, height: from - until,
-      }));
+      const [below, above] = this.chart.band.map(y);
+      parts.push(svg("rect", { class: "band", ...inner, y: above, height: below - above }));
     }
     const across = (value, name) => svg("line", {
       class: name, x1: ROOM.left, x2: this.width - ROOM.right, y1: y(value), y2: y(value),
@@ -101,26 +124,41 @@ class TimeChart {
       parts.push(svg("text", { class: "tick", x: ROOM.left - 6, y: y(value) + 4, "text-anchor": "end" },
         text.replace("-", "−")));
     }
-    for (const value of ticks(0, seconds[run.frames - 1], Math.max(2, this.width / 90))) {
-      parts.push(svg("text", { class: "tick", x: this.x(value), y: height - 7, "text-anchor": "middle" },
-        String(Number(value.toPrecision(6))) + (value === 0 && run.stamped ? "\u00a0s" : "")));
-    }
+    ticks(from, until, Math.max(2, this.width / 90)).forEach((value, i) => {
+      parts.push(svg("text", { class: "tick", x: this.x(value), y: HEIGHT - 7, "text-anchor": "middle" },
+        String(Number(value.toPrecision(6))) + (i === 0 && run.stamped ? "\u00a0s" : "")));
+    });
     if (this.chart.middle !== null) parts.push(across(this.chart.middle, "middle"));
-    const lines = this.shown().sort(([a], [b]) => isReference(b) - isReference(a));
-    for (const [key, line] of lines) {
-      const d = polyline(line.length, k => (Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null));
-      parts.push(svg("path", { class: "line estimator-" + key, d }));
+    const view = svg("svg", { ...inner, y: 0, height: HEIGHT, viewBox: `${ROOM.left} 0 ${inner.width} ${HEIGHT}` });
+    for (const [key, line] of this.shown()) {
+      const chosenFrames = thinned(line, frames, 2 * inner.width);
+      const d = polyline(chosenFrames.length, i => {
+        const k = chosenFrames[i];
+        return Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null;
+      });
+      view.append(svg("path", { class: lineClass(key), d }));
     }
-    this.cursor = svg("line", { class: "cursor", y1: ROOM.top, y2: height - ROOM.bottom });
-    parts.push(this.cursor);
-    this.svg.replaceChildren(...parts);
-    this.moveCursor();
+    this.marked = svg("rect", { class: "marked", y: ROOM.top, height: HEIGHT - ROOM.top - ROOM.bottom, width: 0 });
+    [this.cursor, this.hairline] = ["cursor", "hairline"].map(name => svg("line", { class: name, y1: ROOM.top, y2: HEIGHT - ROOM.bottom }));
+    this.svg.replaceChildren(...parts, view, this.marked, this.cursor, this.hairline);
+    this.moveLine(this.cursor, seconds[chosen.frame]);
+    this.moveLine(this.hairline, null);
   }
 
-  moveCursor() {
-    if (!this.cursor) return;
-    const x = this.x(seconds[chosen.frame]);
-    this.cursor.setAttribute("x1", x);
-    this.cursor.setAttribute("x2", x);
+  mark(...times) {
+    const [left, right] = times.map(time => this.x(time)).sort((a, b) => a - b);
+    this.marked.setAttribute("x", left);
+    this.marked.setAttribute("width", right - left);
+  }
+
+  // Hidden where the time is not in the span.
+  moveLine(line, time) {
+    if (!line) return;
+    const [from, until] = span();
+    const inside = time !== null && time >= from && time <= until;
+    line.style.display = inside ? "" : "none";
+    if (!inside) return;
+    line.setAttribute("x1", this.x(time));
+    line.setAttribute("x2", this.x(time));
   }
 }

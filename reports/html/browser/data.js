@@ -48,10 +48,12 @@ const observations = run.observations && {
 const isReference = key => key !== TRUTH && run.estimators[Number(key)].name === run.reference;
 const isBit = (flags, i) => flags !== null && ((flags[i >> 3] >> (i & 7)) & 1) === 1;
 
-// What is chosen: one frame and a set of estimators for the whole page.
-const chosen = { frame: 0, shown: new Set(trajectories.keys()) };
+// What is chosen for the whole page: one frame, a set of estimators, and a span of time, or null for all of it.
+const chosen = { frame: 0, shown: new Set(trajectories.keys()), span: null };
 const onFrame = [];
 const onShown = [];
+const onSpan = [];
+const onPointed = [];  // with the time under the pointer, or null
 
 function goTo(frame) {
   const last = run.frames - 1;
@@ -65,6 +67,30 @@ function show(key, shown) {
   if (shown) chosen.shown.add(key);
   else chosen.shown.delete(key);
   onShown.forEach(update => update());
+}
+
+const span = () => chosen.span || [0, seconds[run.frames - 1]];
+
+// Shows the times between two ends, a few frames at least; null for all of the time.
+function zoom(ends) {
+  const last = seconds[run.frames - 1];
+  const shortest = Math.min(last, 4 * last / Math.max(1, run.frames - 1));
+  if (ends !== null) {
+    const length = Math.max(ends[1] - ends[0], shortest);
+    const from = Math.max(0, Math.min(last - length, (ends[0] + ends[1] - length) / 2));
+    ends = length < last ? [from, from + length] : null;
+  }
+  chosen.span = ends;
+  onSpan.forEach(update => update());
+}
+
+// Magnifies the time around the cursor.
+function magnify(factor) {
+  const [from, until] = span();
+  const at = seconds[chosen.frame];
+  const middle = at >= from && at <= until ? at : (from + until) / 2;
+  const half = (until - from) / factor / 2;
+  zoom([middle - half, middle + half]);
 }
 
 // The frame whose time is nearest.

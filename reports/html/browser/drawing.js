@@ -13,17 +13,40 @@ const press = (button, on) => button.setAttribute("aria-pressed", String(on));
 // Far outside a picture, numbers only make the file longer.
 const bounded = value => Math.max(-1e5, Math.min(1e5, value)).toFixed(1);
 
-// A line through n places, broken where `place` gives none.
+// A line through n places, broken where `place` gives none; places less than half a pixel on are left out.
 function polyline(n, place) {
   let d = "";
-  let pen = "M";
+  let from = null;
   for (let i = 0; i < n; i++) {
     const at = place(i);
-    if (at) d += `${pen}${bounded(at[0])} ${bounded(at[1])}`;
-    pen = at ? "L" : "M";
+    if (at && from && Math.abs(at[0] - from[0]) + Math.abs(at[1] - from[1]) < 0.5) continue;
+    if (at) d += `${from ? "L" : "M"}${bounded(at[0])} ${bounded(at[1])}`;
+    from = at;
   }
   return d;
 }
+
+// Frames of a line between two ends that show all of it in so many pixels: all, or the extremes of each piece.
+function thinned(line, [first, last], pixels) {
+  const n = last - first + 1;
+  const pieces = Math.max(1, Math.floor(pixels));
+  if (n <= 2 * pieces) return Array.from({ length: n }, (_, i) => first + i);
+  const frames = [];
+  for (let piece = 0; piece < pieces; piece++) {
+    const from = first + Math.floor(piece * n / pieces);
+    const until = first + Math.floor((piece + 1) * n / pieces);
+    let [low, high] = [from, from];
+    for (let k = from; k < until; k++) {
+      if (!Number.isFinite(line[k])) continue;
+      if (!(line[k] >= line[low])) low = k;
+      if (!(line[k] <= line[high])) high = k;
+    }
+    frames.push(...new Set([low, high].sort((a, b) => a - b)));
+  }
+  return frames;
+}
+
+const lineClass = key => `line estimator-${key}${isReference(key) ? " reference" : ""}`;
 
 function quantity(value, unit = "") {
   if (!Number.isFinite(value)) return "–";

@@ -63,7 +63,7 @@ class FrameView {
     const parts = [];
     for (const one of seen) {
       const [x, y] = [2 * side, 2 * side + 1].map(row => scale * one.measured[row]);
-      const group = svg("g", { class: `observation ${one.fate} trajectory-${key}` });
+      const group = svg("g", { class: `observation ${one.fate} estimator-${key}` });
       if (one.predicted) {
         const [px, py] = [2 * side, 2 * side + 1].map(row => scale * one.predicted[row]);
         group.append(svg("path", { class: "error", d: `M${x.toFixed(1)} ${y.toFixed(1)}L${bounded(px)} ${bounded(py)}` }));

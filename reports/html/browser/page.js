@@ -14,6 +14,22 @@ for (const box of document.querySelectorAll("#estimators-shown input")) {
   box.addEventListener("change", () => show(box.value, box.checked));
 }
 
+// On a phone the list of estimators is folded away.
+const list = document.querySelector("#controls details");
+const phone = matchMedia("(max-width: 40rem)");
+const fold = () => { list.open = !phone.matches; };
+phone.addEventListener("change", fold);
+fold();
+
+// Legends of paper and phone have what is shown.
+onShown.push(() => {
+  for (const entry of document.querySelectorAll(".legend li")) entry.hidden = !chosen.shown.has(entry.dataset.key);
+});
+
+for (const button of document.querySelectorAll("button[data-time]")) {
+  button.addEventListener("click", () => (button.dataset.time === "all" ? zoom(null) : magnify(button.dataset.time === "in" ? 2 : 1 / 2)));
+}
+
 const play = document.getElementById("play");
 let playing = null;
 function stop() {

@@ -1,23 +1,38 @@
 // All paths from above or in 3D, with landmarks, covariance ellipses and the frame of the cursor.
+// Paths that coincide are drawn apart: their offsets from the reference, pose by pose, times a factor.
 const ELLIPSES = 25;
 const CHI = Math.sqrt(5.991);  // 95 % of a plane's two degrees of freedom
 
 class PathView {
   constructor(place) {
     this.place = place.querySelector(".plot");
-    this.legend = place.querySelector(".scale");
+    this.words = place.querySelector(".view");
     this.svg = svg("svg", { tabindex: "0", role: "application", "aria-label": place.dataset.label });
     this.place.append(this.svg);
     this.solid = false;
     this.landmarks = false;
     this.ellipses = false;
+    this.follow = false;
+    this.factor = 1;
+    this.reference = [...trajectories.values()].find(trajectory => isReference(trajectory.key));
+    this.apart = new Map();  // displaced paths by key
     this.extent = this.bounds();
     this.reset();
     this.buttons(place);
     this.listen();
     whenResized(this.place, () => this.draw());
     onShown.push(() => this.draw());
-    onFrame.push(() => this.drawCursor());
+    onFrame.push(() => (this.follow ? this.draw() : this.drawCursor()));
+  }
+
+  // (3 n) positions as they are drawn.
+  path(trajectory) {
+    if (this.factor === 1 || trajectory === this.reference) return trajectory.path;
+    if (!this.apart.has(trajectory.key)) {
+      const from = this.reference.path;
+      this.apart.set(trajectory.key, trajectory.path.map((value, i) => from[i] + this.factor * (value - from[i])));
+    }
+    return this.apart.get(trajectory.key);
   }
 
   // The box of the paths; a path that runs off alone may be switched off, but does not hide the others.
@@ -62,7 +77,7 @@ class PathView {
     const height = this.height;
     const { low, high } = this.extent;
     const [right, up] = this.axes();
-    const middle = low.map((value, i) => (value + high[i]) / 2);
+    const middle = (this.follow && this.here()) || low.map((value, i) => (value + high[i]) / 2);
     const spread = axis => axis.reduce((sum, a, i) => sum + Math.abs(a) * (high[i] - low[i]), 0) || 1;
     const fit = Math.min((width - 40) / spread(right), (height - 64) / spread(up));
     const m = this.zoom * Math.min(fit, 1e6);
@@ -77,6 +92,13 @@ class PathView {
     ];
   }
 
+  // Position of the reference, or of the first path shown, at the cursor; null where it has none.
+  here() {
+    const trajectory = this.reference || this.shown()[0];
+    const at = trajectory && Array.from(trajectory.path.subarray(3 * chosen.frame, 3 * chosen.frame + 3));
+    return at && Number.isFinite(at[0]) ? at : null;
+  }
+
   draw() {
     this.width = Math.round(this.place.clientWidth);
     if (this.width === 0) return;
@@ -86,9 +108,10 @@ class PathView {
     const parts = [];
     const shown = this.shown();
     if (this.landmarks) {
-      for (const trajectory of shown) if (trajectory.points) parts.push(svg("path", { class: "dots estimator-" + trajectory.key, d: this.dots(trajectory.points) }));
+      const placed = this.factor === 1 ? shown : shown.filter(trajectory => trajectory === this.reference);
+      for (const trajectory of placed) if (trajectory.points) parts.push(svg("path", { class: "dots estimator-" + trajectory.key, d: this.dots(trajectory.points) }));
     }
-    for (const trajectory of shown) parts.push(svg("path", { class: "line estimator-" + trajectory.key, d: this.track(trajectory.path) }));
+    for (const trajectory of shown) parts.push(svg("path", { class: lineClass(trajectory.key), d: this.track(this.path(trajectory)) }));
     if (this.ellipses) {
       const every = Math.max(1, Math.floor(run.frames / ELLIPSES));
       for (const trajectory of shown) {
@@ -99,13 +122,18 @@ class PathView {
       }
     }
     for (const trajectory of shown) {
-      const last = this.lastPose(trajectory.path);
+      const path = this.path(trajectory);
+      const last = this.lastPose(path);
       if (last < 0) continue;
-      const [x, y] = this.project(trajectory.path, 3 * last);
+      const [x, y] = this.project(path, 3 * last);
       parts.push(svg("rect", { class: "end estimator-" + trajectory.key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
     }
-    const [x, y] = this.project([0, 0, 0], 0);
-    parts.push(svg("circle", { class: "start", cx: x, cy: y, r: 5 }));
+    const [first] = shown;
+    const start = first ? first.path.findIndex(Number.isFinite) : -1;
+    if (start >= 0) {
+      const [x, y] = this.project(first.path, start);
+      parts.push(svg("circle", { class: "start", cx: x, cy: y, r: 5 }));
+    }
     if (this.solid) parts.push(...this.triad());
     parts.push(...this.ruler());
     this.cursor = svg("g", { class: "now" });
@@ -148,10 +176,10 @@ class PathView {
     const middle = (a + c) / 2;
     const apart = Math.hypot((a - c) / 2, b);
     if (!(middle - apart >= 0)) return "";
-    const [long, short] = [middle + apart, middle - apart].map(v => CHI * this.scale * Math.sqrt(v));
+    const [long, short] = [middle + apart, middle - apart].map(v => CHI * this.factor * this.scale * Math.sqrt(v));
     if (long < 0.5 || long > 1e5) return "";
     const angle = -0.5 * Math.atan2(2 * b, a - c);
-    const [x, y] = this.project(trajectory.path, 3 * k);
+    const [x, y] = this.project(this.path(trajectory), 3 * k);
     const [dx, dy] = [long * Math.cos(angle), long * Math.sin(angle)];
     const arc = `A${long.toFixed(1)} ${Math.max(short, 0.1).toFixed(1)} ${(angle * 180 / Math.PI).toFixed(1)} 0 0`;
     return `M${bounded(x - dx)} ${bounded(y - dy)}${arc} ${bounded(x + dx)} ${bounded(y + dy)}`
@@ -164,9 +192,10 @@ class PathView {
     const metres = power * [5, 2, 1].find(factor => factor * power <= wanted);
     const length = metres * this.scale;
     const y = this.height - 10;
+    const offset = this.factor === 1 ? "" : `; ${quantity(metres / this.factor, "m")} of offset from ${this.reference.name} (× ${this.factor})`;
     return [
       svg("path", { class: "ruler", d: `M12 ${y - 5}v5h${length.toFixed(1)}v-5` }),
-      svg("text", { class: "tick", x: 18 + length, y: y + 1 }, `${Number(metres.toPrecision(3))} m`),
+      svg("text", { class: "tick", x: 18 + length, y: y + 1 }, `${Number(metres.toPrecision(3))} m${offset}`),
     ];
   }
 
@@ -187,8 +216,9 @@ class PathView {
     const k = chosen.frame;
     const parts = [];
     for (const trajectory of this.shown()) {
-      if (!Number.isFinite(trajectory.path[3 * k])) continue;
-      const [x, y] = this.project(trajectory.path, 3 * k);
+      const path = this.path(trajectory);
+      if (!Number.isFinite(path[3 * k])) continue;
+      const [x, y] = this.project(path, 3 * k);
       if (this.ellipses && trajectory.covariance) {
         parts.push(svg("path", { class: "ellipse now estimator-" + trajectory.key, d: this.ellipse(trajectory, k) }));
       }
@@ -203,9 +233,10 @@ class PathView {
     let best = null;
     let least = 22 ** 2;
     for (const trajectory of this.shown()) {
+      const path = this.path(trajectory);
       for (let k = 0; k < run.frames; k++) {
-        if (!Number.isFinite(trajectory.path[3 * k])) continue;
-        const [x, y] = this.project(trajectory.path, 3 * k);
+        if (!Number.isFinite(path[3 * k])) continue;
+        const [x, y] = this.project(path, 3 * k);
         const away = (x - px) ** 2 + (y - py) ** 2;
         if (away < least) [least, best] = [away, { trajectory, frame: k }];
       }
@@ -274,6 +305,7 @@ class PathView {
 
   drag(dx, dy) {
     if (!this.solid) {
+      if (this.follow) this.stopFollowing();
       this.pan = [this.pan[0] + dx, this.pan[1] + dy];
       return;
     }
@@ -286,14 +318,36 @@ class PathView {
     this.pan = this.pan.map(value => value * factor);
   }
 
+  // The picture stays where it is when it no longer follows the cursor.
+  stopFollowing() {
+    const { low, high } = this.extent;
+    const from = low.map((value, i) => (value + high[i]) / 2);
+    const moved = (this.here() || from).map((value, i) => value - from[i]);
+    const along = axis => this.scale * axis.reduce((sum, a, i) => sum + a * moved[i], 0);
+    this.pan = [this.pan[0] - along(this.right), this.pan[1] + along(this.up)];
+    this.follow = false;
+    press(this.followButton, false);
+  }
+
   buttons(place) {
+    this.followButton = place.querySelector('[data-do="follow"]');
+    const factor = place.querySelector("select");
+    factor.closest("label").hidden = !this.reference || trajectories.size < 2;
+    factor.addEventListener("change", () => this.change(() => {
+      this.factor = Number(factor.value);
+      this.apart.clear();
+    }));
     for (const button of place.querySelectorAll("button")) {
       const what = button.dataset.do;
       button.addEventListener("click", () => {
-        if (["solid", "landmarks", "ellipses"].includes(what)) {
+        if (["solid", "landmarks", "ellipses", "follow"].includes(what)) {
           this[what] = !this[what];
           press(button, this[what]);
-          if (what === "solid") this.reset();
+          if (what === "solid") {
+            this.reset();
+            this.words.textContent = this.solid ? "In 3D." : "From above.";
+          }
+          if (what === "follow") this.pan = [0, 0];
         } else if (what === "larger") {
           press(button, place.classList.toggle("large"));
         } else if (what === "reset") this.reset();
