@@ -37,7 +37,6 @@ def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, 
         "frames": len(t),
         "step": "moment" if data.stamped else "frame",
         "stamped": data.stamped,
-        "start": "start of the reference",
         "axes": list(data.axes),
         "t": floats(t),
         "reference": data.reference,
@@ -151,7 +150,7 @@ def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> l
         far = result.bound if first else position[k]
         text = f"{name} {'first' if first else 'farthest,'} {far:.3g} m from {data.reference}"
         found.append({"frame": int(np.argmin(np.abs(t - data.t[name][k]))), "text": text})
-    return found
+    return sorted(found, key=lambda bookmark: int(bookmark["frame"]))
 
 
 def _numbered(data: ComparisonData, lines: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

@@ -105,7 +105,8 @@ class Page:
 def render_page(page: Page) -> str:
     """HTML of a page: one file that needs no other and makes no request. All text that comes from files is escaped."""
     plots, keys = page.plots, {name: str(i) for i, name in enumerate(page.colors)}
-    styles = asset("report.css") + ("" if plots is None else asset("explore.css"))
+    styles = asset("report.css") + (asset("explore.css") if page.colors else "")
+    titles = {title: key for name, key in keys.items() for title in (name, f"{name} (reference)")}
     sections = [section for section in (page.table, *page.sections) if section.blocks]
     return (
         environment()
@@ -116,7 +117,7 @@ def render_page(page: Page) -> str:
             sections=sections,
             css=Markup(styles),
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
-            classes={name: f"estimator-{key}" for name, key in keys.items()},
+            classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
             **({} if plots is None else _interactive(plots)),
         )

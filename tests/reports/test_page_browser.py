@@ -91,7 +91,7 @@ def test_switching_an_estimator_off_takes_its_lines_away_and_frees_the_axis(open
     assert opened.count("#over-time .line.estimator-0") > 3
     opened.page.uncheck('#estimators-shown input[value="0"]')
     assert opened.count("#over-time .line.estimator-0") == 0
-    assert opened.count("#path-view .estimator-0") == 0
+    assert opened.count("#path-view svg .estimator-0") == 0
     assert opened.count("#path-view .line.estimator-1") == 1
     assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) .plot > svg') != before
     opened.page.check('#estimators-shown input[value="0"]')
@@ -173,7 +173,7 @@ def test_the_page_is_operable_by_keyboard(opened: Opened) -> None:
     assert opened.text("#clock").startswith("frame 11 ")
     opened.page.focus('#estimators-shown input[value="0"]')
     opened.page.keyboard.press("Space")
-    assert opened.count("#path-view .estimator-0") == 0
+    assert opened.count("#path-view svg .estimator-0") == 0
     opened.page.focus("#path-view svg")
     before = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.keyboard.press("+")
@@ -251,7 +251,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: str) -> None:
     opened = Opened(chromium, compared)
     assert opened.count("#path-view .line") == 7
-    assert opened.count(".chart svg") == 7
+    assert opened.count(".chart .plot > svg") == 7
     clock = opened.text("#clock")
     assert clock.startswith("moment ")
     assert clock.endswith("\u00a0s")
@@ -271,7 +271,7 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     assert opened.count(f"{rotation} .line.estimator-6") == 0  # positions only
     assert opened.count(f"{rotation} .line.estimator-1") == 1
     opened.page.uncheck('#estimators-shown input[value="1"]')
-    assert opened.count("#path-view .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
+    assert opened.count("#path-view svg .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
     opened.page.click("summary:has-text('in numbers')")
     row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
     at_ten = six().results["steady"].departure["position"].iloc[10]
