@@ -90,7 +90,7 @@ def test_switching_an_estimator_off_takes_its_lines_away_and_frees_the_axis(open
     assert opened.count("#over-time .line.estimator-0") > 3
     opened.page.uncheck('#estimators-shown input[value="0"]')
     assert opened.count("#over-time .line.estimator-0") == 0
-    assert opened.count("#path-view .estimator-0") == 0
+    assert opened.count("#path-view svg .estimator-0") == 0
     assert opened.count("#path-view .line.estimator-1") == 1
     assert opened.page.inner_html('.chart:has(svg[aria-label^="Divergence"]) .plot > svg') != before
     opened.page.check('#estimators-shown input[value="0"]')
@@ -172,7 +172,7 @@ def test_the_keyboard_is_enough(opened: Opened) -> None:
     assert opened.text("#clock").startswith("frame 11 ")
     opened.page.focus('#estimators-shown input[value="0"]')
     opened.page.keyboard.press("Space")
-    assert opened.count("#path-view .estimator-0") == 0
+    assert opened.count("#path-view svg .estimator-0") == 0
     opened.page.focus("#path-view svg")
     before = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.keyboard.press("+")
