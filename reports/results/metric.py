@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.limits import Better
 
-from ..formatting import interval, number
+from ..formatting import RESOLUTION, interval, number, resolved
 from .statistics import at
 
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
@@ -144,8 +144,14 @@ class Metric:
         return f"{self.short}, {self.unit}" if self.unit else self.short
 
     def text(self, value: float) -> str:
-        """A figure of it, without its unit."""
+        """A figure of it, without its unit; 0 with the resolution for rounding."""
+        if self.is_rounding(value):
+            return resolved(value, RESOLUTION)
         return number(int(value) if self.count and isfinite(value) else value)
+
+    def is_rounding(self, value: float) -> bool:
+        """Whether a distance or an angle is not zero, and too small to mean anything."""
+        return self.unit in ("m", "°") and 0.0 < abs(value) < RESOLUTION
 
     def value(self, results: Mapping[str, Any]) -> Value:
         """Its figure in the results of one estimator."""

@@ -122,7 +122,8 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
             return Cell(OVERCONFIDENT, note=mark)
         if not isfinite(value):
             return Cell(DASH, note=mark)
-        return Cell(m.text(value), first is not None and m.text(value) == m.text(first), mark)
+        marked = first is not None and m.text(value) == m.text(first) and not m.is_rounding(value)
+        return Cell(m.text(value), marked, mark)
 
     rows = tuple(
         Row(

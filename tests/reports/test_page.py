@@ -17,7 +17,9 @@ from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
+from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.metric import MAIN
 from fgbaseline.reports.results.metrics import shown_in
 from fgbaseline.reports.tables.run import main_table
@@ -84,6 +86,35 @@ def test_the_best_of_a_column_is_marked_and_the_reference_is_not_nearest_to_itse
     best = {row.name: [row.cells[i].best for i in at] for row in table.rows}
     assert best == {"dead-reckoning": [False, False], "ekf": [False, True], "isam2": [True, False]}
     assert [row.name for row in table.rows if row.reference] == ["isam2"]
+
+
+def test_rounding_is_zero_with_its_resolution_and_never_the_best() -> None:
+    problem = plain_problem(scene())
+    drifts = {"ekf": 1e-9, "joint-ekf": 3.0, "isam2": 0.0}
+    run = run_of(problem, *(answer(problem, name, (drift, 0.0, 0.0)) for name, drift in drifts.items()))
+    table = main_table(run, as_dict(run)["estimators"])
+    at = [i for i, column in enumerate(table.columns) if column.group.startswith("divergence") and column.unit == "m"]
+    rows = {row.name: [row.cells[i] for i in at] for row in table.rows}
+    assert len(at) == 2
+    assert {(cell.text, cell.best) for cell in rows["ekf"]} == {("0 ± 1.00 × 10⁻⁶", False)}
+    assert all("10⁻⁶" not in cell.text for cell in rows["joint-ekf"])
+    sentences = " ".join(verdict(run))
+    assert "0 ± 1.00 × 10⁻⁶ m" in sentences
+    assert "10⁻⁹" not in sentences
+
+
+@pytest.mark.parametrize(("farthest", "logarithmic"), [(60.0, True), (6.0, False)])
+def test_a_chart_is_logarithmic_where_one_estimator_dwarfs_the_others(farthest: float, logarithmic: bool) -> None:
+    problem = plain_problem(scene())
+    drifts = {"dead-reckoning": farthest, "ekf": 3.0, "joint-ekf": 2.0, "isam2": 0.0}
+    run = run_of(problem, *(answer(problem, name, (0.0, drift, 0.0)) for name, drift in drifts.items()))
+    assert {chart["name"]: chart["log"] for chart in page_data(run)["charts"]}["divergence"] is logarithmic
+
+
+def test_bookmarks_are_in_the_order_of_time() -> None:
+    frames = [bookmark["frame"] for bookmark in page_data(standard_run())["bookmarks"]]
+    assert len(frames) >= 2
+    assert frames == sorted(frames)
 
 
 def test_nothing_is_loaded_from_anywhere() -> None:
