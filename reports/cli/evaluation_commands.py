@@ -136,7 +136,7 @@ def compare(
     elif force:
         raise InputError("force: there is no folder to replace; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
-    page = None if out is None else report.write(out, force=force)
+    page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict
     click.echo(f"{first}\n")
     print_table(report.text_table, wrap_names=False)
