@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fgbaseline import compare
 from fgbaseline.data import Estimate, HeldOut, Problem, Status, Truth
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.parallel import background_map
 from fgbaseline.geometry import FloatArray
@@ -30,8 +31,8 @@ class CommonRmse:
     frames: int
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Evidence:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Evidence(Displayed):
     """Consistency, residuals and map of an estimate; what compares with truth or reference is None without it.
 
     For the reference itself `difference`, `sigma_ratio` and `map` are None too.
@@ -67,8 +68,8 @@ class Evidence:
         return None if self.map is None or len(self.map) == 0 else compare.map_by_depth(self.map).reset_index()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class InertialEvidence:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class InertialEvidence(Displayed):
     """Velocity and biases of an estimate from raw inertial data; what compares with truth or reference is None without.
 
     For the columns see `compare.velocity_and_bias_errors`.
@@ -84,8 +85,8 @@ class InertialEvidence:
     """of the 15 and of each block: see `compare.state_nees`"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class HeldOutReport:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class HeldOutReport(Displayed):
     """Tracks that were held out of the run, and the prediction errors of the paths on them."""
 
     held: HeldOut
@@ -95,8 +96,8 @@ class HeldOutReport:
     """see `compare.held_out_ranking`; empty where no track is left to judge by"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Result:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Result(Displayed):
     """Estimator of a run, compared."""
 
     estimate: Estimate
@@ -137,8 +138,8 @@ class Result:
         return float("nan") if self.divergence is None else compare.divergence_summary(self.divergence)["rmse"]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Run:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Run(Displayed):
     """Problem, results of all estimators and the reference among them."""
 
     problem: Problem

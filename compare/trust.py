@@ -1,5 +1,6 @@
 """Trust in the reference: a verdict from its residuals and its agreement with a batch solution, never from truth."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.plural import percent
 from fgbaseline.geometry import disparity
@@ -66,13 +68,19 @@ class Criterion:
     """what the value rests on beside the reference; empty where nothing needs to be said"""
 
 
-@dataclass(frozen=True, slots=True)
-class Trust:
+@dataclass(frozen=True, slots=True, repr=False)
+class Trust(Displayed):
     """Verdict, its reasons in sentences, worst first, and the criteria that were measured."""
 
     verdict: Verdict
     reasons: tuple[str, ...]
     criteria: tuple[Criterion, ...] = ()
+
+    def _heading(self) -> str:
+        return f"Trust: {self.verdict.name.lower()}"
+
+    def _facts(self) -> Mapping[str, str]:
+        return {f"reason {i}": reason for i, reason in enumerate(self.reasons, 1)}
 
 
 @dataclass(frozen=True, slots=True)

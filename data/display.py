@@ -32,10 +32,10 @@ class Displayed:
     def __repr__(self) -> str:
         facts = self._facts()
         if facts is None:
-            return _cut(f"{self._heading()}({', '.join(f'{k}={v}' for k, v in _fields(self).items())})")
+            return cut(f"{self._heading()}({', '.join(f'{k}={v}' for k, v in _fields(self).items())})")
         width = max(map(len, facts), default=0)
         rows = [f"  {title:{width}}  {text}" for title, text in list(facts.items())[: LINES - 1]]
-        return "\n".join(_cut(" ".join(line.splitlines())) for line in (self._heading(), *rows))
+        return "\n".join(cut(" ".join(line.splitlines())) for line in (self._heading(), *rows))
 
     def _repr_html_(self) -> str:
         """The table that a notebook shows."""
@@ -66,5 +66,6 @@ def _brief(value: object) -> str:
     return type(value).__name__
 
 
-def _cut(line: str) -> str:
+def cut(line: str) -> str:
+    """The line, or its beginning with an ellipsis."""
     return line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…"

@@ -181,7 +181,7 @@ class Estimate(Displayed):
         known = np.asarray(np.isfinite(self.world_T_imu).all(axis=(1, 2)))
         length = path_length(self.world_T_imu[:, :3, 3])
         facts = {
-            "poses": f"{known.sum():,} of {plural(len(known), 'frame')}, path {length:.1f} m",
+            "poses": f"{known.sum():,} of {plural(len(self.world_T_imu), 'frame')}, path {length:.1f} m",
             "covariance": "of every pose" if self.covariance is not None else "none",
             "landmarks": f"{len(self.landmarks):,}; {plural(int(self.used.sum()), 'observation')} used",
             "time": "not measured" if np.isnan(self.seconds_total) else f"{self.seconds_total:.3g} s",

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fgbaseline.data import Estimate
+from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
 
 from .covariance import CovarianceState, covariance_state
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class PoseSigma:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class PoseSigma(Displayed):
     """1-sigma of each pose under the noise model of the problem, with the first pose fixed.
 
     A covariance (6, 6) is that of the right perturbation [v, w]. A rotation of axes leaves the trace of a block

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fgbaseline.data import Estimate
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
 
@@ -18,8 +19,8 @@ SMALLER = 0.1
 """of the filter's own variance: by so much the reference's must exceed it in a direction of an overconfident pose"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ReferenceNees:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ReferenceNees(Displayed):
     """NEES of the difference of an estimate from the reference."""
 
     nees: FloatArray

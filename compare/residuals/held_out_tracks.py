@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.data import HeldOut, Sequence
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, StereoMeasurement, se3
 from fgbaseline.geometry.triangulation import triangulate_tracks
@@ -32,8 +33,8 @@ RESAMPLES = 400
 SEED = 20264
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class HeldOutErrors:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class HeldOutErrors(Displayed):
     """Prediction errors of several paths on the same held-out observations."""
 
     table: pd.DataFrame

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
@@ -38,8 +39,8 @@ SCALE = "scale"
 YAW = "yaw"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Alignment:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Alignment(Displayed):
     """Transformation p -> scale * rotation @ p + translation, and the pairs that determine it."""
 
     kind: Align = Align.NONE

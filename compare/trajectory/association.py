@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from fgbaseline.data import Trajectory
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError, so3
@@ -26,8 +27,8 @@ class Association(StrEnum):
     """the trajectory with the denser stamps is interpolated at those of the other, never beyond its ends"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class MatchedTrajectories:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class MatchedTrajectories(Displayed):
     """Paired poses of a reference and an estimate, n >= 1 of each, with the record of association and alignment.
 
     Input of every trajectory metric. `aligned` returns the same pairs with the estimate aligned to the reference.

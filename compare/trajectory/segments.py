@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
@@ -20,8 +21,8 @@ OFFICIAL_STEP = 10
 ROUND = np.array([1.0, 2.0, 2.5, 5.0])
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class SegmentErrors:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class SegmentErrors(Displayed):
     """Errors of segments, and the segment lengths."""
 
     table: pd.DataFrame

@@ -19,11 +19,12 @@ from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Sequence
+from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Result:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Result(Displayed):
     """Figures of one estimate."""
 
     entry: Entry
@@ -76,8 +77,8 @@ class Result:
         return {"m": position_resolution(*paths), "°": rotation_resolution_deg(*paths)}
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Comparison:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Comparison(Displayed):
     """A reference, and the figures of every estimate against it."""
 
     reference: Entry

@@ -8,7 +8,7 @@ import numpy as np
 from fgbaseline import compare
 from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.settings import Settings
-from fgbaseline.data import TimeUnit, Trajectory
+from fgbaseline.data import Landmarks, TimeUnit, Trajectory
 from fgbaseline.data.formats import Order, ParsedTrajectory
 from fgbaseline.data.formats.parsed_trajectory import bends, unit_ambiguity
 from fgbaseline.data.formats.quaternion_order import fits_clearly_better, in_words
@@ -52,6 +52,11 @@ class Resolved:
     def up(self) -> FloatArray | None:
         """(3,) what points up in its world, where the format defines it."""
         return self.source.up if isinstance(self.source, ParsedTrajectory) else None
+
+    @property
+    def landmarks(self) -> Landmarks | None:
+        """Landmarks in its world, where the source has them."""
+        return self.source.landmarks if isinstance(self.source, ParsedTrajectory) else None
 
     @property
     def orders(self) -> tuple[Order, ...]:

@@ -4,11 +4,12 @@ from dataclasses import dataclass, replace
 
 from fgbaseline.compare import Trust
 from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
+from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Entry:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Entry(Displayed):
     """A trajectory with its landmarks, covariances and trust."""
 
     trajectory: Trajectory
@@ -35,8 +36,8 @@ class Entry:
         return replace(self, remarks=(*self.remarks, remark))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Entries:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Entries(Displayed):
     """All inputs, in one body frame."""
 
     reference: Entry

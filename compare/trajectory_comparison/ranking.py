@@ -8,6 +8,7 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import RmseDifference
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
 
 AT_MOST = 100_000_000
@@ -15,8 +16,8 @@ AT_MOST = 100_000_000
 REPETITIONS = 1000
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Ranking:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Ranking(Displayed):
     """Position errors over the moments that all ranked estimates have: see `compare.rankable`."""
 
     at: dict[str, IntArray]

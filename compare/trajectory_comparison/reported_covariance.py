@@ -8,14 +8,15 @@ from fgbaseline import compare
 from fgbaseline.compare import Align, Association, CovarianceState, MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.data import Estimate, Truth
+from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray, InputError
 
 SINCE_FIRST = "both since the first pose"
 ALIGNED = "the alignment takes out a part of the errors"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ReportedCovariance:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ReportedCovariance(Displayed):
     """Errors of n poses and the covariances that the estimate reports for them."""
 
     error: FloatArray

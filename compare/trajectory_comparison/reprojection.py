@@ -10,14 +10,15 @@ from fgbaseline import compare
 from fgbaseline.compare import Alignment, MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Trajectory
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Pixels:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Pixels(Displayed):
     """Reprojection errors of one trajectory: tables of `compare.reprojection`, `used` being the problem's mask."""
 
     own: pd.DataFrame | None

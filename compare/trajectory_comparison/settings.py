@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from fgbaseline.geometry import InputError
 
 if TYPE_CHECKING:
-    from fgbaseline.data import TimeUnit
+    from fgbaseline.data import Problem, Sequence, TimeUnit
+    from fgbaseline.geometry import FloatArray
 
 
 Body = Literal["imu", "camera"]
@@ -68,7 +69,7 @@ class Settings:
     """lengths of relative motions; empty for 1 s (1 frame without stamps) and 10 m"""
     all_pairs: bool = False
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None
-    times: tuple[Path, ...] = ()
+    times: tuple["Path | FloatArray", ...] = ()
     """stamps for KITTI files: each takes those with one for each of its poses"""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """unit of stamps, where neither a header nor their size shows it"""
@@ -78,12 +79,12 @@ class Settings:
     """point that the reference follows, m, in the body of the estimates"""
     align_body: bool = False
     """removes a constant rotation between the bodies"""
-    sequence: Path | None = None
-    """a recording, or the folder of an exported problem"""
+    sequence: "Path | Sequence | Problem | None" = None
+    """a recording, the folder of an exported problem, or either in memory"""
     held_out: float = 0.0
     """share of the tracks of a recording to judge all paths by; a run that held some out has its own"""
-    extrinsic: Path | None = None
-    """imu_T_cam: a KITTI file of one line; None for that of `sequence`"""
+    extrinsic: "Path | FloatArray | None" = None
+    """imu_T_cam (4, 4), or a KITTI file of one line; None for that of `sequence`"""
     reference_body: Body = "imu"
     estimate_body: Body = "imu"
     beside: str = "all"
@@ -105,9 +106,14 @@ class Settings:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it: sequences as text with commas between, an empty one as None."""
+    """A value as JSON has it: an empty sequence as None, others as text with commas between; arrays by their shape."""
+    if hasattr(value, "shape"):
+        return f"array {value.shape}"
     if isinstance(value, Iterable) and not isinstance(value, str):
         return ",".join(f"{x:g}" if isinstance(x, int | float) else str(_plain(x)) for x in value) or None
     if isinstance(value, Delta):
         return f"{value.length:g}{value.unit}"
+    if hasattr(value, "observations"):  # a recording, or a problem, which has one
+        recording = getattr(value, "sequence", value)
+        return recording.source or recording.name
     return str(value) if isinstance(value, Path) else value

@@ -13,6 +13,7 @@ from ..observations import IntArray
 from ..problem.inertial import imu_intervals
 from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
+from ..trajectory import Trajectory
 from .columns import Order
 from .inertial_truth import inertial_truth, with_state
 from .named_file import FilePath, reading, shown
@@ -26,8 +27,8 @@ FASTER = 3.0
 """times the recording's: lines that are so much farther apart are not one for each frame"""
 
 
-def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) -> Sequence:
-    """The recording with the truth of a trajectory file (see `read_trajectory_file`).
+def attach_truth(sequence: Sequence, path: FilePath | Trajectory, frame: BodyFrame | None) -> Sequence:
+    """The recording with the truth of a trajectory file (see `read_trajectory_file`), or of a trajectory in memory.
 
     `frame` is the body whose poses they are: "camera" (the left one) or "imu". The result is `world_T_imu` with the
     world being the IMU's frame at frame 0. Line k of a KITTI file is frame k, or that of its number; frames beyond its
@@ -39,23 +40,51 @@ def attach_truth(sequence: Sequence, path: FilePath, frame: BodyFrame | None) ->
     It replaces what truth the recording has. Raises InputError naming file and line for bad text, and when `frame` is
     missing, the file has more lines than the recording has frames (KITTI), no stamp fits (TUM), or frame 0 has no pose.
     """
+    name = (path.source or path.name) if isinstance(path, Trajectory) else shown(path)
     if frame not in get_args(BodyFrame):
         raise InputError(
-            f"{shown(path)}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
+            f"{name}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
-    with reading(path), np.errstate(all="ignore"):
-        poses, line, remarks = _poses_of_frames(sequence, path, frame)
+    with reading(name), np.errstate(all="ignore"):
+        if isinstance(path, Trajectory):
+            poses, line, remarks = _matched(sequence, path)
+        else:
+            poses, line, remarks = _poses_of_frames(sequence, path, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
-        source = shown(path)
         inertial = sequence.imu is not None
-        truth = inertial_truth(poses, source) if inertial else Truth.from_any_world(poses, source=source)
-        if inertial and frame == "imu":
+        truth = inertial_truth(poses, name) if inertial else Truth.from_any_world(poses, source=name)
+        if inertial and frame == "imu" and not isinstance(path, Trajectory):
             truth = with_state(truth, path, line)
         missing = sequence.n_frames - int(truth.known.sum())
         if missing:
-            remarks.append(f"{missing} of {sequence.n_frames} frames have no ground truth in {shown(path)}.")
+            remarks.append(f"{missing} of {sequence.n_frames} frames have no ground truth in {name}.")
         return replace(sequence, truth=truth, remarks=(*sequence.remarks, *remarks))
+
+
+def _matched(sequence: Sequence, path: Trajectory) -> tuple[FloatArray, IntArray, list[str]]:
+    """As `_poses_of_frames` has it, of a trajectory in memory."""
+    if not path.oriented:
+        raise InputError("it has positions without orientations, which a run needs to bring it to its own world")
+    poses, line = np.full((sequence.n_frames, 4, 4), np.nan), np.full(sequence.n_frames, -1, dtype=np.int64)
+    frames, nearest = match_stamps(sequence.t, path.t)
+    if not len(frames):
+        raise _no_stamp_fits(sequence, path)
+    poses[frames] = path.world_T_body[nearest]
+    return poses, line, _apart(sequence, path, frames, nearest)
+
+
+def _no_stamp_fits(sequence: Sequence, path: Trajectory) -> InputError:
+    return InputError(
+        f"none of its time stamps ({float(path.t[0])!r} to {float(path.t[-1])!r} s) is near one of the recording's "
+        f"({float(sequence.t[0])!r} to {float(sequence.t[-1])!r} s); give the truth of this recording, on its clock"
+    )
+
+
+def _apart(sequence: Sequence, path: Trajectory, frames: IntArray, nearest: IntArray) -> list[str]:
+    """The remark on stamps that differ."""
+    apart = float(np.abs(sequence.t[frames] - path.t[nearest]).max())
+    return [f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart."] if apart else []
 
 
 def _poses_of_frames(
@@ -86,14 +115,9 @@ def _poses_of_frames(
         )
         read = file.trajectory(unit, order)
     if not len(frames):
-        raise InputError(
-            f"none of its time stamps ({float(read.t[0])!r} to {float(read.t[-1])!r} s) is near one of the recording's "
-            f"({float(sequence.t[0])!r} to {float(sequence.t[-1])!r} s); give the truth of this recording, on its clock"
-        )
+        raise _no_stamp_fits(sequence, read)
     poses[frames] = read.world_T_body[nearest]
-    apart = float(np.abs(sequence.t[frames] - read.t[nearest]).max())
-    if apart:
-        remarks.append(f"Ground truth is matched by time; stamps are up to {1e3 * apart:.3g} ms apart.")
+    remarks += _apart(sequence, read, frames, nearest)
     return poses, _lines(file, sequence.n_frames, frames, nearest), remarks
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from ..estimate import Landmarks
 from ..observations import IntArray
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
@@ -48,6 +49,8 @@ class ParsedTrajectory:
     """(n, 12), (n, 36) as written in text, or (n, 6, 6) of the right perturbation"""
     up: FloatArray | None = None
     """(3,) what points up in its world, where the format defines it"""
+    landmarks: Landmarks | None = None
+    """in its world, where the source has them"""
     remarks: tuple[str, ...] = ()
     """remarks on the detection: each completes a sentence that begins with the file name"""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fgbaseline.data.axis_conventions import IDENTITY
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import NoiseSettings
@@ -19,8 +20,8 @@ from ..odometry.stereo_odometry import Odometry
 from ..windows.residuals import OFFSET, TURN
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Diagnosis(Displayed):
     """Estimated faults and noise of a recording; `findings_of` reports them in sentences."""
 
     sequence: Sequence

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.problem.inertial import ImuIntervals
@@ -18,8 +19,8 @@ from .sensors import SensorChecks
 from .units import ImuUnits
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class InertialDiagnosis:
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class InertialDiagnosis(Displayed):
     """Start, path, noise and faults of a recording with raw inertial samples."""
 
     sequence: Sequence

@@ -141,7 +141,7 @@ def compare(
         option, what = ("force", "folder to replace") if force else ("open", "page")
         raise InputError(f"{option}: there is no {what}; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
-    page = None if out is None else report.write(out, force=force)
+    page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict
     click.echo(f"{first}\n")
     print_table(report.text_table, wrap_names=False)

@@ -1,24 +1,30 @@
 """Inputs of a comparison, read and brought to one body frame: reference, estimates and the problem behind them."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.bodies import moved_body, with_body_recognized, with_lever_arm
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
-from fgbaseline.data import Landmarks, Problem, Trajectory
-from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data import Landmarks, Problem
+from fgbaseline.data.formats import read_kitti, read_landmarks, read_times
+from fgbaseline.data.formats.named_file import FilePath
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from .reference_run import ReferenceRun, load_problem, read_reference_run
+from .reference_run import ReferenceRun, load_problem, read_reference_run, reference_in_memory
+from .sources import TrajectoryLike, opened, split_name
 
-Given = str | Path | Trajectory
-"""`[NAME=]FILE`, or a trajectory in memory"""
+Given = TrajectoryLike | Source
+"""a trajectory; the name of a reference may be that of a run's folder"""
+
+GivenLandmarks = Sequence[FilePath] | Mapping[str, FilePath | Landmarks]
+"""`[NAME=]FILE` each, or landmarks by the name of their trajectory"""
 
 CUT_OFF = 0.01
 """largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
@@ -26,12 +32,23 @@ ONLINE = "-online"
 """suffix of a smoother's by-product: pose k from data up to frame k"""
 
 
-def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
+def read_entries(
+    reference: Given | Run, estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings
+) -> Entries:
     """Reads all inputs. Raises InputError with the file and its fault."""
-    run = read_reference_run(Path(str(reference))) if _is_folder(reference) else None
+    if isinstance(reference, Run):
+        run: ReferenceRun | None = reference_in_memory(reference)
+    elif isinstance(reference, str | os.PathLike) and Path(reference).is_dir():
+        run = read_reference_run(Path(reference))
+    else:
+        run = None
     problem, held = load_problem(settings, run)
-    own = [opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
-    sources = own if run is None else [run.files.trajectory(run.reference), *own]
+    sources: list[Source] = []
+    if run is not None:
+        sources.append(run.files.trajectory(run.reference))
+    elif not isinstance(reference, Run):
+        sources.append(opened(reference, settings.form))
+    sources += [opened(given, settings.form) for given in estimates]
     first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
     beside = []
     if run is not None:
@@ -48,25 +65,13 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     return Entries(entries[0], tuple(entries[1:]), problem, held, up, run is not None)
 
 
-def _is_folder(given: Given) -> bool:
-    return isinstance(given, str | Path) and Path(given).is_dir()
-
-
-def opened(given: Given, settings: Settings) -> Source:
-    """Trajectory of `[NAME=]FILE`, parsed. Raises InputError."""
-    if isinstance(given, Trajectory):
-        return given
-    name, file = _split(str(given))
-    return read_trajectory_file(file, settings.form, name)
-
-
 def in_one_body(
     every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
-        Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
+        Entry(each.trajectory(times), each.landmarks, each.covariance, each.up, each.remarks) for each in every
     ]
     bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
     if settings.lever_arm is not None and bodies[0] != bodies[1]:
@@ -94,20 +99,11 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def _split(given: str) -> tuple[str | None, str]:
-    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
-    name, mark, file = given.partition("=")
-    if not mark or Path(given).exists() or "/" in name:
-        return None, given
-    if not name or not file:
-        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
-    return name, file
-
-
 def frame_times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
-        return [read_times(file, settings.unit) for file in settings.times]
+        given = settings.times
+        return [np.asarray(t) if isinstance(t, np.ndarray) else read_times(t, settings.unit) for t in given]
     if problem is None:
         return []
     t = problem.sequence.t
@@ -117,6 +113,10 @@ def frame_times(settings: Settings, problem: Problem | None) -> list[FloatArray]
 def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:
     if settings.extrinsic is None:
         return None if problem is None else problem.sequence.imu_T_cam
+    if isinstance(settings.extrinsic, np.ndarray):
+        if settings.extrinsic.shape != (4, 4):
+            raise InputError(f"extrinsic: expected imu_T_cam (4, 4), got an array {settings.extrinsic.shape}")
+        return np.asarray(settings.extrinsic, dtype=np.float64)
     poses = read_kitti(settings.extrinsic)
     if len(poses) != 1:
         raise InputError(f"{settings.extrinsic}: expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
@@ -158,20 +158,22 @@ def valid_file_name(name: str) -> str:
     return name
 
 
-def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], problem: Problem | None) -> list[Entry]:
-    """The entries with landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
-    if files and problem is None:
+def _with_landmarks(
+    entries: list[Entry], given: GivenLandmarks, own: list[str], problem: Problem | None
+) -> list[Entry]:
+    """The entries with landmarks by name, or of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
+    if given and problem is None:
         raise InputError("landmarks: their reprojection needs the observations of a recording; add --sequence")
     found: dict[str, Landmarks] = {}
-    for given in files:
-        name, file = _split(given)
+    named = given.items() if isinstance(given, Mapping) else [split_name(os.fspath(file)) for file in given]
+    for name, file in named:
         if name is None:
             if len(own) != 1:
-                raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; name one: NAME=FILE")
+                raise InputError(f"{file}: it may belong to any of {len(own)} estimates; name one: NAME=FILE")
             name = own[0]
         if name not in own:
             raise InputError(f"landmarks: there is no estimate '{name}'; there are {', '.join(own)}")
-        found[name] = read_landmarks(file)
+        found[name] = file if isinstance(file, Landmarks) else read_landmarks(file)
     merged = [replace(e, landmarks=found.get(e.name, e.landmarks)) for e in entries]
     for entry in merged:
         _require_known(entry, problem)

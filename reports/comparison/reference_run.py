@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from fgbaseline.compare import Trust, Verdict
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.settings import Settings
-from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
+from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence, Trajectory, read, read_problem
 from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.geometry import InputError
 
@@ -15,11 +16,31 @@ from ..results.reader import SUMMARY, RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class RunInMemory:
+    """Trajectories and landmarks of a run that is in memory, as `RunFolder` reads them."""
+
+    run: Run
+
+    @property
+    def folder(self) -> str:
+        """What stands for it in messages."""
+        return self.run.problem.sequence.name
+
+    def trajectory(self, name: str) -> Trajectory:
+        """The path of an estimator."""
+        return Trajectory.of_frames(self.run.problem.sequence.t, self.run.results[name].estimate.world_T_imu, name)
+
+    def landmarks(self, name: str) -> Landmarks:
+        """The landmarks of an estimator."""
+        return self.run.results[name].estimate.landmarks
+
+
 @dataclass(frozen=True, slots=True)
 class ReferenceRun:
     """A run whose reference others are compared with."""
 
-    files: RunFolder
+    files: RunFolder | RunInMemory
     reference: str
     trust: Trust
     names: tuple[str, ...]
@@ -54,19 +75,38 @@ def read_reference_run(folder: Path) -> ReferenceRun:
     return ReferenceRun(RunFolder(folder), chosen, trust, names, settings, up)
 
 
+def reference_in_memory(run: Run) -> ReferenceRun:
+    """Reference of a run in memory. Raises InputError where it has none."""
+    if run.reference is None:
+        raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
+    names = tuple(result.name for result in run.answered)
+    up = tuple(map(float, run.problem.sequence.up))
+    return ReferenceRun(RunInMemory(run), run.reference, run.trust, names, dict(run.settings), up)
+
+
 def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem | None, HeldOut | None]:
     """Problem and held-out tracks: of an exported folder, or built from a recording as in the run, else calibrated.
 
-    Raises InputError.
+    A run in memory has its own. Raises InputError.
     """
     sequence = settings.sequence
-    if settings.held_out and (sequence is None or sequence.is_dir()):
+    if not (sequence is None or isinstance(sequence, Path | Sequence | Problem)):
+        raise InputError(f"sequence: expected a file, a Sequence or a Problem, got {type(sequence).__name__}")
+    if settings.seed < 0:
+        raise InputError(f"seed: expected a whole number from 0 on, got {settings.seed}")
+    is_posed = isinstance(sequence, Problem) or (isinstance(sequence, Path) and sequence.is_dir())
+    if settings.held_out and (sequence is None or is_posed):
         raise InputError("held-out: the tracks come from a recording; give it with --sequence, not an exported folder")
     if sequence is None:
-        return None, None
-    if sequence.is_dir():
+        if run is None or not isinstance(run.files, RunInMemory):
+            return None, None
+        of = run.files.run
+        return of.problem, None if of.held_out is None else of.held_out.held
+    if isinstance(sequence, Problem):
+        return sequence, None
+    if isinstance(sequence, Path) and is_posed:
         return read_problem(sequence), None
-    recorded = read(sequence)
+    recorded = read(sequence) if isinstance(sequence, Path) else sequence
     if run is None:
         wanted = RunSettings(sequence=sequence, held_out=settings.held_out, seed=settings.seed)
     else:
@@ -79,7 +119,7 @@ def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem 
     return build_problem(kept, wanted), held
 
 
-def _settings_of(run: ReferenceRun, sequence: Path) -> RunSettings:
+def _settings_of(run: ReferenceRun, sequence: Path | Sequence) -> RunSettings:
     """Settings that build the problem of a run, from its summary. Raises InputError where it lacks one."""
     known = run.settings
     try:

@@ -1,7 +1,8 @@
 """Comparison in one call, its tables, sentences and figures, and the folder that it writes."""
 
 import json
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
@@ -10,18 +11,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
-from fgbaseline.data import Trajectory, write_tum
+from fgbaseline.data import write_tum
 from fgbaseline.data.formats.atomic_folder import atomic_folder
+from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.geometry import InputError
 
+from ..keywords import for_python
+from ..notebook import NotebookResult
 from ..phrases import comparison as phrases
 from ..results.comparison import MARK, Summary
 from ..results.comparison_summary import summarize
 from ..tables import Table, latex, markdown
-from ..tables.comparison import comparison_table, main_table, metrics_table
-from .inputs import Given, read_entries
+from ..tables.comparison import comparison_table, main_frame, main_table, metrics_table
+from .inputs import Given, GivenLandmarks, read_entries
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +35,7 @@ if TYPE_CHECKING:
 FILES = ("sequence", "extrinsic")
 
 
-class ComparisonReport(Comparison):
+class ComparisonReport(NotebookResult, Comparison):
     """A comparison with pandas tables, sentences, matplotlib figures, and a folder with all of them."""
 
     @cached_property
@@ -39,8 +45,8 @@ class ComparisonReport(Comparison):
 
     @property
     def table(self) -> pd.DataFrame:
-        """One row per estimate, one column per main metric; see `caption`."""
-        return main_table(self, self.summary)
+        """One row per main metric, one column per estimate; see `caption`, and `metrics` for the intervals."""
+        return main_frame(self, self.summary)
 
     @property
     def text_table(self) -> Table:
@@ -58,9 +64,22 @@ class ComparisonReport(Comparison):
         return phrases.caption(self)
 
     @property
+    def heading(self) -> str:
+        """Reference and estimates."""
+        return f"Comparison with {self.reference.name}: {', '.join(self.results)}"
+
+    @cached_property
     def verdict(self) -> list[str]:
         """Conclusions in sentences, the trust in the reference first."""
         return phrases.verdict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table, as `table`."""
+        return self.table
+
+    def plot(self) -> "Figure":
+        """The figure of all paths, from above."""
+        return self.figures()["paths"]
 
     def figures(self) -> "dict[str, Figure]":
         """The figures by name."""
@@ -68,12 +87,13 @@ class ComparisonReport(Comparison):
 
         return draw(self)
 
-    def write(self, folder: str | Path, *, force: bool = False) -> Path:
-        """Writes tables, paths, series, figures and report.html into a folder atomically; returns the report's path.
+    @for_python
+    def report(self, path: FilePath, *, force: bool = False) -> Path:
+        """Writes tables, paths, series, figures and report.html into a folder atomically; returns the page's path.
 
         Raises InputError where the folder exists without `force` or is not that of a comparison.
         """
-        place = Path(folder)
+        place = Path(path)
         with atomic_folder(place, force=force, mark=MARK) as building:
             self._fill(building)
         return place / "report.html"
@@ -98,7 +118,7 @@ class ComparisonReport(Comparison):
         paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
         for path in paths:
             write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
-        self.table.to_csv(folder / "table.csv")
+        main_table(self, self.summary).to_csv(folder / "table.csv")
         self.metrics.to_csv(folder / "metrics.csv", index=False)
         figures = self.figures()
         save(figures, folder / "figures")
@@ -113,32 +133,35 @@ class ComparisonReport(Comparison):
 
 
 def compare(
-    reference: Given,
+    reference: Given | Run,
     *estimates: Given,
-    landmarks: Sequence[str | Path] = (),
-    deltas: Sequence[str] = (),
+    landmarks: GivenLandmarks | Iterable[FilePath] = (),
+    deltas: Iterable[str] = (),
     **options: Any,
 ) -> ComparisonReport:
-    """Compares estimates with a reference, each a `[NAME=]FILE` (TUM, KITTI, EuRoC, npz) or a `Trajectory`.
+    """Comparison of estimates with a reference, as the command `compare` and `fgbaseline.compare_trajectories` have it.
 
-    The reference may be the folder of a run: then its other estimators are compared too. `landmarks` are CSV files
-    (`[NAME=]FILE`), `deltas` are texts such as "1s" or "10m"; the other options are the fields of `Settings`.
-
-        result = compare("truth.tum", "mine.tum", align="se3")
-        result.table, result.caption, result.verdict
-        result.write("out/comparison")
-
-    Raises InputError, in one sentence, for an invalid file or option.
+    Each is a `[NAME=]FILE` or a trajectory in memory; the reference may be a run or its folder. The options are the
+    fields of `Settings`; `compare_trajectories` describes them. Raises InputError, which names options of the command.
     """
-    options |= {name: Path(options[name]) for name in FILES if options.get(name) is not None}
-    times = options.pop("times", None) or ()
-    options["times"] = tuple(map(Path, [times] if isinstance(times, str | Path) else times))
+    times = options.pop("times", None)
+    if times is None or isinstance(times, str | os.PathLike | np.ndarray):
+        times = () if times is None else (times,)
+    if not isinstance(times, Iterable):
+        raise InputError(f"times: expected files or arrays of stamps, got {type(times).__name__}")
+    options["times"] = tuple(map(_as_path, times))
+    options |= {name: _as_path(options[name]) for name in FILES if name in options}
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
-    given = [item if isinstance(item, Trajectory) else str(item) for item in (reference, *estimates)]
+    of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
     with np.errstate(all="ignore"):
-        entries = read_entries(given[0], given[1:], [str(file) for file in landmarks], settings)
+        entries = read_entries(reference, estimates, of_them, settings)
         comparison = compare_entries(entries, settings)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
+
+
+def _as_path(given: Any) -> Any:
+    """A name as a path; anything in memory as it is."""
+    return Path(given) if isinstance(given, str | os.PathLike) else given
 
 
 def _write_series(result: Result, path: Path) -> None:

@@ -14,13 +14,15 @@ from fgbaseline.data import (
     Sequence,
     TimeUnit,
     Trajectory,
+    Truth,
+    attach_truth,
     documented,
     estimator_names,
     find_estimator,
     read,
 )
 from fgbaseline.data.finding import OF_THE_FILE
-from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.formats import BodyFrame, ParsedTrajectory
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.tracking import ImageOptions, Pictures, has_images
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
@@ -34,6 +36,7 @@ IMAGES = ("right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
 TRACKS = "tracks.npz"
 """of a run on images, in its folder"""
+DEFAULT_ESTIMATORS = ("dead-reckoning", "ekf", "isam2", "isam2-online")
 MARK = "summary.json"
 """the file that marks a run's folder"""
 
@@ -42,16 +45,16 @@ MARK = "summary.json"
 class RunSettings:
     """Settings of the user."""
 
-    sequence: Path | None = None
-    """None for the simulated drive"""
+    sequence: Path | Sequence | Problem | None = None
+    """a recording, in a file or in memory, or a problem that is posed already; None for the simulated drive"""
     preset: Literal["calibrated", "documented"] = "calibrated"
-    estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+    estimators: tuple[str, ...] = DEFAULT_ESTIMATORS
     batch_up_to: int = 0
     """number of observations up to which `batch`, started at the answer of `isam2` only, is added to them"""
     features: int | Literal["all"] | None = None
     """None for the preset's default"""
     landmarks: LandmarkMode = LandmarkMode.UPDATED
-    truth: Path | None = None
+    truth: Path | ParsedTrajectory | Trajectory | Truth | None = None
     truth_frame: BodyFrame | None = None
     seed: int = 0
     as_recorded: bool = False
@@ -82,8 +85,8 @@ class RunSettings:
     """TOML file of user-specified repairs"""
     functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
     """estimators among the names that are not installed, such as those of the user's files"""
-    add: tuple[str | Trajectory, ...] = ()
-    """trajectories beside the estimators: `[NAME=]FILE`"""
+    add: tuple[str | ParsedTrajectory | Trajectory, ...] = ()
+    """trajectories beside the estimators: `[NAME=]FILE`, or parsed already"""
     add_body: BodyFrame | None = None
     """body whose poses they have; None for the IMU"""
     add_time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -91,15 +94,21 @@ class RunSettings:
     add_offset: float = 0.0
     """added to their stamps, s"""
 
+    def __post_init__(self) -> None:
+        if not (self.sequence is None or isinstance(self.sequence, Path | Sequence | Problem)):
+            raise InputError(f"recording: expected a file, a Sequence or a Problem, got {type(self.sequence).__name__}")
+        if self.seed < 0:
+            raise InputError(f"seed: expected a whole number from 0 on, got {self.seed}")
+
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
         return {
-            "sequence": None if self.sequence is None else str(self.sequence),
+            "sequence": _source_of(self.sequence),
             "preset": self.preset,
             "estimators": ",".join(self.estimators),
             "features": self.features or (DEFAULT_FEATURES if self.preset == "documented" else "all"),
             "landmarks": str(self.landmarks),
-            "truth": None if self.truth is None else str(self.truth),
+            "truth": _source_of(self.truth),
             "truth_frame": self.truth_frame,
             "seed": self.seed,
             "as_recorded": self.as_recorded,
@@ -113,11 +122,27 @@ class RunSettings:
             },
             **({"topics": ",".join(self.topics)} if self.topics else {}),
             "functions": ",".join(f"{name}={_source(function)}" for name, function in self.functions.items()) or None,
-            "add": ",".join(t.name if isinstance(t, Trajectory) else t for t in self.add) or None,
+            "add": ",".join(t if isinstance(t, str) else t.name for t in self.add) or None,
             "add_body": self.add_body,
             "add_time_unit": self.add_time_unit,
             "add_offset": self.add_offset,
         }
+
+
+POSED = {
+    name: getattr(RunSettings(), name)
+    for name in ("preset", "features", "landmarks", "as_recorded", "held_out", "repairs", "truth")
+}
+"""what a problem decides: name -> the setting that leaves it alone"""
+
+
+def _source_of(given: Path | Sequence | Problem | ParsedTrajectory | Trajectory | Truth | None) -> str | None:
+    """A path as it is; the source or name of what is in memory."""
+    if given is None or isinstance(given, Path):
+        return None if given is None else str(given)
+    if isinstance(given, Problem):
+        return _source_of(given.sequence)
+    return given.source if isinstance(given, Truth) else given.source or given.name
 
 
 def _source(function: Callable[..., object]) -> str:
@@ -163,25 +188,57 @@ def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Se
         from fgbaseline.data.simulate import Simulation, simulate
 
         return simulate(Simulation(seed=settings.seed))
-    if settings.truth is not None and settings.truth_frame is None:
-        raise InputError(
-            f"truth: the body of the poses in {settings.truth} is unknown; add --truth-frame camera or imu"
+    _require_truth_frame(settings)
+    if not isinstance(settings.sequence, Path):
+        sequence = _in_memory(settings.sequence, settings)
+    elif has_images(settings.sequence):
+        sequence = _of_images(settings, pictures)
+        if isinstance(settings.truth, Path):
+            return sequence  # with this truth in place of its own
+    else:
+        _require_none(settings, IMAGES, "it belongs to a recording of images; leave it out")
+        sequence = read(
+            settings.sequence,
+            None,
+            None,
+            settings.time_unit,
+            settings.imu,
+            settings.imu_calibration,
+            settings.velocities,
+            settings.extrinsic,
         )
-    if settings.truth is None and settings.truth_frame is not None:
-        raise InputError(f"truth-frame: '{settings.truth_frame}' is given without a ground truth; add --truth FILE")
-    if has_images(settings.sequence):
-        return _of_images(settings, pictures)
-    _require_none(settings, IMAGES, "it belongs to a recording of images; leave it out")
-    return read(
-        settings.sequence,
-        settings.truth,
-        settings.truth_frame,
-        settings.time_unit,
-        settings.imu,
-        settings.imu_calibration,
-        settings.velocities,
-        settings.extrinsic,
-    )
+    truth = settings.truth
+    if truth is None:
+        return sequence
+    if isinstance(truth, Truth):
+        return sequence.with_truth(truth)
+    if isinstance(truth, ParsedTrajectory):
+        truth = truth.trajectory(times=[sequence.t])
+    return attach_truth(sequence, truth, settings.truth_frame)
+
+
+def _require_truth_frame(settings: RunSettings) -> None:
+    """Raises InputError where the body of the true poses is missing, or stated of nothing."""
+    truth, frame = settings.truth, settings.truth_frame
+    if frame is not None and (truth is None or isinstance(truth, Truth)):
+        why = "without a ground truth; add --truth FILE" if truth is None else "with a Truth, whose body is the imu"
+        raise InputError(f"truth-frame: '{frame}' is given {why}")
+    if frame is None and not (truth is None or isinstance(truth, Truth)):
+        name = truth if isinstance(truth, Path) else truth.name
+        raise InputError(f"truth: the body of the poses in {name} is unknown; add --truth-frame camera or imu")
+
+
+def _in_memory(given: Sequence | Problem, settings: RunSettings) -> Sequence:
+    """The recording that is given, or that of a problem. Raises InputError for settings that it does not have."""
+    for name in ("time_unit", "imu", "imu_calibration", *BESIDE, *IMAGES):
+        if getattr(settings, name) is not None:
+            raise InputError(f"{name.replace('_', '-')}: it is for a recording in a file; leave it out")
+    if isinstance(given, Sequence):
+        return given
+    for name, usual in POSED.items():
+        if getattr(settings, name) != usual:
+            raise InputError(f"{name.replace('_', '-')}: the problem is posed already; leave it out")
+    return given.sequence
 
 
 def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
@@ -189,11 +246,11 @@ def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
 
     if settings.time_unit is not None:
         raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
-    assert settings.sequence is not None
+    assert isinstance(settings.sequence, Path)
     names = ("right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
     options = ImageOptions(**{name: getattr(settings, name) for name in names})
-    truth, body = settings.truth, settings.truth_frame
-    return image_sequence(settings.sequence, options, settings.tracker, truth, body, pictures)
+    truth = settings.truth if isinstance(settings.truth, Path) else None
+    return image_sequence(settings.sequence, options, settings.tracker, truth, settings.truth_frame, pictures)
 
 
 def _require_none(settings: RunSettings, names: tuple[str, ...], advice: str) -> None:
@@ -209,7 +266,12 @@ def hold_out_tracks(sequence: Sequence, settings: RunSettings) -> tuple[Sequence
 
 
 def build_problem(sequence: Sequence, settings: RunSettings, processes: int = 1) -> Problem:
-    """Builds the problem of a preset, with `processes` for its diagnosis. Raises InputError."""
+    """Builds the problem of a preset, with `processes` for its diagnosis; one that is given is left as it is.
+
+    Raises InputError.
+    """
+    if isinstance(settings.sequence, Problem):
+        return settings.sequence
     if settings.repairs is not None and (settings.as_recorded or settings.preset == "documented"):
         why = "--as-recorded" if settings.as_recorded else "the documented preset"
         raise InputError(f"repairs: {why} uses no repairs; leave out one of the two")

@@ -17,7 +17,8 @@ from fgbaseline.data.solving import Watch, no_progress, solve_all
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import InputError
 
-from ..comparison.inputs import frame_times, in_one_body, opened, valid_file_name
+from ..comparison.inputs import frame_times, in_one_body, valid_file_name
+from ..comparison.sources import opened
 from .problem import RunSettings
 
 LEVEL = 1.0
@@ -41,7 +42,7 @@ def read_added(settings: RunSettings) -> Added:
         raise InputError("add: its body, time unit or offset is given without a trajectory; add --add NAME=PATH")
     sources: dict[str, Source] = {}
     for given in settings.add:
-        source = opened(given, options)
+        source = opened(given)
         name = valid_file_name(source.name)
         if name in sources or name in settings.estimators:
             raise InputError(f"add: the name '{name}' is taken; give the trajectory another: NAME={_path(given)}")
@@ -127,5 +128,5 @@ def _aligned(
     return estimate, f"{file}, {matched.caption}, to {reference.name}{why}; landmarks triangulated along it"
 
 
-def _path(given: str | Trajectory) -> str:
-    return "PATH" if isinstance(given, Trajectory) else str(Path(given.partition("=")[2] or given))
+def _path(given: str | Source) -> str:
+    return str(Path(given.partition("=")[2] or given)) if isinstance(given, str) else "PATH"

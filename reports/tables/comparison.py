@@ -59,6 +59,13 @@ def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
     return pd.DataFrame(table, index=pd.Index(comparison.results, name="estimate"))
 
 
+def main_frame(comparison: Comparison, summary: Summary) -> pd.DataFrame:
+    """The figures of `main_table` without their intervals: one metric a row, one estimate a column."""
+    results, metrics = summary.by_name, _metrics(comparison, summary.by_name)
+    rows = [[m.value(results[name]).value for name in comparison.results] for m in metrics]
+    return pd.DataFrame(rows, pd.Index([m.full_title for m in metrics], name="metric"), list(comparison.results))
+
+
 def metrics_table(summary: Summary) -> pd.DataFrame:
     """`metrics.csv`: estimate, metric (its path in comparison.json), value, low, high."""
     results = summary.by_name

@@ -91,19 +91,8 @@ def terminal_table(estimators: Estimators, reference: str | None) -> Table:
 
 
 def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table:
-    answered = [name for name in run.results if name in estimators and run.results[name].answered]
-    even = same_frames(np.isfinite(run.results[n].estimate.world_T_imu[:, 0, 0]) for n in answered)
-    values = {m: {name: m.value(estimators[name]).value for name in answered} for m in metrics}
-    shown = [
-        m
-        for m, of_all in values.items()
-        if any(
-            _stands_for(run, name, estimators[name], m) or (isfinite(value) and (value != 0.0 or not m.nonzero_only))
-            for name, value in of_all.items()
-        )
-        and not (m.group == DIVERGENCE and len(answered) < 2)
-        and not (even and m.uneven_only)
-    ]
+    shown, answered, even = _shown(run, estimators, metrics)
+    values = {m: {name: m.value(estimators[name]).value for name in answered} for m in shown}
     rivals = {m: _rivals(run, m, answered) if even or m.same_data else set[str]() for m in shown}
     firsts = {m: best(m.better, {name: values[m][name] for name in rivals[m]}) for m in shown}
     notes: dict[str, str] = {}
@@ -138,6 +127,30 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
     away = f"divergence from {run.reference}, unaligned"
     columns = tuple(Column.of(m, away if m.group == DIVERGENCE else "") for m in shown)
     return Table(columns, rows, notes=tuple((mark, text) for text, mark in notes.items()))
+
+
+def _shown(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> tuple[list[Metric], list[str], bool]:
+    """The metrics that a table shows, the estimators that answered, and whether these cover the same frames."""
+    answered = [name for name in run.results if name in estimators and run.results[name].answered]
+    even = same_frames(np.isfinite(run.results[n].estimate.world_T_imu[:, 0, 0]) for n in answered)
+
+    def is_shown(m: Metric) -> bool:
+        if (m.group == DIVERGENCE and len(answered) < 2) or (even and m.uneven_only):
+            return False
+        values = {name: m.value(estimators[name]).value for name in answered}
+        return any(
+            _stands_for(run, name, estimators[name], m) or (isfinite(value) and (value != 0.0 or not m.nonzero_only))
+            for name, value in values.items()
+        )
+
+    return [m for m in metrics if is_shown(m)], answered, even
+
+
+def main_frame(run: Run, estimators: Estimators) -> pd.DataFrame:
+    """The figures of `main_table`, one metric a row and one estimator a column; NaN where there is none."""
+    shown, answered, _ = _shown(run, estimators, shown_in(MAIN))
+    rows = [[m.value(e).value if name in answered else nan for name, e in estimators.items()] for m in shown]
+    return pd.DataFrame(rows, pd.Index([m.full_title for m in shown], name="metric"), list(estimators))
 
 
 def trust_table(criteria: Iterable[Criterion]) -> Table:

@@ -1,14 +1,15 @@
-"""The table of every report and its writers for terminal, Markdown and LaTeX, which escape what comes from files."""
+"""The table of every report, and its writers for terminal, Markdown, LaTeX and notebooks, which escape file content."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from itertools import groupby
 from math import isfinite, nan
 from typing import Literal, NamedTuple, Self
 
 from fgbaseline.compare.limits import Better
 
-from ..formatting import interval, md, tex
+from ..formatting import DASH, interval, md, tex
 from ..results.metric import Metric, Value
 
 UNWRAPPED = 160
@@ -103,11 +104,11 @@ class Table:
         return ((group, list(rows)) for group, rows in groupby(self.rows, key=lambda row: row.group))
 
     def transposed(self, name: str = "") -> "Table":
-        """A row for each column, under the titles of their groups, and a column for each row that has cells."""
-        filled = [row for row in self.rows if row.cells]
-        columns = tuple(Column(_name(row)) for row in filled)
+        """A row for each column, under the titles of their groups, and a column for each row."""
+        columns = tuple(Column(_name(row)) for row in self.rows)
+        cells = [row.cells or (Cell(DASH),) * len(self.columns) for row in self.rows]
         rows = tuple(
-            Row(column.heading, tuple(row.cells[i] for row in filled), group=column.group, term=column.term)
+            Row(column.heading, tuple(of[i] for of in cells), group=column.group, term=column.term)
             for i, column in enumerate(self.columns)
         )
         return replace(self, columns=columns, rows=rows, name=name)
@@ -229,6 +230,18 @@ def markdown(table: Table) -> str:
         lines.append([*([md(row.group)] if grouped else []), md(_name(row)), *cells])
     caption = ["", md(table.caption)] if table.caption else []
     return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), *caption, ""])
+
+
+def html(table: Table) -> str:
+    """The table in HTML without style, for a notebook; rows of a group begin with its title."""
+    left = 'style="text-align: left"'
+    head = "".join(f"<th>{escape(column.heading)}</th>" for column in table.columns)
+    lines = [f"<tr><th {left}>{escape(table.name)}</th>{head}</tr>"]
+    for row in table.rows:
+        texts = [f"<b>{escape(c.text)}</b>" if c.best else escape(c.text) for c in row.cells] or [escape(row.reason)]
+        name = f"{row.group}: {_name(row)}" if row.group else _name(row)
+        lines.append(f"<tr><th {left}>{escape(name)}</th>{''.join(f'<td>{text}</td>' for text in texts)}</tr>")
+    return f"<table>{''.join(lines)}</table><p>{escape(table.caption)}</p>"
 
 
 def latex(table: Table) -> str:

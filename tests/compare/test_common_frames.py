@@ -118,7 +118,7 @@ def test_an_estimate_that_lost_track_half_way_is_ranked_over_what_both_have(lost
 
 def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", align="none")
-    result.write(lost / "out")
+    result.report(lost / "out")
     for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
         assert "of the time, %" in text.replace("\\%", "%")
         assert "49.7" in text

@@ -125,7 +125,7 @@ def test_slow_keyframes_beside_a_fast_truth_are_in_seconds(tmp_path: Path, secon
     (tmp_path / "keys.tum").write_text(tum(keyframes).replace(".000000000", ""))
     result = compare(tmp_path / "truth.tum", tmp_path / "keys.tum", align="none")
     assert len(result.results["keys"].matched) == len(keyframes.ns)
-    assert float(result.table["ATE: max, m"]["keys"]) < 1e-9
+    assert float(result.table.loc["ATE: max, m", "keys"]) < 1e-9
 
 
 def test_frames_pair_by_their_numbers_and_files_of_other_lengths_are_refused(tmp_path: Path) -> None:
@@ -147,10 +147,10 @@ def test_frames_pair_by_their_numbers_and_files_of_other_lengths_are_refused(tmp
     times = [tmp_path / "times.txt", tmp_path / "part_times.txt"]
     by_time = compare(tmp_path / "truth.txt", f"it={tmp_path / 'part.txt'}", times=times)
     rmse = "ATE: RMSE, m"
-    assert by_number.table[rmse]["it"] == pytest.approx(by_time.table[rmse]["it"], rel=1e-12)
+    assert by_number.table.loc[rmse, "it"] == pytest.approx(by_time.table.loc[rmse, "it"], rel=1e-12)
     whole = compare(tmp_path / "truth.txt", f"it={tmp_path / 'whole.txt'}")
     numbered = compare(tmp_path / "truth.txt", f"it={tmp_path / 'all.txt'}")
-    assert numbered.table[rmse]["it"] == pytest.approx(whole.table[rmse]["it"], rel=1e-12)
+    assert numbered.table.loc[rmse, "it"] == pytest.approx(whole.table.loc[rmse, "it"], rel=1e-12)
     assert "paired (by frame;" in whole.caption
 
 
@@ -186,13 +186,13 @@ def test_a_prism_is_compared_by_a_lever_arm_that_the_orientations_of_the_estimat
     imu_T_prism[:3, 3] = arm
     write_kitti(tmp_path / "imu_T_prism.txt", imu_T_prism[None])
     largest = "ATE: max, m"
-    assert compare(tmp_path / "prism.txt", tmp_path / "imu.tum").table[largest]["imu"] > 0.1
+    assert compare(tmp_path / "prism.txt", tmp_path / "imu.tum").table.loc[largest, "imu"] > 0.1
     given_arm = compare(tmp_path / "prism.txt", tmp_path / "imu.tum", lever_arm=tuple(arm.tolist()))
     as_body = compare(
         tmp_path / "prism.txt", tmp_path / "imu.tum", reference_body="camera", extrinsic=tmp_path / "imu_T_prism.txt"
     )
     for result in (given_arm, as_body):
-        assert result.table[largest]["imu"] < 1e-9
+        assert result.table.loc[largest, "imu"] < 1e-9
         assert any("moved by the lever arm (0.3, -0.2, 1.1) m" in sentence for sentence in result.verdict)
     with pytest.raises(InputError, match=r"prism\.txt: it has no orientations"):
         compare(tmp_path / "imu.tum", tmp_path / "prism.txt", lever_arm=(0.0, 0.0, 1.0))
@@ -275,7 +275,7 @@ def test_an_npz_in_nanoseconds_is_the_same_trajectory(tmp_path: Path) -> None:
     write_trajectory_npz(tmp_path / "truth.npz", truth.t, truth.poses)
     np.savez(tmp_path / "ns.npz", t=np.array(truth.ns), world_T_body=truth.poses)
     result = compare(tmp_path / "truth.npz", tmp_path / "ns.npz", align="none")
-    assert result.table["ATE: max, m"]["ns"] < 1e-9
+    assert result.table.loc["ATE: max, m", "ns"] < 1e-9
     assert any("divided by 1,000,000,000" in sentence for sentence in result.verdict)
 
 

@@ -142,7 +142,7 @@ def test_a_filter_on_exported_files_alone_comes_back_through_compare(tmp_path: P
         sequence=tmp_path / "problem",
         landmarks=[tmp_path / "mine.csv"],
     )
-    row = result.table.loc["mine"]
+    row = result.table["mine"]
     assert row["ATE: max, m"] < 1e-9
     assert row["ATE: rotation RMSE, °"] < 1e-6
     assert row["reprojection error: median, px"] < 10.0

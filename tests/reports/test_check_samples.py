@@ -173,7 +173,7 @@ def test_case_25_limits_on_the_lost_estimate(tmp_path: Path) -> None:
     folder = RECORDINGS / "cases" / "25-completion"
     if not folder.is_dir():
         pytest.skip(f"cases/25-completion is not in {RECORDINGS} (set FGBASELINE_RECORDINGS)")
-    compare(folder / "gt.tum", folder / "whole.tum", folder / "lost.tum").write(tmp_path / "out")
+    compare(folder / "gt.tum", folder / "whole.tum", folder / "lost.tum").report(tmp_path / "out")
     limits = read_limits(folder / "limits2.toml")
     assert evaluate(limits, read_folder(tmp_path / "out"), None).exit_code == 1
     (tmp_path / "limits.toml").write_text('[[limit]]\nmetric = "coverage"\nestimators = "lost"\nat_least = 0.95\n')

@@ -94,7 +94,7 @@ def test_against_a_reference_file_the_table_is_captioned_and_no_page_is_written(
 
 def test_the_recording_itself_is_a_reference(made: Path) -> None:
     result = compare(made / "drive.npz", made / "truth.tum", align="none")
-    assert result.table["ATE: max, m"]["truth"] < 1e-9
+    assert result.table.loc["ATE: max, m", "truth"] < 1e-9
 
 
 def in_process(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:

@@ -1,0 +1,188 @@
+"""`fgbaseline.run`: the command `run` for Python, with arrays and functions where it has files and names."""
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from fgbaseline.compare.trajectory_comparison.conventions import Source
+from fgbaseline.data import (
+    LandmarkMode,
+    Problem,
+    Sequence,
+    TimeUnit,
+    Trajectory,
+    Truth,
+    estimator_names,
+    find_estimator,
+)
+from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.solving import Watch, no_progress
+from fgbaseline.data.user_estimator import load_all
+from fgbaseline.geometry import InputError
+
+from ..comparison.sources import Array, TrajectoryLike, by_name, opened
+from ..keywords import for_python
+from .problem import (
+    DEFAULT_ESTIMATORS,
+    RunSettings,
+    build_problem,
+    check_estimators,
+    hold_out_tracks,
+    import_estimators,
+    read_sequence,
+)
+from .report import RunReport
+from .solution import read_added, solve
+
+Solver: TypeAlias = Callable[..., object]
+"""`solve(problem, progress=None) -> Estimate`; an answer that is none becomes a row with the reason"""
+
+
+@for_python
+def run(
+    recording: FilePath | Sequence | Problem | None = None,
+    *,
+    estimators: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver] = DEFAULT_ESTIMATORS,
+    add: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike] = (),
+    add_body: Literal["imu", "camera"] | None = None,
+    add_time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    add_offset: float = 0.0,
+    preset: Literal["calibrated", "documented"] = "calibrated",
+    features: int | Literal["all"] | None = None,
+    landmarks: Literal["in-turn", "held"] = "in-turn",
+    truth: FilePath | Trajectory | Truth | Array | tuple[Array, Array] | None = None,
+    truth_frame: Literal["imu", "camera"] | None = None,
+    as_recorded: bool = False,
+    imu: FilePath | None = None,
+    imu_calibration: FilePath | None = None,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    repairs: FilePath | None = None,
+    held_out: float = 0.0,
+    seed: int = 0,
+    processes: int = 1,
+    progress: bool = False,
+) -> RunReport:
+    """Runs estimators on a recording and compares them, as `fgbaseline run` does; nothing is written.
+
+        result = fgbaseline.run("drive.npz", estimators=["ekf", "isam2", my_filter])
+        result.table, result.verdict, result.figures()
+        result.report("out/drive")
+
+    Args:
+        recording: A file, a `Sequence` or a `Problem`; by default a simulated drive with known truth.
+        estimators: Registered names, functions `solve(problem, progress=None) -> Estimate`, or "FILE:FUNCTION"; a
+            mapping names them. Functions alone run beside the default names.
+        add: Trajectories beside the estimators: as those of `compare_trajectories`, aligned to the reference.
+        add_body: Body whose poses they have; by default the imu.
+        add_time_unit: Unit of their stamps, where a file leaves it open.
+        add_offset: Added to their stamps, s.
+        preset: The problem: diagnosed and repaired, or as the source paper has it.
+        features: Number of landmarks, those with the most observations; by default all (documented: 1000).
+        landmarks: Landmarks of the documented SLAM: updated in turn with the pose, or held.
+        truth: Ground truth: a file, a `Truth`, poses (T, 4, 4) by frame, or stamps (n,), s, with poses (n, 4, 4).
+        truth_frame: Body whose poses the ground truth has; a `Truth` has those of the imu.
+        as_recorded: No diagnosis and no repairs; the noise is assumed.
+        imu: CSV of raw inertial samples, in place of the recording's velocities.
+        imu_calibration: YAML of their noise; by default assumed.
+        time_unit: Unit of the recording's stamps; by default detected.
+        repairs: TOML file of user-specified repairs.
+        held_out: Share of the tracks that diagnosis and estimators do not use; they rank the paths.
+        seed: Seed of the simulated drive and of the choice of held-out tracks.
+        processes: Number of processes that share diagnosis and comparison.
+        progress: Whether progress is printed on standard error.
+
+    Raises InputError, in one sentence, for an invalid recording or keyword. An estimator that raises an exception
+    becomes a failed result; the others go on.
+    """
+    names, functions = named_estimators(estimators)
+    settings = RunSettings(
+        sequence=Path(recording) if isinstance(recording, str | os.PathLike) else recording,
+        preset=preset,
+        estimators=names,
+        features=features,
+        landmarks=LandmarkMode(landmarks),
+        truth=_in_memory(truth),
+        truth_frame=truth_frame,
+        seed=seed,
+        as_recorded=as_recorded,
+        time_unit=None if time_unit is None else TimeUnit(time_unit),
+        held_out=held_out,
+        imu=None if imu is None else Path(imu),
+        imu_calibration=None if imu_calibration is None else Path(imu_calibration),
+        repairs=None if repairs is None else Path(repairs),
+        functions=functions,
+        add=tuple(opened(each, name=name) for name, each in by_name(add)),
+        add_body=add_body,
+        add_time_unit=add_time_unit,
+        add_offset=add_offset,
+    )
+    check_estimators(settings.estimators, settings.functions)
+    sequence = read_sequence(settings)
+    added = read_added(settings)
+    kept, held = hold_out_tracks(sequence, settings)
+    problem = build_problem(kept, settings, processes)
+    import_estimators(names)
+    solved = solve(problem, settings, _watch() if progress else no_progress, held, processes, added)
+    return RunReport(**{field.name: getattr(solved, field.name) for field in fields(solved)})
+
+
+def named_estimators(
+    given: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver],
+) -> tuple[tuple[str, ...], dict[str, Solver]]:
+    """All names in order, and the functions among them that are not registered; the default names before these alone.
+
+    Raises InputError for a function without a name of its own.
+    """
+    if isinstance(given, Mapping):
+        each = list(given.items())
+    elif not (callable(given) or isinstance(given, Iterable)):
+        raise InputError(f"estimators: expected names and functions, got {type(given).__name__}")
+    else:
+        each = [("", one) for one in ([given] if isinstance(given, str) or callable(given) else given)]
+    names: list[str] = []
+    functions: dict[str, Solver] = {}
+    for wanted, one in each:
+        if isinstance(one, str) and ":" not in one and wanted in ("", one):
+            names += [name.strip() for name in one.split(",") if name.strip()]
+            continue
+        if isinstance(one, str):
+            ((name, function),) = load_all((f"{wanted}={one}" if wanted else one,)).items()
+        elif callable(one):
+            name, function = wanted or _name_of(one), one
+        else:
+            raise InputError(f"estimators: expected names and functions, got {type(one).__name__}")
+        names.append(name)
+        if name not in estimator_names():
+            functions[name] = function
+        elif find_estimator(name) is not function:
+            raise InputError(f"estimators: '{name}' is installed already; name the function, such as {{'mine': solve}}")
+    beside = DEFAULT_ESTIMATORS if names and len(functions) == len(names) else ()
+    return (*beside, *names), functions
+
+
+def _name_of(function: Solver) -> str:
+    """Registered name of a function, else its own."""
+    name = str(getattr(function, "__name__", ""))
+    if (registered := name.replace("_", "-")) in estimator_names() and find_estimator(registered) is function:
+        return registered
+    if not re.fullmatch(r"\w+", name):
+        raise InputError(f"estimators: {function!r} has no name; give it one, such as {{'mine': solve}}")
+    return name
+
+
+def _in_memory(
+    truth: FilePath | Trajectory | Truth | Array | tuple[Array, Array] | None,
+) -> Path | Source | Truth | None:
+    """The truth as the settings of a run have it."""
+    if isinstance(truth, str | os.PathLike):
+        return Path(truth)
+    return truth if truth is None or isinstance(truth, Truth) else opened(truth, name="truth")
+
+
+def _watch() -> Watch:
+    from ..progress import reporter
+
+    return reporter().estimator

@@ -1,0 +1,91 @@
+"""A run with its tables, sentences and figures, and the page or folder that it writes."""
+
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.data.formats.atomic_folder import atomic_folder
+
+from ..keywords import for_python
+from ..notebook import NotebookResult
+from ..phrases.run import verdict
+from ..results.run import Summary, summarize
+from ..tables import Table
+from ..tables.run import main_frame, main_table, metrics_table
+from .problem import MARK
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class RunReport(NotebookResult, Run):
+    """A run with pandas tables, sentences, matplotlib figures, and the folder of `fgbaseline run`."""
+
+    @cached_property
+    def summary(self) -> Summary:
+        """All metrics, as in `summary.json`."""
+        return summarize(self)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row per main metric, one column per estimator."""
+        return main_frame(self, self._estimators)
+
+    @property
+    def text_table(self) -> Table:
+        """The main metrics as text, for `tables.markdown`, `latex` and `print_table`."""
+        return main_table(self, self._estimators).transposed()
+
+    @property
+    def metrics(self) -> pd.DataFrame:
+        """Every metric: estimator, metric (its path in `summary.json`) and value."""
+        return metrics_table(self.summary)
+
+    @cached_property
+    def verdict(self) -> list[str]:
+        """Conclusions in sentences, the trust in the reference first."""
+        return verdict(self)
+
+    @property
+    def heading(self) -> str:
+        """Recording, and reference with its trust."""
+        reference = "no reference" if self.reference is None else f"reference {self.reference}"
+        return f"Run on {self.problem.sequence.name}: {reference}, {self.trust.verdict.name.lower()}"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table, as `table`."""
+        return self.table
+
+    def figures(self) -> "dict[str, Figure]":
+        """The figures by name, as the page has them."""
+        from ..figures import draw
+
+        return draw(self)
+
+    def plot(self) -> "Figure":
+        """The figure of all paths, from above."""
+        return self.figures()["paths_overlaid"]
+
+    @for_python
+    def report(self, path: str | os.PathLike[str], *, force: bool = False, processes: int = 1) -> Path:
+        """Writes the folder of `fgbaseline run` atomically; returns the path of its page, `report.html`.
+
+        `force` replaces the folder of an earlier run; `processes` draw the figures. Raises InputError where the folder
+        exists without `force`, or is not that of a run.
+        """
+        from .folder import write_run
+
+        place = Path(path)
+        with atomic_folder(place, force=force, mark=MARK) as building:
+            write_run(self, building, processes)
+        return place / "report.html"
+
+    @cached_property
+    def _estimators(self) -> Mapping[str, Any]:
+        estimators: Mapping[str, Any] = self.summary.model_dump(mode="json", by_alias=True)["estimators"]
+        return estimators
