@@ -132,12 +132,13 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     """Errors of the motion over each delta, as boxes; None where the paths are too short for all."""
     if not data.relative:
         return None
-    n, rows, inch = len(data.names), len(data.relative), (1.0 if style.titled else 0.6)
-    figure = Figure(figsize=(style.width, 0.9 * inch + rows * inch * (0.75 + 0.27 * n)))
+    names = [name for name in data.names if any(name in motions for motions in data.relative.values())]
+    rows, inch = len(data.relative), (1.0 if style.titled else 0.6)
+    figure = Figure(figsize=(style.width, 0.9 * inch + rows * inch * (0.75 + 0.27 * len(names))))
     panels = figure.subplots(rows, 2, squeeze=False, sharey=True)
     for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            _boxes(data, panel, motions, column)
+            _boxes(panel, names, data.colors, motions, column)
             panel.set_xlabel(f"over {delta}: {'translation' if unit == 'm' else 'rotation'}, {unit}")
             panel.set_xlim(left=0.0)
     pairs = "all pairs" if data.all_pairs else "consecutive pairs"
@@ -145,12 +146,13 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     return figure
 
 
-def _boxes(data: ComparisonData, panel: Axes, motions: Mapping[str, pd.DataFrame], column: str) -> None:
-    color = data.colors
+def _boxes(
+    panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, pd.DataFrame], column: str
+) -> None:
     for name, table in motions.items():
         panel.boxplot(
             [table[column].dropna().to_numpy()],
-            positions=[data.names.index(name)],
+            positions=[names.index(name)],
             orientation="horizontal",
             widths=0.55,
             whis=(5, 95),
@@ -161,8 +163,8 @@ def _boxes(data: ComparisonData, panel: Axes, motions: Mapping[str, pd.DataFrame
             whiskerprops={"color": color[name]},
             capprops={"color": color[name]},
         )
-    panel.set_yticks(range(len(data.names)), [safe_text(name) for name in data.names])
-    panel.set_ylim(len(data.names) - 0.5, -0.5)
+    panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
+    panel.set_ylim(len(names) - 0.5, -0.5)
     panel.grid(axis="y", visible=False)
 
 
