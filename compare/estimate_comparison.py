@@ -63,7 +63,7 @@ class Evidence:
 
     @property
     def map_by_depth(self) -> pd.DataFrame | None:
-        """See `compare.map_by_depth`; None for the reference and where no landmark is background_map."""
+        """See `compare.map_by_depth`; None for the reference and where the maps share no landmark."""
         return None if self.map is None or len(self.map) == 0 else compare.map_by_depth(self.map).reset_index()
 
 

@@ -233,6 +233,8 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
     said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"
+    if any(event.kind == EventKind.STARTED_AT_ISAM2 for event in batch.events):
+        said = said.replace("solution", "solution started at isam2's answer")
     text = f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
     return _BesideBatch(verdict, text, criteria)
 

@@ -15,7 +15,7 @@ from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..figures.style import dark_matrix
 from ..formatting import counted, number
-from ..results.metrics import TERMS
+from ..results.metric import TERMS
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""
@@ -47,7 +47,7 @@ CAPTIONS: Mapping[str, str] = {
     "one logarithmic scale.",
     "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "
     "in the camera frames do not.",
-    "time_per_frame": "An estimator below the dotted line runs in real time.",
+    "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 
 

@@ -69,6 +69,11 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
         (problem,) = built()
     for sentence in preliminary_remarks(problem):
         click.echo(sentence)
+    if 0 < settings.batch_up_to < int(problem.mask.sum()) and "isam2" in settings.estimators:
+        many = plural(int(problem.mask.sum()), "observation")
+        progress.print_line(
+            f"batch is left out: {many}, by default up to {settings.batch_up_to:,}; --estimators adds it"
+        )
     solved = solve(problem, settings, progress.estimator, held, cores(), added)
     for name, result in solved.results.items():
         if not result.answered:

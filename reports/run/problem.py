@@ -40,6 +40,8 @@ class RunSettings:
     """None for the simulated drive"""
     preset: Literal["calibrated", "documented"] = "calibrated"
     estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+    batch_up_to: int = 0
+    """number of observations up to which `batch`, started at the answer of `isam2` only, is added to them"""
     features: int | Literal["all"] | None = None
     """None for the preset's default"""
     landmarks: LandmarkMode = LandmarkMode.UPDATED

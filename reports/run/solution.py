@@ -1,7 +1,8 @@
 """Solution of a run's problem: estimators in turn, trajectories from files beside them, and the comparison of all."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import Source, resolve
 from fgbaseline.compare.trajectory_comparison.metrics import matched_poses
 from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
 from fgbaseline.compare.trajectory_comparison.settings import Settings
-from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory
+from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory, find_estimator
 from fgbaseline.data.solving import Watch, no_progress, solve_all
 from fgbaseline.data.triangulated import landmarks_along
 from fgbaseline.geometry import InputError
@@ -57,7 +58,12 @@ def solve(
     added: Added | None = None,
 ) -> Run:
     """Solves the problem with each estimator in turn, and compares the estimates with `processes`."""
-    estimates = solve_all(problem, settings.estimators, watch, settings.functions)
+    functions = settings.functions
+    if batch_is_added(problem, settings):
+        batch: Callable[..., object] = find_estimator("batch")
+        functions = {**functions, "batch": partial(batch, from_dead_reckoning=False)}
+        settings = replace(settings, estimators=(*settings.estimators, "batch"))
+    estimates = solve_all(problem, settings.estimators, watch, functions)
     captions: dict[str, str] = {}
     reference = reference_among(estimates)
     for name, source in ({} if added is None else added.sources).items():
@@ -70,6 +76,15 @@ def solve(
             estimates[name] = Estimate.failed(name, str(error), problem.n_frames, len(problem.excluded))
             captions[name] = "it could not be aligned"
     return compare_all(problem, estimates, settings.record(), held, processes, captions)
+
+
+def batch_is_added(problem: Problem, settings: RunSettings) -> bool:
+    """Whether `batch` shows if the reference has converged, though it was not asked for (see `batch_up_to`)."""
+    return (
+        "isam2" in settings.estimators
+        and "batch" not in settings.estimators
+        and 0 < int(problem.mask.sum()) <= settings.batch_up_to
+    )
 
 
 def _aligned(

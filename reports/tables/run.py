@@ -15,7 +15,8 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
-from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
+from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
+from ..results.metrics import shown_in
 from ..results.run import Summary
 from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
@@ -53,8 +54,8 @@ def main_table(run: Run, estimators: Estimators) -> Table:
         return table
     near = "; the reference, its by-products and other minima of its graph are not ranked by divergence"
     caption = (
-        f"Best of a column in bold{near if run.reference is not None else ''}; figures that read the same are best "
-        "together. Reprojection errors are over all observations of the landmarks that an estimator has; common "
+        f"Best of a column in bold{near if run.reference is not None else ''}; equal printed values are all "
+        "bold. Reprojection errors are over all observations of the landmarks that an estimator has; common "
         "observations are those that every estimator used."
     )
     return replace(table, caption=caption)
@@ -208,7 +209,7 @@ def _residuals(run: Run) -> Table:
 def _map(run: Run) -> Table:
     """Distances of landmarks from the reference's, by depth."""
     tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
-    figures = {"landmarks": "n", "distance, m": "distance", "as seen, m": "seen", "sigmas": "sigmas"}
+    figures = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
     return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, figures)
 
 
