@@ -150,7 +150,9 @@ def print_table(
     from rich.text import Text
 
     console = Console(highlight=False)
-    room = console.width if console.is_terminal else max(console.width, width)
+    if not console.is_terminal:  # rich prints no wider than its console
+        console = Console(highlight=False, width=max(console.width, width))
+    room = console.width
     names = [f"{row.group}: {row.name}" if row.group else row.name for row in table.rows]
     texts = [[cell.text for cell in row.cells] or [""] * len(table.columns) for row in table.rows]
     first = _Width.of([table.name, *names], wrapped=wrap_names)
@@ -171,10 +173,10 @@ def print_table(
             shown.add_column(Text(column.heading), justify=justify, width=fitted, overflow="fold")
         for row, name, text in zip(table.rows, names, texts, strict=True):
             shown.add_row(*map(Text, (name, *(text[i] for i in block))), style=(styles or {}).get(row.status, ""))
-        console.print(shown, width=room)
+        console.print(shown)
     for row, name in zip(table.rows, names, strict=True):
         if row.reason and not row.cells:
-            console.print(Text(f"{name}: {row.reason}"), width=room, soft_wrap=True)
+            console.print(Text(f"{name}: {row.reason}"), soft_wrap=True)
 
 
 class _Width(NamedTuple):
