@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..formatting import counted, number
-from ..results.metrics import TERMS
+from ..results.metric import TERMS
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""

@@ -15,7 +15,8 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
-from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
+from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
+from ..results.metrics import shown_in
 from ..results.run import Summary
 from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best

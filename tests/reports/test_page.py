@@ -18,7 +18,8 @@ from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.metrics import MAIN, shown_in
+from fgbaseline.reports.results.metric import MAIN
+from fgbaseline.reports.results.metrics import shown_in
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
@@ -142,7 +143,7 @@ def test_only_the_script_of_the_page_itself_may_run() -> None:
     ]
 
 
-def test_what_the_plots_are_drawn_from_is_what_the_run_has() -> None:
+def test_the_plots_hold_the_data_of_the_run() -> None:
     run = standard_run()
     held = json.loads(standard_page().partition('id="run">')[2].partition("</script>")[0])
     ekf, problem = held["estimators"][1], run.problem
@@ -192,7 +193,7 @@ def test_a_run_without_observations_and_one_without_any_answer_have_their_page()
     assert "There is no reference" in rendered(nobody, with_figures=True)
 
 
-def test_what_the_mask_excluded_and_what_happened_is_counted_and_capped() -> None:
+def test_masked_observations_and_events_are_counted_and_capped() -> None:
     problem = plain_problem(scene())
     excluded = problem.excluded.copy()
     excluded[:31] = Excluded.PREDICTION
