@@ -9,8 +9,10 @@ import numpy as np
 from .opencv import opencv
 from .rig import Image
 
-WINDOW = 31
-"""px, side of the square over which mean and deviation are taken"""
+COARSE = 4
+"""px of the image in one of the coarse image in which mean and deviation are taken"""
+WINDOW = 9
+"""coarse px, side of the square over which they are taken"""
 NOISE = 10.0
 """gray levels; keeps the noise of surfaces without texture small"""
 GAIN = 45.0
@@ -20,11 +22,14 @@ GAIN = 45.0
 def equalized(image: Image) -> Image:
     """128 plus `GAIN` times the deviation from the local mean, in local standard deviations; (height, width)."""
     cv2 = opencv()
+    height, width = image.shape
+    coarse = (max(1, width // COARSE), max(1, height // COARSE))
     values = image.astype(np.float32)
-    mean = cv2.blur(values, (WINDOW, WINDOW))
-    square = cv2.sqrBoxFilter(image, cv2.CV_32F, (WINDOW, WINDOW))
-    deviation = cv2.sqrt(cv2.max(square - mean * mean, 0.0) + NOISE**2)
-    result: Image = cv2.addWeighted(
-        cv2.divide(values - mean, deviation), GAIN, np.zeros_like(values), 0.0, 128.0, dtype=cv2.CV_8U
+    mean, square = (
+        cv2.blur(cv2.resize(each, coarse, interpolation=cv2.INTER_AREA), (WINDOW, WINDOW))
+        for each in (values, cv2.multiply(values, values))
     )
+    gain = GAIN / np.sqrt(np.maximum(square - mean * mean, 0.0) + np.float32(NOISE**2))
+    gains, offset = (cv2.resize(each, (width, height)) for each in (gain, 128.0 - gain * mean))
+    result: Image = cv2.add(cv2.multiply(values, gains), offset, dtype=cv2.CV_8U)
     return result

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline.data.tracking import StereoTracker, TrackerSettings, track
+from fgbaseline.data import Observations, Sequence
+from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
+from fgbaseline.diagnosis import diagnose, track_statistics
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
@@ -98,8 +100,75 @@ def test_a_gyroscope_predicts_through_a_fast_turn(room: Room) -> None:
     assert kept[0] > 50
 
 
+@pytest.mark.parametrize(("interval", "levels"), [(0.25, 1), (0.4, 4)])
+def test_the_diagnosis_counts_the_wrong_matches(interval: float, levels: int) -> None:
+    """With the checks off Lucas-Kanade goes wrong in big steps; with them on, at the same steps, it does not."""
+    room = Room(12)
+    t = interval * np.arange(room.n_frames)
+    room.__dict__["world_T_imu"] = Room.poses_at(t)
+    images = [(room.image(k), room.image(k, right=True)) for k in range(room.n_frames)]
+    off = TrackerSettings(forward_backward=1e3, row_gate=1e3, reprojection_gate=1e3, pyramid_levels=levels)
+    for settings in (off, TrackerSettings()):
+        tracker = StereoTracker(CAMERA, settings)
+        found = [tracker.step(*pair) for pair in images]
+        true = wrong_share(room, found)
+        frame = np.repeat(np.arange(room.n_frames), [len(tracks.number) for tracks in found])
+        _, landmark = np.unique(np.concatenate([tracks.number for tracks in found]), return_inverse=True)
+        observations = Observations.sort(frame, landmark, np.concatenate([tracks.pixel for tracks in found]))
+        twist = se3.log(se3.relative(room.world_T_imu)) / interval
+        twist = np.vstack([twist, twist[-1:]])
+        n_landmarks = int(landmark.max()) + 1
+        recording = Sequence("room", t, twist[:, :3], twist[:, 3:], CAMERA, IMU_T_CAM, observations, n_landmarks)
+        tracks = track_statistics(diagnose(recording))
+        counted = tracks.wrong.sum() / tracks.links.sum()
+        if settings is off:
+            assert 0.01 < true < 0.1
+            assert 0.5 * true < counted < 2.0 * true
+        else:
+            assert true < 0.001
+            assert counted < 0.001
+
+
+def wrong_share(room: Room, found: list[Tracks]) -> float:
+    """Share of the steps from frame to frame that end more than `WRONG` px from the point they began at."""
+    errors = []
+    for k, (before, now) in enumerate(pairwise(found)):
+        _, i, j = np.intersect1d(before.number, now.number, return_indices=True)
+        points, _ = room.points(k, before.pixel[i, :2])
+        errors.append(np.abs(now.pixel[j] - room.project(k + 1, points)).max(axis=1))
+    return float(np.mean(np.concatenate(errors) > WRONG))
+
+
+def test_cameras_of_different_exposure_match(room: Room, images: list[tuple[FloatArray, FloatArray]]) -> None:
+    """The right image at 60 % of the brightness: nine tenths of the matches of equal exposure are there, and right."""
+    left, right = images[0]
+    darker = np.rint(0.6 * right).astype(np.uint8)
+    equal, found = (StereoTracker(CAMERA).step(left, other) for other in (right, darker))
+    assert len(found.number) > 0.9 * len(equal.number) > 100
+    true = room.project(0, room.points(0, found.pixel[:, :2])[0])
+    assert np.median(np.abs(true - found.pixel).max(axis=1)) < 0.1
+
+
+def test_pictures_are_thinned_evenly_to_their_size(images: list[tuple[FloatArray, FloatArray]]) -> None:
+    t = 0.05 * np.arange(len(images))
+    whole = Pictures()
+    for k, pair in enumerate(images):
+        whole.add(k, float(t[k]), *pair)
+    assert list(whole.pairs) == list(range(len(images)))
+    most = sum(pair.n_bytes for pair in whole.pairs.values()) // 3
+    some = Pictures(most_bytes=most)
+    for k, pair in enumerate(images):
+        some.add(k, float(t[k]), *pair)
+    assert some.step == 4
+    assert sum(pair.n_bytes for pair in some.pairs.values()) <= most
+    assert {k: pair.left for k, pair in some.by_frame(t[2:]).items()} == {k - 2: whole.pairs[k].left for k in (4, 8)}
+
+
 def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
-    """As issue 20 wants it: 150 observations a frame, 7 frames a track, residuals below 0.8 px, 3.3 % above 5 px."""
+    """150 observations a frame, 7 frames a track, residuals to the true poses below 0.8 px in the median.
+
+    Above 5 px lie 2.5 %, nine tenths of them in frames 0 to 2 and 8, where all tracks disagree with the true poses.
+    """
     folder = recordings("kitti_images/odometry_06_first51/calib.txt").parent
     found = track(folder)
     poses = np.array([np.vstack([np.fromstring(line, sep=" ").reshape(3, 4), [0, 0, 0, 1]])
@@ -116,7 +185,8 @@ def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     error = np.linalg.norm(measured_rows(pixel).T - found.camera.rows(seen.T).pixel, axis=0)
     error = np.where(np.isfinite(error) & (seen[:, 2] > 0), error, np.inf)
     assert np.median(error) < 0.8
-    assert np.mean(error > 5.0) < 0.033
+    assert np.mean(error > 5.0) < 0.025
+    assert np.mean(error[frame > 2] > 5.0) < 0.01
 
 
 def test_euroc_pairs_a_second_apart(recordings: Callable[[str], Path]) -> None:

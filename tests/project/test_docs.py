@@ -24,6 +24,7 @@ from fgbaseline.reports.cli.main import COMMANDS, group
 from ..builders.commands import environment
 from ..builders.documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown
 
+KITTI = "test_kitti_odometry_has_no_motion"
 ELSEWHERE = {
     "make test": "tests/project/test_docs.py::test_targets_of_make_are_there",
     "make run": "tests/project/test_docs.py::test_targets_of_make_are_there",
@@ -45,6 +46,29 @@ ELSEWHERE = {
         )
         for verb, out in (("run", " --out out/drive"), ("diagnose", ""), ("export", " --out out/problem"))
     },
+    **{
+        f"fgbaseline {command}": f"tests/data/test_image_sources.py::{test}"
+        for command, test in (
+            ("run dataset-room1_512_16 --out out/room1", "test_tum_vi"),
+            ("run 2011_09_26/2011_09_26_drive_0002_sync --out out/drive_0002", "test_kitti_raw"),
+            ("track 06 --out 06.npz", "test_kitti_odometry_has_no_motion"),
+            ("run 06 --imu imu0.csv --extrinsic imu_T_cam.txt --out out/06", KITTI),
+            ("run 06 --velocities velocities.csv --extrinsic imu_T_cam.txt --out out/06_velocities", KITTI),
+            (
+                "run left --right right --calibration camchain-imucam.yaml --imu imu0.csv --out out/rig",
+                "test_two_folders",
+            ),
+            ("track V1_01_easy --out v1_01.npz", "test_track_writes_a_recording"),
+            ("run v1_01.npz --out out/v1_01_tracks", "test_track_writes_a_recording"),
+            ("track V1_01_easy --settings tracker.toml --out more.npz", "test_track_writes_a_recording"),
+        )
+    },
+    "fgbaseline run V1_01_easy --out out/v1_01": (
+        "tests/reports/test_run_images.py::test_a_folder_of_images_becomes_a_run_with_the_truth_in_it"
+    ),
+    "fgbaseline run run.bag --calibration camchain-imucam.yaml --out out/bag": (
+        "tests/data/test_bags.py::test_images_and_samples_of_a_bag"
+    ),
     "fgbaseline reproduce 03.npz 10.npz --out out/reproduction": (
         "tests/reports/test_reproduce.py::test_every_figure_is_there_in_three_forms"
     ),
@@ -64,6 +88,10 @@ HOURS = {
 }
 """commands of which there is no cheap form"""
 NEVER_RUN = {
+    **dict.fromkeys(
+        ("pip install 'fgbaseline[images]'", "pip install 'fgbaseline[images,ros]'"),
+        "it would fetch from a registry, under a name that is not registered yet",
+    ),
     "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
 }
 """command -> why no test can run it"""
