@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.plural import plural
-from fgbaseline.data.problem import Excluded, NoiseSettings, Problem
-from fgbaseline.data.problem.documented import most_observed
+from fgbaseline.data.problem import NoiseSettings, Problem
 from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
@@ -23,7 +22,7 @@ from .repair_overrides.application import mask_settings, override_sentences, wit
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
 from .repairs.repaired_sequence import repair
-from .tracks.observation_mask import MaskSettings, exclusions
+from .tracks.observation_mask import MaskSettings, choose_features, exclusions
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,9 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
         f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px, {noise.linear_velocity:.3f} m/s and "
         f"{noise.angular_velocity:.4f} rad/s",
     )
-    problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
+    problem = _with_features(
+        repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks
+    )
     return replace(
         inflate_gap_covariance(_bridged(problem, diagnosis, noise)),
         pixel_inflation=1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel,
@@ -147,7 +148,7 @@ def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration
         "assumed, not estimated from the recording",
         _shift_remark(shift),
     )
-    return _posed(sequence, excluded, features, noise, shift, settings.kernel, remarks)
+    return _with_features(sequence, excluded, features, noise, shift, settings.kernel, remarks)
 
 
 def _shift_remark(shift: float) -> str:
@@ -158,7 +159,7 @@ def _shift_remark(shift: float) -> str:
     return remark + correlated
 
 
-def _posed(
+def _with_features(
     sequence: Sequence,
     excluded: NDArray[np.uint8],
     features: int | None,
@@ -167,10 +168,7 @@ def _posed(
     kernel: HuberKernel | None,
     remarks: tuple[str, ...],
 ) -> Problem:
-    usable = sequence.observations.select(excluded == Excluded.NO)
-    chosen = most_observed(usable, sequence.n_landmarks, features)
-    left_out = (excluded == Excluded.NO) & ~np.isin(sequence.observations.landmark, chosen)
-    excluded[left_out] = Excluded.FEATURE_NOT_CHOSEN
+    chosen, excluded = choose_features(sequence, excluded, features)
     sigma = np.repeat([noise.linear_velocity, noise.angular_velocity], 3)
     variance = (sequence.dt[:, None] * sigma) ** 2
     return Problem(

@@ -32,7 +32,8 @@ def inertial_truth(poses: FloatArray, source: str) -> Truth:
 def with_state(truth: Truth, path: FilePath, line: IntArray) -> Truth:
     """The truth with velocity and biases, where the file has EuRoC's 17 columns; `line` (T,) is that of each frame.
 
-    The axes of the world are those of the file. Raises InputError naming the line for what is no number.
+    The axes of the world are those of the file, whose z axis points up. Raises InputError naming the line for what is
+    no number.
     """
     file = regular_file(path)
     with file.open("rb") as opened:
@@ -45,4 +46,5 @@ def with_state(truth: Truth, path: FilePath, line: IntArray) -> Truth:
     state = np.full((len(line), STATE_WIDTH - 8), np.nan)
     known = line >= 0
     state[known] = table.values[np.searchsorted(table.line, line[known])]
-    return replace(truth, velocity=state[:, :3], gyroscope_bias=state[:, 3:6], accelerometer_bias=state[:, 6:])
+    up = np.array([0.0, 0.0, 1.0])  # an accelerometer's bias is known beside gravity only: such a world has z up
+    return replace(truth, velocity=state[:, :3], gyroscope_bias=state[:, 3:6], accelerometer_bias=state[:, 6:], up=up)

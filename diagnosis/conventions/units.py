@@ -193,8 +193,8 @@ def _takes_camera_along(sequence: Sequence, units: Units) -> bool:
     return units.baseline != 1.0 and far > FARTHEST_CAMERA >= far * units.baseline
 
 
-def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
-    """A finding for each wrong unit of `sequence`, as recorded."""
+def unit_findings(units: Units, sequence: Sequence, seen: str = "") -> tuple[Finding, ...]:
+    """A finding for each wrong unit of `sequence`, as recorded; `seen` is evidence other than the scale ratios."""
     interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
@@ -213,7 +213,7 @@ def unit_findings(units: Units, sequence: Sequence) -> tuple[Finding, ...]:
             if factor > 1.0:
                 text = f"{texts[name]}: {factor:.6g} times too small; multiplied by {factor:.6g}."
             code = codes.get(name, "baseline_unit")
-            certainty = AS_GIVEN if name in units.given else evidence(units)
+            certainty = AS_GIVEN if name in units.given else seen or evidence(units)
             found.append(Finding(code, text, 1.0 / factor, 1.0, "recorded over true", certainty))
     return tuple(found)
 

@@ -14,6 +14,7 @@ from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
 from ..tracks.observation_mask import MaskSettings
+from .baseline import baseline_findings
 from .result import InertialDiagnosis
 from .sensor_axes import axes_findings
 from .sensor_findings import sensor_findings
@@ -27,7 +28,8 @@ DROPPED = 1.5
 
 def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> tuple[Finding, ...]:
     """Faults of the samples, then of the tracks; none for a clean recording. `tracks` are computed where not given."""
-    meaning = (*imu_unit_findings(found.units), *axes_findings(found.axes))
+    units = (*baseline_findings(found.baseline, found.recorded), *imu_unit_findings(found.units))
+    meaning = (*units, *axes_findings(found.axes))
     findings = (*found.sequence.findings, *meaning, *_gaps(found.sequence))
     if found.sensors is not None:
         noise = found.recorded.imu.noise if found.recorded.imu is not None else None
@@ -54,6 +56,8 @@ def inertial_repairs(found: InertialDiagnosis) -> tuple[str, ...]:
     """What was done to the samples, one sentence each."""
     named = (("angular velocities", found.units.rate), ("specific forces", found.units.force))
     done = [f"{name} of the inertial samples multiplied by {factor:.6g}" for name, factor in named if factor != 1.0]
+    if found.baseline.factor != 1.0:
+        done.append(f"baseline multiplied by {found.baseline.factor:.6g}")
     if found.axes.changed:
         done.append("inertial samples turned from the axes they were recorded in to those of imu_T_cam")
     return tuple(done)

@@ -1,5 +1,7 @@
 """The pipeline of a diagnosis of raw inertial data: units, odometry, start, path, pixel noise, sensors."""
 
+from dataclasses import replace
+
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -7,12 +9,14 @@ from fgbaseline.data.plural import plural
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
+from ..conventions.units import Units, rescaled, usual_baseline
 from ..inertial_start.path import InertialPath, inertial_path
 from ..inertial_start.start import Start, inertial_start
 from ..noise.calibration_fit import fit_windows
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.track_segments import repeated
 from ..tracks.unusable import unusable
+from .baseline import baseline_unit
 from .result import InertialDiagnosis
 from .sensor_axes import SensorAxes, in_imu_axes, sensor_axes
 from .sensors import sensor_checks
@@ -54,26 +58,39 @@ def no_start(seen: Odometry) -> str:
 
 
 def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
-    seen = odometry(recorded) if len(recorded.observations) else None
+    usual = usual_baseline(recorded)
+    seen = odometry(usual) if len(recorded.observations) else None
     units = imu_units(recorded, seen)
     sequence = rescaled_samples(recorded, units)
     axes = SensorAxes() if seen is None else sensor_axes(sequence, seen)
     sequence = in_imu_axes(sequence, axes)
+    baseline = baseline_unit(sequence, seen)
+    sequence = rescaled(sequence, Units(baseline=baseline.factor))
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
-    reason = unusable(sequence)
+    reason = baseline.doubt or unusable(sequence)
     if reason or seen is None:
-        return InertialDiagnosis(sequence, recorded, reason, units, axes, imu)
-    copies = repeated(sequence)
+        return InertialDiagnosis(sequence, recorded, reason, units, axes, baseline, imu)
+    if usual is not recorded:  # its camera is at the IMU
+        seen = odometry(sequence)
+    found = InertialDiagnosis(
+        sequence,
+        recorded,
+        units=units,
+        axes=axes,
+        baseline=baseline,
+        imu=imu,
+        odometry=seen,
+        repeated=repeated(sequence),
+    )
     first = inertial_start(sequence, seen, imu, max(seen.pixel_sigma, np.finfo(float).tiny))
     if first is None:
-        return InertialDiagnosis(sequence, recorded, no_start(seen), units, axes, imu, seen, copies)
+        return replace(found, cannot_tell=no_start(seen))
     path = inertial_path(sequence, seen, imu, first)
     fit = fit_windows(sequence, seen, path.twist(sequence), processes)
     pixel = seen.pixel_sigma * path.inflation if fit is None else fit.sigmas.pixel
     start = inertial_start(sequence, seen, imu, pixel * misfit_of_beginning(sequence, seen, path))
-    sensors = sensor_checks(sequence, seen, path, start)
-    return InertialDiagnosis(sequence, recorded, "", units, axes, imu, seen, copies, start, path, fit, sensors)
+    return replace(found, start=start, path=path, fit=fit, sensors=sensor_checks(sequence, seen, path, start))
 
 
 def misfit_of_beginning(sequence: Sequence, seen: Odometry, path: InertialPath) -> float:

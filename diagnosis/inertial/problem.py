@@ -6,22 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.data.plural import plural
-from fgbaseline.data.problem import Excluded, Problem
-from fgbaseline.data.problem.documented import most_observed
+from fgbaseline.data.problem import Problem
 from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
+from ..conventions.units import usual_baseline
 from ..inertial_start.start import Start
 from ..odometry.stereo_odometry import odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
-from ..tracks.observation_mask import MaskSettings, exclusions
+from ..tracks.observation_mask import MaskSettings, choose_features, exclusions
+from .baseline import baseline_findings, baseline_unit
 from .findings import inertial_findings, inertial_repairs
 from .pipeline import found_start
 from .result import InertialDiagnosis
 from .truth_tie import path_from, tied_truth
-from .units import imu_units, require_si
+from .units import imu_unit_findings, imu_units, require_si
 
 
 def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
@@ -42,7 +43,9 @@ def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
     )
     origin = "found in the recording" if found.fit is not None else "assumed, not estimated from the recording"
     remarks = (f"pixel noise {origin}: {found.pixel:.2f} px", *_imu_remarks(sequence))
-    problem = _posed(repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks)
+    problem = _with_features(
+        repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks
+    )
     return replace(
         problem,
         diagnosed=True,
@@ -56,9 +59,11 @@ def as_recorded_inertial(
 ) -> Problem:
     """The problem of a recording taken as it is, with the noise of its calibration and `pixel` px.
 
-    Raises InputError where no start is found, and for samples in other units than rad/s and m/s^2.
+    Raises InputError where no start is found, and for samples and a baseline in other units than rad/s, m/s^2 and m.
     """
-    require_si(sequence, imu_units(sequence, odometry(sequence) if len(sequence.observations) else None))
+    seen = odometry(usual_baseline(sequence)) if len(sequence.observations) else None
+    units = imu_units(sequence, seen)
+    require_si(sequence, (*baseline_findings(baseline_unit(sequence, seen), sequence), *imu_unit_findings(units)))
     try:
         start, path, _ = found_start(sequence, pixel)
     except ValueError as error:
@@ -68,7 +73,7 @@ def as_recorded_inertial(
         f"not diagnosed: {pixel:g} px is assumed, not estimated from the recording",
         *_imu_remarks(sequence),
     )
-    return _posed(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
+    return _with_features(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
 
 
 def _source(sequence: Sequence) -> str:
@@ -94,7 +99,7 @@ def _imu_remarks(sequence: Sequence) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def _posed(
+def _with_features(
     sequence: Sequence,
     excluded: NDArray[np.uint8],
     features: int | None,
@@ -106,10 +111,7 @@ def _posed(
 ) -> Problem:
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
-    usable = sequence.observations.select(excluded == Excluded.NO)
-    chosen = most_observed(usable, sequence.n_landmarks, features)
-    left_out = (excluded == Excluded.NO) & ~np.isin(sequence.observations.landmark, chosen)
-    excluded[left_out] = Excluded.FEATURE_NOT_CHOSEN
+    chosen, excluded = choose_features(sequence, excluded, features)
     remarks = (*remarks, f"start: {start.state.source}")
     if sequence.truth is not None:
         truth, how = tied_truth(sequence.truth, path_from(start.pose, path), 1.0 / float(np.median(sequence.dt)))

@@ -14,6 +14,7 @@ from ..inertial_start.path import InertialPath
 from ..inertial_start.start import Start
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
+from .baseline import BaselineUnit
 from .sensor_axes import SensorAxes
 from .sensors import SensorChecks
 from .units import ImuUnits
@@ -24,12 +25,13 @@ class InertialDiagnosis(Displayed):
     """Start, path, noise and faults of a recording with raw inertial samples."""
 
     sequence: Sequence
-    """in rad/s and m/s^2, in the axes of imu_T_cam"""
+    """in rad/s, m/s^2 and m, in the axes of imu_T_cam"""
     recorded: Sequence
     cannot_tell: str = ""
     """reason for which no start is found, in a sentence without its full stop; empty otherwise"""
     units: ImuUnits = field(default_factory=ImuUnits)
     axes: SensorAxes = field(default_factory=SensorAxes)
+    baseline: BaselineUnit = field(default_factory=BaselineUnit)
     imu: ImuIntervals | None = None
     odometry: Odometry | None = None
     repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))

@@ -47,8 +47,11 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
         found.append(Finding("extrinsic", text, size, size, "°", said))
     offset, error = checks.time_offset
     if _significant(offset, error, MIN_OFFSET):
-        late = "late" if offset > 0.0 else "early"
-        text = f"The inertial samples are stamped {1e3 * abs(offset):.1f} ms too {late} beside the images."
+        when = "after" if offset > 0.0 else "before"
+        text = (
+            f"The gyroscope turns {1e3 * abs(offset):.1f} ms {when} the cameras: stamps of two clocks, or a filter of "
+            "the unit. Estimators take the stamps as they are."
+        )
         found.append(Finding("time_offset", text, abs(offset), abs(offset), "s", f"standard error {error:.4f} s"))
     scale, error = checks.gyroscope_scale
     if _significant(scale - 1.0, error, MIN_SCALE):

@@ -10,8 +10,9 @@ import numpy as np
 from fgbaseline.data.sequence import Truth
 from fgbaseline.geometry import FloatArray, so3
 
-UPRIGHT = np.deg2rad(3.0)
-"""rad between the z axis of a file's world and the measured up, within which z is taken for up"""
+UPRIGHT = np.deg2rad(0.5)
+"""rad between the z axis of a file's world and the measured up, within which z is taken for up: the measured up is as
+uncertain, and a body that begins level within a few degrees is no world"""
 TIED = 20
 """frames with truth over which yaw and translation are tied, where frame 0 has none"""
 

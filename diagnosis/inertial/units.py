@@ -37,10 +37,20 @@ class ImuUnits:
 
 def mean_rates(sequence: Sequence) -> FloatArray:
     """(T-1, 3) mean angular velocity of the samples between frames, in their unit."""
+    return _means(sequence)[0]
+
+
+def mean_forces(sequence: Sequence) -> FloatArray:
+    """(T-1, 3) mean specific force of the samples between frames, in their unit."""
+    return _means(sequence)[1]
+
+
+def _means(sequence: Sequence) -> tuple[FloatArray, FloatArray]:
     assert sequence.imu is not None
     cut = imu_intervals(sequence.imu, sequence.t)
-    turned = np.add.reduceat(cut.angular_velocity * cut.dt[:, None], cut.starts[:-1], axis=0)
-    return np.asarray(turned / sequence.dt[:, None], dtype=np.float64)
+    values = np.concatenate([cut.angular_velocity, cut.specific_force], axis=1) * cut.dt[:, None]
+    mean = np.add.reduceat(values, cut.starts[:-1], axis=0) / sequence.dt[:, None]
+    return mean[:, :3], mean[:, 3:]
 
 
 def imu_units(sequence: Sequence, seen: Odometry | None) -> ImuUnits:
@@ -96,11 +106,8 @@ def imu_unit_findings(units: ImuUnits) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def require_si(sequence: Sequence, units: ImuUnits) -> None:
-    """Raises InputError where samples that are taken as recorded are in other units."""
-    findings = imu_unit_findings(units)
+def require_si(sequence: Sequence, findings: tuple[Finding, ...]) -> None:
+    """Raises InputError where a recording that is taken as recorded has `findings` on its units."""
     if findings:
         said = " ".join(finding.sentence.split(":")[0] + f" ({finding.certainty})." for finding in findings)
-        raise InputError(
-            f"{sequence.source}: {said} Convert the samples, or run without --as-recorded, which repairs them"
-        )
+        raise InputError(f"{sequence.source}: {said} Convert them, or run without --as-recorded, which repairs them")

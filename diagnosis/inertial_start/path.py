@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
 from .least_squares import Solution, solved
@@ -62,15 +62,13 @@ def _initial(imu: ImuIntervals, frames: IntArray, relative: RelativePoses, start
     pose, velocity = np.tile(start.pose, (n, 1, 1)), np.tile(start.state.velocity, (n, 1))
     biases = (np.tile(start.state.gyroscope_bias, (n, 1)), np.tile(start.state.accelerometer_bias, (n, 1)))
     motions = motions_between(imu, frames, np.concatenate(biases, axis=1)[:-1])
-    for i, dt in enumerate(motions.dt.tolist()):
-        R, gravity = pose[i, :3, :3], imu.gravity_vector
-        pose[i + 1, :3, :3] = R @ motions.rotation[i]  # rotations of the gyroscope drift less, positions of the cameras
-        gained = gravity * dt + R @ motions.velocity[i]
-        velocity[i + 1] = velocity[i] + gained
-        pose[i + 1, :3, 3] = pose[i, :3, 3] + velocity[i] * dt + 0.5 * gravity * dt**2 + R @ motions.position[i]
-        if i in known:
+    for i in range(n - 1):
+        motion = motions.between(i)
+        pose[i + 1], velocity[i + 1] = strapdown.predict(pose[i], velocity[i], motion, imu.gravity_vector)
+        if i in known:  # rotations of the gyroscope drift less, positions of the cameras
+            gained = velocity[i + 1] - velocity[i]
             pose[i + 1, :3, 3] = (pose[i] @ known[i])[:3, 3]
-            velocity[i + 1] = (pose[i + 1, :3, 3] - pose[i, :3, 3]) / dt + 0.5 * gained
+            velocity[i + 1] = (pose[i + 1, :3, 3] - pose[i, :3, 3]) / motion.dt + 0.5 * gained
     return States(pose, velocity, *biases)
 
 

@@ -64,6 +64,17 @@ class Motions:
     biases: FloatArray
     """(m, 6) with which they were integrated"""
 
+    def between(self, i: int) -> strapdown.ImuMotion:
+        """The motion of interval i."""
+        return strapdown.ImuMotion(
+            self.rotation[i],
+            self.velocity[i],
+            self.position[i],
+            float(self.dt[i]),
+            self.transition[i],
+            self.noise[i],
+        )
+
     def at(self, biases: FloatArray) -> "Motions":
         """The motions at other biases (m, 6)."""
         change = (self.transition[:, :9, 9:] @ (biases - self.biases)[:, :, None])[:, :, 0]

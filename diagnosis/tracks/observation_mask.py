@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Excluded
+from fgbaseline.data.problem.documented import most_observed
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity, se3
 from fgbaseline.geometry.measurement import measured_rows
@@ -47,6 +48,16 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
     left = np.bincount(landmark[kept], minlength=sequence.n_landmarks)
     excluded[kept[left[landmark[kept]] < settings.min_track]] = Excluded.SHORT
     return excluded
+
+
+def choose_features(
+    sequence: Sequence, excluded: NDArray[np.uint8], features: int | None
+) -> tuple[IntArray, NDArray[np.uint8]]:
+    """The landmarks observed most often after masking, at most `features`; and the mask without those left out."""
+    usable = sequence.observations.select(excluded == Excluded.NO)
+    chosen = most_observed(usable, sequence.n_landmarks, features)
+    left_out = (excluded == Excluded.NO) & ~np.isin(sequence.observations.landmark, chosen)
+    return chosen, np.where(left_out, np.uint8(Excluded.FEATURE_NOT_CHOSEN), excluded)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -90,6 +90,16 @@ def test_truth_of_any_world_is_tied_to_the_start(first: int, recording: data.Seq
         assert heading == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_world_that_is_nearly_level_is_leveled_by_the_samples(recording: data.Sequence) -> None:
+    """Tilted by 2 degrees, as the frame of a car at its first pose is, where frames before it were cut."""
+    tilted = moved_truth(recording, 0, se3.exp(np.array([0.0, 0.0, 0.0, 0.035, 0.0, 0.4])), None)
+    found, reference = (diagnosis.calibrated(s).sequence.truth for s in (tilted, recording))
+    assert found is not None
+    assert reference is not None
+    up = found.world_T_imu[:, 2, :3], reference.world_T_imu[:, 2, :3]
+    assert np.rad2deg(np.arccos(np.einsum("ni,ni->n", *up))).max() < 1.0
+
+
 def test_true_velocities_turn_with_the_world(problem: Problem, recording: data.Sequence) -> None:
     tied, given = problem.sequence.truth, recording.truth
     assert tied is not None
@@ -125,6 +135,43 @@ def test_other_units_are_found_and_repaired_or_refused(code: str, recording: dat
     np.testing.assert_allclose(found.start.velocity, problem.start.velocity, atol=1e-6)
     with pytest.raises(InputError, match=name):
         diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+
+
+@pytest.mark.parametrize(("unit", "name"), [(1e-3, "in mm"), (1e3, "in km")])
+def test_a_baseline_in_another_unit_is_found_by_the_accelerometer(unit: float, name: str) -> None:
+    """The camera's place is in m, or far from the IMU and then in the unit of the baseline."""
+    recording = inertial_recording(upside_down, seed=2, n_frames=80)
+    expected = diagnosis.calibrated(recording)
+    wrong = replace(recording, camera=replace(recording.camera, baseline=recording.camera.baseline / unit))
+    found = diagnosis.calibrated(wrong)
+    assert [code for code in faults(found) if code not in faults(expected)] == ["baseline_unit"]
+    assert name in found.findings[0].sentence
+    assert found.repairs[0] == f"baseline multiplied by {unit:g}"
+    assert found.start is not None
+    assert expected.start is not None
+    assert found.sequence.camera.baseline == pytest.approx(recording.camera.baseline, rel=1e-12)
+    np.testing.assert_allclose(found.start.velocity, expected.start.velocity, atol=1e-6)
+    with pytest.raises(InputError, match=name):
+        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+
+
+def test_an_unusual_baseline_that_the_accelerometer_confirms_stays() -> None:
+    """A rig of 6 m, far apart beside the rigs that are usual."""
+    recording = inertial_recording(upside_down, seed=2, n_frames=80)
+    camera, o = recording.camera, recording.observations
+    wide = replace(camera, baseline=6.0)
+    pixel = o.pixel.copy()
+    pixel[:, 2] = pixel[:, 0] - (pixel[:, 0] - pixel[:, 2]) * wide.baseline / camera.baseline
+    found = diagnosis.calibrated(replace(recording, camera=wide, observations=replace(o, pixel=pixel)))
+    assert "baseline_unit" not in faults(found)
+    assert found.sequence.camera.baseline == 6.0
+
+
+def test_a_baseline_that_neither_unit_explains_is_refused(recording: data.Sequence) -> None:
+    """A hundred times too large: in m the cameras' accelerations are 100 times too large, in mm 10 times too small."""
+    wrong = replace(recording, camera=replace(recording.camera, baseline=100.0 * recording.camera.baseline))
+    with pytest.raises(InputError, match=r"the stereo baseline, 30 m, is in doubt.*0\.03 m; write b in m"):
+        diagnosis.calibrated(wrong)
 
 
 AXES = {
