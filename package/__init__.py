@@ -35,16 +35,18 @@ FUNCTIONS = {"run": "fgbaseline.reports.run.api", "compare_trajectories": "fgbas
 """name -> module"""
 
 
-def __getattr__(name: str) -> Any:
-    """A function, package or version that is not imported yet. Raises AttributeError for any other name."""
-    if name not in __all__:
-        raise AttributeError(f"module 'fgbaseline' has no attribute '{name}'")
-    if name == "__version__":
-        return import_module("importlib.metadata").version("fgbaseline")
-    if name in FUNCTIONS:
-        return getattr(import_module(FUNCTIONS[name]), name)
-    return import_module(f"fgbaseline.{name}")
-
-
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+if not TYPE_CHECKING:  # with it, type checkers would take any name for an attribute
+
+    def __getattr__(name: str) -> Any:
+        """A function, package or version that is not imported yet. Raises AttributeError for any other name."""
+        if name not in __all__:
+            raise AttributeError(f"module 'fgbaseline' has no attribute '{name}'")
+        if name == "__version__":
+            return import_module("importlib.metadata").version("fgbaseline")
+        if name in FUNCTIONS:
+            return getattr(import_module(FUNCTIONS[name]), name)
+        return import_module(f"fgbaseline.{name}")

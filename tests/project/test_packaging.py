@@ -171,6 +171,64 @@ def test_each_installs_into_an_empty_environment_and_works_beside_the_users_own_
     use_beside_the_users_own_modules(with_sdist, tmp_path / "another project", with_a_report=False)
 
 
+SCRIPT = """
+import fgbaseline
+import numpy as np
+from fgbaseline import data, ekf
+from fgbaseline.data import Estimate, Problem
+
+
+def mine(problem: Problem, progress: object = None) -> Estimate:
+    answer = ekf.dead_reckoning(problem)
+    return Estimate("mine", answer.world_T_imu, answer.used)
+
+
+sequence = data.read("drive.npz")
+result = fgbaseline.run(sequence, estimators=["ekf", "isam2", mine], preset="calibrated", features="all")
+reveal_type(fgbaseline.__version__)
+reveal_type(result)
+reveal_type(result.table)
+reveal_type(result.figures())
+reveal_type(result.report("out/drive", force=True))
+path = (sequence.t, result.results["mine"].estimate.world_T_imu)
+reveal_type(fgbaseline.compare_trajectories(result, {"mine": path}, align="yaw", deltas=["1s"]))
+reveal_type(fgbaseline.compare_trajectories("truth.tum", ["a.tum", path, np.zeros((3, 4, 4))]).verdict)
+fgbaseline.run(sequence, preset="best")
+fgbaseline.run(sequence, sead=3)
+fgbaseline.compare_trajectories(path, path, align="best")
+fgbaseline.nothing
+"""
+REVEALED = (
+    "str",
+    "RunReport",
+    "DataFrame",
+    "dict[str, matplotlib.figure.Figure]",
+    "Path",
+    "ComparisonReport",
+    "list[str]",
+)
+REFUSED = ("arg-type", "call-arg", "arg-type", "attr-defined")
+
+
+def test_a_users_script_is_checked_against_the_types_of_the_wheel(built: Built, tmp_path: Path) -> None:
+    with zipfile.ZipFile(built.wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    (tmp_path / "script.py").write_text(SCRIPT)
+    # The packages of a path that mypy is given are checked as source; only those installed need py.typed.
+    environment_of_user = Environment.make(tmp_path / "user")
+    shutil.copytree(tmp_path / "site", environment_of_user.packages, dirs_exist_ok=True)
+    (here,) = {Path(p) for p in sys.path if p.endswith("site-packages")}
+    (environment_of_user.packages / "lent.pth").write_text(f"{here}\n")
+    command = [sys.executable, "-m", "mypy", "--strict", "--python-executable", environment_of_user.python, "script.py"]
+    checked = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
+    notes = [line for line in checked.stdout.splitlines() if ": note: Revealed type" in line]
+    assert len(notes) == len(REVEALED), checked.stdout
+    for line, revealed in zip(notes, REVEALED, strict=True):
+        assert f'{revealed}"' in line or f"{revealed}[" in line, line
+    errors = [line for line in checked.stdout.splitlines() if ": error: " in line]
+    assert [line.rpartition("[")[2].rstrip("]") for line in errors] == list(REFUSED), checked.stdout
+
+
 def test_both_ask_for_the_same(built: Built) -> None:
     with zipfile.ZipFile(built.wheel) as archive:
         (name,) = (name for name in archive.namelist() if name.endswith("dist-info/METADATA"))
