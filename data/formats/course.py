@@ -26,7 +26,7 @@ from ..sequence import Sequence, Truth
 from .feature_block import read_features
 from .fields import extrinsic, positive, vectors
 from .frame_stamps import read_stamps
-from .imu_arrays import STAMPS, read_imu_arrays, read_state_truth
+from .imu_arrays import FORCE, RATE, STAMPS, read_imu_arrays, read_state_truth
 from .imu_attachment import attach_imu
 from .npz_archive import NpzArchive
 
@@ -41,13 +41,21 @@ _ODD_EXTRINSIC = (
     "cam_T_imu is read as the 2020 course wrote it: its rotation takes IMU to camera, its translation is the "
     "camera's position in the IMU frame."
 )
+NO_VELOCITIES = "The recording has no velocities: the motion is from the inertial samples."
 _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can be run on it."
 
 
-def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
-    """The recording in an open npz of either course form or of our own. Raises InputError naming the key."""
+def read_course(archive: NpzArchive, name: str, source: str, *, has_imu_file: bool = False) -> Sequence:
+    """The recording in an open npz of either course form or of our own. Raises InputError naming the key.
+
+    Without velocities they are zero where it has raw inertial samples, or `has_imu_file`.
+    """
     form = course_form(archive.keys)
     inertial = STAMPS in archive.keys
+    if not inertial and archive.keys & {RATE, FORCE}:
+        raise InputError(
+            f"{STAMPS} is missing, the time stamps of {' and '.join(sorted(archive.keys & {RATE, FORCE}))}"
+        )
     stamps = read_stamps("time_stamps", archive.array("time_stamps"))
     T = len(stamps.kept)
     rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
@@ -65,9 +73,11 @@ def read_course(archive: NpzArchive, name: str, source: str) -> Sequence:
     if moved:
         remarks.append(moved)
     velocity, turned = np.zeros((T, 3)), np.zeros((T, 3))
-    if not inertial or archive.keys & VELOCITY_KEYS:
+    if not (inertial or has_imu_file) or archive.keys & VELOCITY_KEYS:
         velocity = vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))
         turned = vectors(rate, _shaped(archive, rate, (3, T)))
+    elif has_imu_file:
+        remarks.append(NO_VELOCITIES)
     sequence = Sequence(
         name=name,
         t=stamps.t,

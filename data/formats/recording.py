@@ -10,7 +10,7 @@ from fgbaseline.geometry import InputError
 from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY
 from ..sequence import Sequence
 from ..time_unit import TimeUnit, in_seconds
-from .course import read_course
+from .course import NO_VELOCITIES, read_course
 from .ground_truth import BodyFrame, attach_truth
 from .imu_arrays import assumed_noise
 from .imu_attachment import attach_imu
@@ -45,9 +45,11 @@ def read(
     the truth is what the recording itself has. Raises InputError, naming file, field and value, for anything else.
     """
     with reading(path), np.errstate(all="ignore"):  # absurd numbers are judged, not computed with
-        sequence = in_seconds(_read(regular_file(path), os.fspath(path)), time_unit)
+        file = regular_file(path)
+        sequence = in_seconds(_read(file, os.fspath(path), has_imu_file=imu is not None), time_unit)
     if imu is not None:
         sequence = _with_imu(sequence, imu, imu_calibration)
+        sequence = sequence if time_unit is not None else in_seconds(sequence)
     elif imu_calibration is not None:
         raise InputError(f"imu-calibration: {shown(imu_calibration)} is given without samples; add --imu FILE")
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
@@ -59,15 +61,16 @@ def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -
         found = read_imu_calibration(calibration)
     raw = read_imu_csv(imu, found.noise, found.gravity)
     with reading(imu):
-        return attach_imu(sequence, raw._replace(remarks=(*found.remarks, *raw.remarks)), shown(imu))
+        raw = raw._replace(remarks=(*found.remarks, *raw.remarks))
+        return attach_imu(sequence, raw, shown(imu), velocities=NO_VELOCITIES not in sequence.remarks)
 
 
-def _read(file: Path, source: str) -> Sequence:
+def _read(file: Path, source: str, *, has_imu_file: bool) -> Sequence:
     with file.open("rb") as opened:
         head = opened.read(1024)
     if head.startswith(ZIP):
         with NpzArchive(file) as archive:
-            return read_course(archive, file.stem, source)
+            return read_course(archive, file.stem, source, has_imu_file=has_imu_file)
     if head.startswith(b"MATLAB") and head[MATLAB_HEADER - 2 : MATLAB_HEADER] in (b"IM", b"MI"):
         if HDF5 in head:
             raise InputError("this is a MATLAB 7.3 file (HDF5), which is not supported; save it with save(..., '-v7')")
