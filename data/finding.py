@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-UNITS = frozenset({"time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"})
+UNITS = frozenset({"time_unit", "imu_time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"})
 """codes of values in units other than SI"""
 OF_THE_FILE = frozenset(
     {

@@ -53,6 +53,8 @@ EXACT_INTEGER = 2**53
 """a float64 holds every whole number up to here"""
 SINGLE = 7
 """significant digits of a float32; `%g` and `std::cout` write one less"""
+SAMPLE_PERIODS = (5e-5, 0.2)
+"""s between raw inertial samples"""
 COARSE = 0.02
 """of the median interval: rounding from which on the intervals are noticeably wrong"""
 
@@ -83,6 +85,23 @@ def unit_of_stamps(t: FloatArray) -> tuple[TimeUnit, str] | None:
     if interval > LONGEST_INTERVAL and len(fitting) == 1:
         return fitting[0], f"their median interval is {interval:.6g}, which only in {fitting[0].noun} is one of images"
     return None
+
+
+def unit_of_samples(t: FloatArray, samples: FloatArray) -> tuple[TimeUnit, str] | None:
+    """The unit of stamps of frames (T,) and of inertial samples (M,), and how they show it; None for seconds.
+
+    None as well where no unit, or more than one, has usual intervals of both.
+    """
+    interval, period = float(np.median(np.diff(t))), float(np.median(np.diff(samples)))
+    fitting = [
+        unit
+        for unit in TimeUnit
+        if usual(interval * unit.seconds) and SAMPLE_PERIODS[0] <= period * unit.seconds <= SAMPLE_PERIODS[1]
+    ]
+    if TimeUnit.S in fitting or len(fitting) != 1:
+        return None
+    why = f"the median interval of the frames is {interval:.6g} and that of the inertial samples {period:.6g}"
+    return fitting[0], f"{why}, which only in {fitting[0].noun} are those of images and of an IMU"
 
 
 def lost_digits(t: FloatArray, longest: str | None = None) -> str:
@@ -134,6 +153,8 @@ def in_seconds(sequence: Sequence, unit: TimeUnit | None = None) -> Sequence:
         scaled = rescaled_time(sequence, unit.seconds)
         return replace(scaled, remarks=(*sequence.remarks, remark), time_unit_given=True)
     found = unit_of_stamps(sequence.t)
+    if found is None and sequence.imu is not None and not sequence.time_unit_given:
+        found = unit_of_samples(sequence.t, sequence.imu.t)
     if found is None:
         return sequence
     unit, why = found

@@ -175,11 +175,23 @@ def _checked(tolerance: float) -> float:
 
 def _require_some(n: int, reference: Trajectory, estimate: Trajectory, tolerance: float) -> None:
     if n == 0:
+        for path, other in ((estimate, reference), (reference, estimate)):
+            if _counts_frames(path) and not _counts_frames(other):
+                first = f"({path.t[0]:g}, {path.t[1]:g}, ...)"
+                raise InputError(
+                    f"{path.source or path.name}: its first column counts frames {first} and has no times, while those "
+                    f"of {other.name} begin at {float(other.t[0])!r} s; write the time of each pose in its place"
+                )
         spans = [f"{p.name} runs from {float(p.t[0])!r} to {float(p.t[-1])!r} s" for p in (reference, estimate)]
         raise InputError(
             f"no pose of {estimate.source or estimate.name} is within {tolerance:.3g} s of one of "
             f"{reference.source or reference.name}: {' and '.join(spans)}; give a larger tolerance or an offset in time"
         )
+
+
+def _counts_frames(path: Trajectory) -> bool:
+    """Whether the stamps are 0, 1, 2, ... or 1, 2, 3, ...."""
+    return len(path) > 2 and path.t[0] in (0.0, 1.0) and bool((np.diff(path.t) == 1.0).all())
 
 
 def interpolated(path: Trajectory, t: FloatArray) -> Trajectory:

@@ -14,6 +14,10 @@ from .association import MatchedTrajectories
 LEAST_ROTATION = 5.0
 """deg; smaller rotations between bodies are ignored"""
 ITERATIONS = 20
+LENGTH_UNITS = {1e3: "mm", 1e2: "cm"}
+"""units that positions in place of m may have: their number in a meter"""
+SAME_SCALE = 0.05
+"""relative: by so much a scale may differ from that of a unit, from drift"""
 MIN_PAIRS = 10
 """pairs of poses, below which no convention is detected"""
 
@@ -118,6 +122,24 @@ def rmse_of_inverse_poses(matched: MatchedTrajectories) -> tuple[float, float]:
 
     poses = matched.estimate.world_T_body
     return rmse(poses), rmse(se3.inverse(poses))
+
+
+def length_unit(matched: MatchedTrajectories) -> tuple[str, float] | None:
+    """Unit in which one of two files has its positions while the other has meters, and the estimate's scale to it.
+
+    The scale is above 1 where the estimate has the larger numbers. None where it is no unit's, as of most monocular
+    estimates.
+    """
+    if len(matched) < MIN_PAIRS:
+        return None
+    found = align(matched.estimate.world_T_body, matched.reference.world_T_body, Align.SIM3)
+    if not found.scale > 0.0:
+        return None
+    for per_meter, name in LENGTH_UNITS.items():
+        for scale in (per_meter, 1.0 / per_meter):
+            if abs(found.scale * scale - 1.0) < SAME_SCALE:
+                return name, 1.0 / found.scale
+    return None
 
 
 def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> BodyRotation:

@@ -42,6 +42,20 @@ def with_lever_arm(entry: Entry, arm: FloatArray) -> Entry:
     return moved.remarked(f"its positions are moved by the lever arm ({shown}) m, which its orientations carry")
 
 
+def with_length_unit_recognized(reference: Trajectory, entry: Entry, settings: Settings) -> Entry:
+    """The estimate with a remark where the positions of one of the two files are not in meters."""
+    matched = paired(reference, entry.trajectory, settings, oriented=False)
+    found = None if matched is None or settings.align == compare.Align.SIM3 else compare.length_unit(matched)
+    if found is None:
+        return entry
+    unit, scale = found
+    larger, smaller = ("its positions", f"those of {reference.name}")[:: 1 if scale > 1.0 else -1]
+    return entry.remarked(
+        f"{larger} are {max(scale, 1.0 / scale):,.0f} times as large as {smaller}, as in {unit} and not m: write them "
+        "in m, or give --align sim3"
+    )
+
+
 def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings) -> Entry:
     """The estimate with remarks on inverse poses, conjugated quaternions and a constant rotation between the bodies.
 
@@ -67,7 +81,7 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     axis = ", ".join(f"{x:.3f}" for x in found.axis)
     rotation = (
         f"its body is turned by a constant {found.angle_deg:.1f}° about ({axis}) against that of {reference.name} "
-        f"(median deviation {found.residual_deg:.2g}° over {len(matched):,} poses)"
+        f"(median deviation {found.residual_deg:.3g}° over {len(matched):,} poses)"
     )
     if not settings.align_body:
         return entry.remarked(

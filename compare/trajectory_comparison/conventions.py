@@ -203,8 +203,8 @@ def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[
         return each, 0
     order = each.orders[1]
     remark = (
-        f"its quaternions are read as {in_words(order)}: so its rotations fit to {other:.2g}° in the median, and to "
-        f"{assumed:.2g}° as {in_words(each.orders[0])}"
+        f"its quaternions are read as {in_words(order)}: so its rotations fit to {other:.3g}° in the median, and to "
+        f"{assumed:.3g}° as {in_words(each.orders[0])}"
     )
     return replace(each, order=order).remarked(remark), 1
 
@@ -214,16 +214,18 @@ def _with_doubt(each: Resolved, assumed: float, other: float) -> Resolved:
     if fits_clearly_better(assumed, other):
         return each
     orders = [in_words(order) for order in each.orders]
-    fits = f"its rotations fit to {assumed:.2g}° in the median as {orders[0]}, to {other:.2g}° as {orders[1]}"
+    fits = f"its rotations fit to {assumed:.3g}° in the median as {orders[0]}, to {other:.3g}° as {orders[1]}"
     if np.isnan(assumed):
         fits = "its body hardly moves"
     said = f"no header names the order of its quaternions, and {fits}: {orders[0]} is assumed; --quaternion settles it"
     return replace(each.remarked(said), order_in_doubt=True)
 
 
-def paired(reference: Trajectory, estimate: Trajectory, settings: Settings) -> MatchedTrajectories | None:
-    """Pairs of poses, not aligned; None without any (which is reported later) and without orientations."""
-    if reference.stamped != estimate.stamped or not (reference.oriented and estimate.oriented):
+def paired(
+    reference: Trajectory, estimate: Trajectory, settings: Settings, *, oriented: bool = True
+) -> MatchedTrajectories | None:
+    """Pairs of poses, not aligned; None without any (reported later), and without orientations if `oriented`."""
+    if reference.stamped != estimate.stamped or (oriented and not (reference.oriented and estimate.oriented)):
         return None
     try:
         return compare.associate(

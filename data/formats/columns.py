@@ -22,9 +22,11 @@ UNITS = {
 }
 TIME = ("stamp", "timestamp", "timestamps", "time", "times", "t")
 """names of time stamps, preferred ones first"""
-NUMBER = ("frame", "index", "idx", "id", "seq", "")
+METERS = {"mm": 1e-3, "cm": 1e-2, "km": 1e3}
+"""units of positions other than m that a header may name"""
+NUMBER = ("frame", "index", "idx", "id", "seq", "", "frame_id")
 POSITION = {"p", "t", "pos", "position", "trans", "translation", "location", "point"}
-QUATERNION = {"q", "quat", "quaternion", "orientation", "rotation", "rot", "ori", "attitude"}
+QUATERNION = {"q", "o", "quat", "quaternion", "orientation", "rotation", "rot", "ori", "attitude"}
 NO_POSITION = QUATERNION | {
     *("v", "vel", "velocity", "twist", "linear", "angular", "acc", "accel", "acceleration", "w", "omega", "gyro", "b"),
     *("bg", "ba", "bw", "bias", "std", "sigma", "cov", "covariance", "err", "error", "var", "a", "euler", "rpy", "g"),
@@ -53,6 +55,8 @@ class Columns:
     """unit of the stamps, if the header has it"""
     covariance: tuple[int, ...] = ()
     """12 of OpenVINS, or 36 as in ROS"""
+    length: str = "m"
+    """unit of the positions"""
     remark: str = ""
     """remark on the identification"""
 
@@ -178,6 +182,7 @@ def _by_name(names: Sequence[str]) -> Columns | None:
         number=number,
         unit=unit,
         covariance=_covariance(plain) if quaternion else (),
+        length=_length(names[position[0]]),
         remark="roll, pitch and yaw are not read: the header does not state their order" if turned else "",
     )
 
@@ -186,7 +191,13 @@ def _plain(name: str) -> str:
     """A name in small letters, its parts joined by `_`, without a unit in brackets."""
     name = re.sub(r"[\[(](\d)[\])]", r"_\1", name)
     name = re.sub(r"([a-z])([XYZW])$", r"\1_\2", re.sub(r"\s*[\[(][^\])]*[\])]", "", name))
-    return "_".join(re.findall(r"[a-z0-9]+", re.sub(r"[_ ]m$", "", name.strip().lower())))
+    return "_".join(re.findall(r"[a-z0-9]+", re.sub(r"[_ ][kcm]?m$", "", name.strip().lower())))
+
+
+def _length(name: str) -> str:
+    """The unit of a position that stands in brackets or last in its name: m unless METERS has it."""
+    found = re.search(r"[\[(_ ]\s*([kcm]m)\s*[\])]?$", name.strip().lower())
+    return found[1] if found else "m"
 
 
 def _axis(name: str) -> tuple[str, tuple[str, ...]]:

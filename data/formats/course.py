@@ -26,7 +26,7 @@ from ..sequence import Sequence, Truth
 from .feature_block import read_features
 from .fields import extrinsic, positive, vectors
 from .frame_stamps import read_stamps
-from .imu_arrays import STAMPS, read_imu_arrays, read_state_truth
+from .imu_arrays import FORCE, RATE, STAMPS, read_imu_arrays, read_state_truth
 from .imu_attachment import attach_imu
 from .npz_archive import NpzArchive
 from .observation_list import FRAME, read_observation_list
@@ -42,6 +42,7 @@ _ODD_EXTRINSIC = (
     "cam_T_imu is read as the 2020 course wrote it: its rotation takes IMU to camera, its translation is the "
     "camera's position in the IMU frame."
 )
+NO_VELOCITIES = "The recording has no velocities: the motion is from another file."
 _NO_FEATURES = "The recording has no features, so nothing but dead reckoning can be run on it."
 
 
@@ -55,6 +56,10 @@ def read_course(
     """
     form = course_form(archive.keys)
     inertial = STAMPS in archive.keys
+    if not inertial and archive.keys & {RATE, FORCE}:
+        raise InputError(
+            f"{STAMPS} is missing, the time stamps of {' and '.join(sorted(archive.keys & {RATE, FORCE}))}"
+        )
     stamps = read_stamps("time_stamps", archive.array("time_stamps"))
     T = len(stamps.kept)
     rate = "rotational_velocity" if form == "course-2020" else "angular_velocity"
@@ -79,6 +84,8 @@ def read_course(
     if archive.keys & VELOCITY_KEYS or not (inertial or moves):
         velocity = vectors("linear_velocity", _shaped(archive, "linear_velocity", (3, T)))
         turned = vectors(rate, _shaped(archive, rate, (3, T)))
+    elif moves:
+        remarks.append(NO_VELOCITIES)
     sequence = Sequence(
         name=name,
         t=stamps.t,

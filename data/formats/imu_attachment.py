@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, Observations
-from ..plural import plural
+from ..plural import percent, plural
 from ..sequence import Sequence
 from .imu_csv import read_imu_csv
 from .imu_samples import RawSamples
@@ -16,6 +16,12 @@ from .imu_yaml import ImuCalibration
 from .named_file import FilePath
 
 MIN_FRAMES = 2
+FACTORS = (1.0, 1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9)
+"""of the stamps of samples in another unit than those of the frames"""
+LONGEST_PERIOD, USUAL_PERIOD = 1.5, 0.5
+"""intervals between frames: samples in the unit of the frames, and in another unit, have at most this period"""
+COVERED = 0.5
+"""share of the frames that samples in another unit must cover"""
 
 
 def read_imu(samples: FilePath, calibration: ImuCalibration) -> RawSamples:
@@ -27,12 +33,13 @@ def read_imu(samples: FilePath, calibration: ImuCalibration) -> RawSamples:
 def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: bool = True) -> Sequence:
     """The recording with these samples in place of its velocities.
 
-    Frames farther than a sample period outside the samples are cut and counted. Raises InputError where fewer than two
-    frames are left. `velocities` is whether the recording has its own, which are then reported as ignored.
+    Stamps of the samples in another unit than those of the frames are converted. Frames farther than a sample period
+    outside the samples are cut and counted. Raises InputError where fewer than two frames are left. `velocities` is
+    whether the recording has its own, which are then reported as ignored.
     """
-    imu = raw.samples
-    period = imu.period
-    inside = np.asarray((sequence.t >= imu.t[0] - period) & (sequence.t <= imu.t[-1] + period), dtype=np.bool_)
+    factor = _unit_factor(sequence.t, raw.samples.t)
+    imu = raw.samples if factor == 1.0 else replace(raw.samples, t=raw.samples.t * factor)
+    inside = _inside(sequence.t, imu.t)
     first, last, begin, end = map(float, (sequence.t[0], sequence.t[-1], imu.t[0], imu.t[-1]))
     ranges = f"the frames are from {first!r} to {last!r} s and the inertial samples from {begin!r} to {end!r} s"
     if int(inside.sum()) < MIN_FRAMES:
@@ -41,6 +48,10 @@ def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: 
             "give the samples of this recording, on its clock"
         )
     remarks, findings = [*sequence.remarks, *raw.remarks], [*sequence.findings, *raw.findings]
+    if factor != 1.0:
+        text = f"The stamps of samples are in another unit than those of the frames: multiplied by {factor:g}."
+        certainty = f"so multiplied they cover {percent(inside.mean())} of the frames"
+        findings.append(Finding("imu_time_unit", text, 1.0 / factor, 1.0, "recorded over true", certainty))
     if velocities:
         remarks.append(f"The velocities of the recording are ignored: the motion is from the samples of {source}.")
     cut = int((~inside).sum())
@@ -57,6 +68,27 @@ def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: 
         remarks=tuple(remarks),
         findings=tuple(findings),
     )
+
+
+def _inside(t: FloatArray, samples: FloatArray) -> BoolArray:
+    """Mask (T,) of the frames that are at most a sample period outside the samples (M,)."""
+    period = float(np.median(np.diff(samples)))
+    return np.asarray((t >= samples[0] - period) & (t <= samples[-1] + period), dtype=np.bool_)
+
+
+def _unit_factor(t: FloatArray, samples: FloatArray) -> float:
+    """What brings the stamps of samples (M,) to the unit of frames (T,): 1, unless only another unit fits them."""
+    if len(t) < MIN_FRAMES:
+        return 1.0
+    period = float(np.median(np.diff(samples)) / np.median(np.diff(t)))
+    covered = {
+        factor: float(_inside(t, factor * samples).mean())
+        for factor in FACTORS
+        if factor * period <= (LONGEST_PERIOD if factor == 1.0 else USUAL_PERIOD)
+    }
+    best = max(covered, key=lambda factor: covered[factor], default=1.0)
+    as_given = covered.get(1.0, 0.0)
+    return best if covered.get(best, 0.0) >= max(COVERED, 2.0 * as_given) else 1.0
 
 
 def _of_frames(sequence: Sequence, kept: BoolArray) -> Sequence:

@@ -16,11 +16,12 @@ from .stamps import Stamps, possible_units, stamps_of
 
 GYROSCOPE = re.compile(r"(w_rs_s|gyro\w*|gyr|angular_?velocity|angular_?rate|omega|w|g|rot\w*)[._]?([xyz])")
 ACCELEROMETER = re.compile(r"(a_rs_s|accel\w*|acc|linear_?acceleration|specific_?force|a|f)[._]?([xyz])")
-TIME = re.compile(r"#?\s*(time\w*|t|stamp\w*)")
+TIME = (re.compile(r"header\.stamp"), re.compile(r"[#%]?\s*(time\w*|t|stamp\w*)"))
+"""names of the time stamp, the preferred one first: in exports of ROS `%time` is when a message was recorded"""
 UNIT = re.compile(r"[\[(]([^\])]*)[\])]")
 EUROC = tuple(range(7))
 """places of stamp, angular velocity and specific force where no header names them"""
-FACTORS = {"deg": np.pi / 180.0, "°": np.pi / 180.0, "g": 9.80665, "mg": 9.80665e-3}
+FACTORS = dict.fromkeys(("deg", "degree", "degrees", "dps", "°"), np.pi / 180.0) | {"g": 9.80665, "mg": 9.80665e-3}
 """of units that a header may name, by their first word"""
 
 
@@ -74,7 +75,7 @@ def _unit(name: str) -> str:
 
 def _places(names: list[str]) -> tuple[int, ...]:
     bare = [_bare(name) for name in names]
-    places = [next((i for i, name in enumerate(bare) if TIME.fullmatch(name)), -1)]
+    places = [next((i for time in TIME for i, name in enumerate(bare) if time.fullmatch(name)), -1)]
     for sensor in (GYROSCOPE, ACCELEROMETER):
         found = {match.group(2): i for i, name in enumerate(bare) if (match := sensor.fullmatch(name))}
         places += [found.get(axis, -1) for axis in "xyz"]

@@ -8,10 +8,13 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..imu import ImuNoise, ImuSamples
-from ..plural import plural
+from ..plural import noun, plural
+from ..time_unit import lost_digits
 
 MOST_DOUBLED = 0.05
 """share of the samples that may repeat the stamp before; with more, the stamps lost their digits"""
+STRAY = 1000.0
+"""median intervals from a first stamp of exactly 0 to the next, from which on it is a stray value"""
 NO_GRAVITY = 0.35
 """m/s^2, median specific force below which nothing but noise is left of it in any unit"""
 
@@ -34,9 +37,13 @@ def imu_samples(
     kept = np.append(True, np.diff(t) != 0.0) if len(t) else np.zeros(0, dtype=np.bool_)
     doubled = int((~kept).sum())
     if doubled > max(1, MOST_DOUBLED * len(t)):
+        cause = lost_digits(t)
+        advice = f", so their digits are lost: {cause}" if cause else "; write the time of each sample, with all digits"
+        raise InputError(f"imu_time_stamps: {doubled} of {len(t)} samples repeat the stamp before{advice}")
+    if len(t) > 2 and t[0] == 0.0 and t[1] > STRAY * float(np.median(np.diff(t))):
         raise InputError(
-            f"imu_time_stamps: {doubled} of {len(t)} samples repeat the stamp before; write the time of each sample, "
-            "with all digits"
+            f"imu_time_stamps: the stamp of sample 0 is 0, while the next is {float(t[1])!r}: a value that was never "
+            "set; write its time, or remove the sample"
         )
     samples = ImuSamples(t[kept], rate[kept], force[kept], noise, gravity)
     median = float(np.median(np.linalg.norm(samples.specific_force, axis=1)))
@@ -48,5 +55,6 @@ def imu_samples(
     if not doubled:
         return samples, ()
     which = ", ".join(str(k) for k in np.flatnonzero(~kept)[:4].tolist()) + (" and more" if doubled > 4 else "")
-    text = f"{plural(doubled, 'inertial sample')} repeat the stamp before ({which}): the first of each is kept."
+    have = noun(doubled, "repeats", "repeat")
+    text = f"{plural(doubled, 'inertial sample')} {have} the stamp before ({which}): the first of each is kept."
     return samples, (Finding("doubled_samples", text, doubled, 0, "samples", "counted"),)

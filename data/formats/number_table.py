@@ -12,6 +12,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import IntArray
+from .foreign_files import require_table
 
 GZIP = b"\x1f\x8b"
 MOST_BYTES = 2**30
@@ -19,6 +20,9 @@ MOST_BYTES = 2**30
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 WINDOWS_NAN = re.compile(r"nan\([a-z]*\)", re.IGNORECASE)
+MISSING = ("", "none", "null", "na", "n/a")
+"""words that pandas, Python, JSON and R write for NaN, in lower case"""
+DATE = re.compile(r"\d{4}-\d{1,2}-\d{1,2}([T ].*)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +97,7 @@ def read_lines(file: Path) -> Lines:
         texts.append(content)
     separator = _separator(texts[0], numbers[0]) if texts else None
     if separator is not None:
-        texts = [text.removesuffix(separator).rstrip() for text in texts]
+        texts = _without_last_separator(texts, separator)
     return Lines(numbers, texts, separator, title, tuple(comments), title_line)
 
 
@@ -102,11 +106,21 @@ def split(text: str, separator: str | None) -> list[str]:
     return [word.strip(' \t"') for word in text.split(separator)]
 
 
+def _without_last_separator(texts: list[str], separator: str) -> list[str]:
+    """Lines without the separator behind their last word; where the last word is empty, its separator stays."""
+    widths = [_count(text, separator) for text in texts if not text.endswith(separator)]
+    width = max(widths, default=0)
+    return [
+        text.removesuffix(separator).rstrip() if not width or _count(text, separator) == width + 1 else text
+        for text in texts
+    ]
+
+
 def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool = False) -> NumberTable:
     """The numbers of all columns, or of some of them.
 
-    Raises InputError naming the line where it is not as wide as the first, or a word is no finite number; with `nan`
-    that one is allowed.
+    Raises InputError naming the line where it is not as wide as the first, or a word is no finite number. `nan` allows
+    NaN, also as an empty word or one of MISSING.
     """
     lines.require_some()
     width = lines.width
@@ -116,11 +130,15 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
     wanted = list(range(width)) if columns is None else list(columns)
     texts = [WINDOWS_NAN.sub("nan", text) for text in lines.text] if nan else lines.text
     try:
-        values = np.loadtxt(
-            texts, np.float64, comments=None, ndmin=2, delimiter=lines.separator, usecols=wanted, quotechar='"'
-        )
+        values = _loaded(texts, lines.separator, wanted)
     except ValueError as error:
-        raise _culprit(lines, wanted, nan=nan) from error
+        if not nan:
+            raise _culprit(lines, wanted, nan=nan) from error
+        texts = [(lines.separator or " ").join(map(_nan_if_missing, split(t, lines.separator))) for t in texts]
+        try:
+            values = _loaded(texts, lines.separator, wanted)
+        except ValueError:
+            raise _culprit(lines, wanted, nan=nan) from error
     if len(values) != len(texts) or np.isinf(values).any() or (np.isnan(values).any() and not nan):
         raise _culprit(lines, wanted, nan=nan)
     return NumberTable(values, np.array(lines.number, dtype=np.int64))
@@ -149,6 +167,7 @@ def _text(file: Path) -> str:
     content = file.read_bytes()
     if content.startswith(GZIP):
         content = _unpacked(file)
+    require_table(content)
     encoding = _encoding(content)
     try:
         return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
@@ -200,6 +219,14 @@ def _has_no_number(text: str) -> bool:
     return len(words) > 1 and not any(is_number(word) for word in words)
 
 
+def _loaded(texts: list[str], separator: str | None, columns: list[int]) -> FloatArray:
+    return np.loadtxt(texts, np.float64, comments=None, ndmin=2, delimiter=separator, usecols=columns, quotechar='"')
+
+
+def _nan_if_missing(word: str) -> str:
+    return "nan" if word.lower() in MISSING else word
+
+
 def _count(text: str, separator: str | None) -> int:
     return len(text.split()) if separator is None else text.count(separator) + 1
 
@@ -209,9 +236,11 @@ def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
     for i, number in enumerate(lines.number):
         words = lines.words(i)
         for k in columns:
-            word = words[k]
+            word = _nan_if_missing(words[k]) if nan else words[k]
             if is_number(word) and (np.isfinite(float(word)) or (nan and np.isnan(float(word)))):
                 continue
+            if DATE.fullmatch(word):
+                return InputError(f"line {number}: {_short(word)} is a date; write time stamps in seconds since 1970")
             return InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
     return InputError(f"the file is no table of {lines.width} numbers a line; check that it is the right one")
 

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..sequence import Sequence
 from ..time_unit import TimeUnit, in_seconds
-from .course import read_course
+from .course import NO_VELOCITIES, read_course
 from .ground_truth import BodyFrame, attach_truth
 from .imu_attachment import attach_imu, read_imu
 from .imu_yaml import assumed_calibration, read_imu_calibration
@@ -58,6 +58,7 @@ def read(
         sequence = replace(sequence, linear_velocity=linear, angular_velocity=angular, imu=None)
     if imu is not None:
         sequence = _with_imu(sequence, imu, imu_calibration)
+        sequence = sequence if time_unit is not None else in_seconds(sequence)
     elif imu_calibration is not None:
         raise InputError(f"imu-calibration: {shown(imu_calibration)} is given without samples; add --imu FILE")
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
@@ -67,7 +68,7 @@ def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -
     unknown = assumed_calibration("no imu-calibration is given")
     raw = read_imu(imu, unknown if calibration is None else read_imu_calibration(calibration))
     with reading(imu):
-        return attach_imu(sequence, raw, shown(imu))
+        return attach_imu(sequence, raw, shown(imu), velocities=NO_VELOCITIES not in sequence.remarks)
 
 
 def _read(file: Path, source: str, given: FloatArray | None, *, moves: bool) -> Sequence:

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
-from .columns import Columns
+from .columns import METERS, Columns
 from .kitti import kitti_poses
 from .number_table import Lines, NumberTable, numbers_of
 from .parsed_trajectory import ParsedTrajectory
@@ -43,8 +43,10 @@ def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> Parsed
         poses = kitti_poses(pose[:, :12], line)
         position, rotation = poses[:, :3, 3], poses[:, :3, :3]
         return replace(file, position=position, rotation=rotation, up=_up_of_camera(position, rotation))
-    position = pose[:, :3]
-    file = replace(file, position=position)
+    if columns.length in METERS:
+        pose = _in_meters(pose, METERS[columns.length], columns)
+        file = replace(file, remarks=(*file.remarks, f"its positions are in {columns.length} and are given in m"))
+    file = replace(file, position=pose[:, :3])
     if not columns.quaternion:
         return replace(file, remarks=(*file.remarks, "it has positions and no orientations"))
     numbers = pose[:, 3:7]
@@ -62,6 +64,18 @@ def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> Parsed
         covariance_numbers=pose[:, 7:] if columns.covariance else None,
         remarks=(*file.remarks, *_covariance_remark(columns)),
     )
+
+
+def _in_meters(pose: FloatArray, unit: float, columns: Columns) -> FloatArray:
+    """Positions and covariances (n, m) behind each other, their lengths in multiples of `unit` m, in m."""
+    scale = np.ones(pose.shape[1])
+    scale[:3] = unit
+    if len(columns.covariance) == 12:
+        scale[-6:] = unit**2
+    elif columns.covariance:
+        of_row = np.repeat([unit, 1.0], 3)
+        scale[-36:] = np.outer(of_row, of_row).reshape(-1)
+    return pose * scale
 
 
 def _known(

@@ -133,8 +133,9 @@ def _of_npz(empty: ParsedTrajectory, file: Path) -> ParsedTrajectory:
 
 
 def _is_whole(lines: Lines) -> bool:
-    word = lines.words(0)[0]
-    return word.partition(".")[0].isdecimal() and not word.partition(".")[2].strip("0")
+    """Whether every stamp in the first column is a whole number, with or without zeros behind its point."""
+    parts = [lines.words(i)[0].partition(".") for i in range(len(lines.text))]
+    return all(before.isdecimal() and not behind.strip("0") for before, _, behind in parts)
 
 
 def _require_form(form: TrajectoryFormat | None, lines: Lines, columns: Columns) -> None:

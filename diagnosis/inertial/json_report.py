@@ -18,7 +18,7 @@ def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | N
     findings = inertial_findings(found) if findings is None else findings
     imu = found.sequence.imu
     assert imu is not None
-    return header(found.sequence) | {
+    report = header(found.sequence) | {
         "imu": {
             "samples": len(imu),
             "period_s": imu.period,
@@ -31,6 +31,16 @@ def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | N
         "sensors": _sensors(found),
         "sigma": {"pixel": None if found.fit is None else found.fit.sigmas.pixel},
     }
+    return {key: _finite(value) for key, value in report.items()}
+
+
+def _finite(value: Any) -> Any:
+    """The value with None for each number in it that is not finite, which JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _start(found: InertialDiagnosis) -> dict[str, Any] | None:

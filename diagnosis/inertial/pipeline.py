@@ -30,8 +30,11 @@ MIN_BEGINNING = 5
 
 def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnosis:
     """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth."""
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnose(sequence, processes)
+    try:
+        with threadpool_limits(limits=1, user_api="blas"):
+            return _diagnose(sequence, processes)
+    except (np.linalg.LinAlgError, ValueError, FloatingPointError, RuntimeError) as error:
+        return InertialDiagnosis(sequence, sequence, f"its computation failed ({type(error).__name__}: {error})")
 
 
 def found_start(sequence: Sequence, pixel: float) -> tuple[Start, InertialPath, Odometry]:

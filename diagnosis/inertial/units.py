@@ -13,7 +13,7 @@ from ..conventions.scale_ratio import scale_ratio
 from ..odometry.stereo_odometry import Odometry
 
 DEGREE = float(np.pi / 180.0)
-RATES = {DEGREE: "°/s", 1e-3: "mrad/s"}
+RATES = {DEGREE: "°/s", 1e-3: "mrad/s", 1e-3 * DEGREE: "m°/s"}
 FORCES = {9.80665: "g", 9.80665e-3: "mg", 1e-3: "mm/s^2"}
 RATE_TOLERANCE, FORCE_TOLERANCE = 0.45, 0.18
 """of the decadic logarithm of a ratio: factors of 2.8 and 1.5"""
@@ -69,8 +69,14 @@ def imu_units(sequence: Sequence, seen: Odometry | None) -> ImuUnits:
         found = scale_ratio(seen.twist(sequence.dt)[:, 3:], mean_rates(sequence), seen.known, centered=True)
         ratio = found.ratio if found.known else np.nan
     rate = None if np.isnan(ratio) else _unit(1.0 / ratio, (1.0, *RATES), RATE_TOLERANCE)
-    if rate is None and float(np.median(np.linalg.norm(imu.angular_velocity, axis=1))) > MAX_RATE:
-        rate = DEGREE
+    median = float(np.median(np.linalg.norm(imu.angular_velocity, axis=1)))
+    if rate is None and not np.isnan(ratio):
+        raise InputError(
+            f"imu_angular_velocity: the cameras see rotations {ratio:.3g} times as large as those of the samples, "
+            f"which is none of the units rad/s, {', '.join(RATES.values())}; write rad/s"
+        )
+    if rate is None and median > MAX_RATE:
+        rate = next((unit for unit in RATES if median * unit <= MAX_RATE), None)
     return ImuUnits(1.0 if rate is None else rate, force, ratio, magnitude)
 
 

@@ -8,7 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.compare.trajectory_comparison.bodies import moved_body, with_body_recognized, with_lever_arm
+from fgbaseline.compare.trajectory_comparison.bodies import (
+    moved_body,
+    with_body_recognized,
+    with_length_unit_recognized,
+    with_lever_arm,
+)
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
@@ -89,7 +94,9 @@ def in_one_body(
             reference = moved_body(reference, se3.inverse(_required(imu_T_cam, reference)))
         if bodies[1] == "camera":
             estimates = [moved_body(each, se3.inverse(_required(imu_T_cam, each))) for each in estimates]
-    return [reference, *(with_body_recognized(reference.trajectory, each, settings) for each in estimates)]
+    path = reference.trajectory
+    estimates = [with_length_unit_recognized(path, each, settings) for each in estimates]
+    return [reference, *(with_body_recognized(path, each, settings) for each in estimates)]
 
 
 def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:

@@ -91,6 +91,13 @@ def with_nan(path: Path3D) -> str:
     return "\n".join([lines[0], middle, *lines[1:]])
 
 
+def with_empty_cells(path: Path3D) -> str:
+    """CSV of pandas with empty cells in place of NaN, between the poses and in the first line."""
+    lines = tum(path, separator=",").splitlines()
+    lost = [f"{s}.5,,,,,,," for s in (path.ns[0] // 10**9 - 2, path.ns[-1] // 10**9 + 2)]
+    return "\n".join(["t,x,y,z,qx,qy,qz,qw", lost[0], *lines, lost[1], ""])
+
+
 def repeating(path: Path3D) -> str:
     """One stamp twice, with another pose."""
     lines = tum(path).splitlines()
@@ -142,6 +149,23 @@ VARIANTS: dict[str, Variant] = {
             )
         )
     ),
+    "4Seasons": text(
+        lambda p: (
+            "# frame_id, translation_x, translation_y, translation_z, quaternion_x, quaternion_y, quaternion_z, "
+            + "quaternion_w, scale\n"
+            + rows(p.stamps("ns"), with_more(p.numbers(), ["1.0"]), ",")
+        )
+    ),
+    "ZED": text(lambda p: "timestamp,tx,ty,tz,ox,oy,oz,ow\n" + rows(p.stamps("ns"), p.numbers(), ",")),
+    "mm in the header": text(
+        lambda p: (
+            "timestamp [ns],x [mm],y [mm],z [mm],qx,qy,qz,qw\n"
+            + rows(p.stamps("ns"), [[*(repr(1e3 * float(x)) for x in n[:3]), *n[3:]] for n in p.numbers()], ",")
+        )
+    ),
+    "stamps before matrices": text(lambda p: rows(p.stamps("ns"), kitti(p), ",")),
+    "lost frames of pandas": text(with_empty_cells),
+    "lost frames of Python": text(lambda p: with_empty_cells(p).replace(",,,,,,,", ",None" * 7)),
     "rostopic": text(
         lambda p: (
             f"{ROSTOPIC}\n"

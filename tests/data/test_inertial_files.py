@@ -64,6 +64,15 @@ def test_eurocs_samples_are_read_by_their_header(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.angular_velocity, samples.angular_velocity)
 
 
+def test_an_export_of_ros_is_read_by_the_stamp_of_its_header(tmp_path: Path) -> None:
+    names = [f"field.{name}.{axis}" for name in ("angular_velocity", "linear_acceleration") for axis in "xyz"]
+    header = ",".join(["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", *names])
+    lines = [[str(int(line[0]) + 7_000_000), "3", line[0], "imu", *line[1:]] for line in rows()]
+    samples = read_imu_csv(written(tmp_path / "ros.csv", lines, header), NOISE, 9.81).samples
+    expected = read_imu_csv(written(tmp_path / "euroc.csv", rows()), NOISE, 9.81).samples
+    assert_equal(expected, samples, "imu")
+
+
 def test_units_of_a_header_are_converted(tmp_path: Path) -> None:
     header = HEADER.replace("rad s^-1", "deg s^-1")
     read = read_imu_csv(written(tmp_path / "data.csv", rows(), header), NOISE, 9.81)
@@ -193,6 +202,49 @@ def test_stamps_of_samples_follow_the_unit_of_the_frames(recording: data.Sequenc
     np.testing.assert_allclose(read.imu.t, recording.imu.t, atol=1e-12)
 
 
+STAMPS = [(1.0, 1e3), (1.0, 1e6), (1.0, 1e9), (1e3, 1e3), (1e6, 1e6), (1e9, 1e9), (1e3, 1.0), (1e9, 1.0)]
+
+
+@pytest.mark.parametrize(("of_frames", "of_samples"), STAMPS)
+@pytest.mark.parametrize("epoch", [0.0, 1_403_636_579.0])
+def test_units_of_frames_and_samples_are_found_and_reported(
+    of_frames: float, of_samples: float, epoch: float, recording: data.Sequence, tmp_path: Path
+) -> None:
+    assert recording.imu is not None
+    frames, samples = of_frames * (recording.t + epoch), of_samples * (recording.imu.t + epoch)
+    read = data.read(rewritten(recording, tmp_path / "a.npz", time_stamps=frames[None], imu_time_stamps=samples[None]))
+    assert read.imu is not None
+    assert read.n_frames == recording.n_frames
+    precision = 1e-6 if epoch else 1e-9
+    np.testing.assert_allclose(read.t - epoch, recording.t, atol=precision)
+    np.testing.assert_allclose(read.imu.t - epoch, recording.imu.t, atol=precision)
+    codes = {finding.code for finding in read.findings}
+    assert ("imu_time_unit" in codes) == (of_frames != of_samples)
+    assert ("time_unit" in codes) == (of_frames != 1.0)
+
+
+def test_slow_keyframes_beside_samples_are_in_seconds(recording: data.Sequence, tmp_path: Path) -> None:
+    assert recording.imu is not None
+    stretch = 50.0 * np.arange(recording.n_frames) / (recording.n_frames - 1)
+    samples = np.linspace(0.0, 50.0, len(recording.imu))
+    read = data.read(rewritten(recording, tmp_path / "a.npz", time_stamps=stretch[None], imu_time_stamps=samples[None]))
+    assert not read.findings
+    np.testing.assert_array_equal(read.t, stretch)
+
+
+def test_tracks_without_velocities_take_samples_from_a_file(recording: data.Sequence, tmp_path: Path) -> None:
+    with_velocities(recording, tmp_path / "t.npz")
+    with np.load(tmp_path / "t.npz") as archive:
+        arrays = {key: archive[key] for key in archive.files if not key.endswith("velocity")}
+    np.savez(tmp_path / "bare.npz", **arrays)
+    read = data.read(tmp_path / "bare.npz", imu=imu_csv(recording, tmp_path / "imu.csv"))
+    assert read.imu is not None
+    assert any("has no velocities" in remark for remark in read.remarks)
+    assert not any("are ignored" in remark for remark in read.remarks)
+    with pytest.raises(InputError, match="linear_velocity is missing"):
+        data.read(tmp_path / "bare.npz")
+
+
 def test_body_velocities_beside_samples_are_ignored_and_reported(recording: data.Sequence, tmp_path: Path) -> None:
     zero = np.zeros((3, recording.n_frames))
     read = data.read(rewritten(recording, tmp_path / "a.npz", linear_velocity=zero, angular_velocity=zero))
@@ -204,6 +256,7 @@ BAD_KEYS: dict[str, tuple[dict[str, Any], str]] = {
     "noise of zero": ({"imu_noise": np.array([0.0, 1.0, 1.0, 1.0])}, "gyroscope_density is 0.0"),
     "three densities": ({"imu_noise": np.ones(3)}, "imu_noise: expected 4 numbers"),
     "a negative gravity": ({"gravity": np.array(-9.81)}, "gravity: expected a positive number"),
+    "no stamps": ({"imu_time_stamps": None}, "imu_time_stamps is missing, the time stamps of imu_angular_velocity and"),
     "another epoch": ({"imu_time_stamps": 1e9 + np.arange(10.0)[None]}, "imu_angular_velocity: expected shape (3, 10)"),
 }
 
@@ -245,6 +298,21 @@ def test_samples_replace_the_velocities_of_tracks(recording: data.Sequence, tmp_
     assert any("are assumed" in remark for remark in read.remarks)
     with pytest.raises(InputError, match="add --imu"):
         data.read(tracks, imu_calibration=samples)
+
+
+def test_stamps_of_samples_that_cannot_be_are_refused_by_their_cause(recording: data.Sequence, tmp_path: Path) -> None:
+    assert recording.imu is not None
+    clock = recording.imu.t + 1_403_636_579.0
+    stray = np.append(0.0, clock[1:])
+    cut = np.array([float(f"{stamp:.6g}") for stamp in clock])
+    for stamps, message in (
+        (stray, "the stamp of sample 0 is 0, while the next is 1403636578"),
+        (clock.astype(np.float32).astype(np.float64), "their digits are lost: they went through a float32"),
+        (cut, "their digits are lost: "),
+    ):
+        with pytest.raises(InputError) as caught:
+            data.read(rewritten(recording, tmp_path / "a.npz", imu_time_stamps=stamps[None]))
+        assert message in str(caught.value)
 
 
 def test_frames_outside_the_samples_are_cut_and_counted(recording: data.Sequence, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fgbaseline.data.formats import write_kitti, write_trajectory_npz
+from fgbaseline.data.formats import read_trajectory, write_kitti, write_trajectory_npz
 from fgbaseline.geometry import InputError, se3
 from fgbaseline.reports.comparison import ComparisonReport, compare
 
@@ -256,6 +256,21 @@ DAMAGED = {
     "time that runs backward": (
         lambda p: "\n".join(reversed(tum(p).splitlines())), r"line 2: the time stamp .* is not after .* \(line 1\)"
     ),
+    "dates": (
+        lambda p: "time,x,y,z,qx,qy,qz,qw\n" + rows(["2014-06-24T19:02:59.5"] * len(p.ns), p.numbers(), ","),
+        "line 2: '2014-06-24T19:02:59.5' is a date; write time stamps in seconds",
+    ),
+    "numbers of frames": (
+        lambda p: rows([f"{k}.0" for k in range(len(p.ns))], p.numbers()), r"counts frames \(0, 1, \.\.\.\) and has"
+    ),
+    "JSON": (lambda _: '{"frames": [{"transform_matrix": [[1.0, 0.0]]}]}', "it is JSON"),
+    "a web page": (lambda _: "<!DOCTYPE html><html><body>404</body></html>", "it is HTML or XML"),
+    "a pointer": (lambda _: "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12\n", "git lfs pull"),
+    "g2o": (lambda p: "\n".join(f"VERTEX_SE3:QUAT {k} {' '.join(n)}" for k, n in enumerate(p.numbers())), "pose graph"),
+    "COLMAP": (
+        lambda _: "# Image list with two lines of data per image:\n#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID",
+        "it is a COLMAP file",
+    ),
     "a stray zero": (lambda p: tum(p).replace(p.stamps("s")[9], "0.0"), "line 10: the time stamp 0.0 is not after"),
 }  # fmt: skip
 
@@ -268,6 +283,35 @@ def test_damage_is_refused_by_its_cause(tmp_path: Path, case: str) -> None:
     (tmp_path / "other.txt").write_text(write(truth))
     with refused(sentence, tmp_path / "other.txt"):
         compare(tmp_path / "truth.tum", tmp_path / "other.txt")
+
+
+@pytest.mark.parametrize("per_meter", [1e3, 1e-3, 1e2])
+@pytest.mark.parametrize("oriented", [True, False])
+def test_positions_in_another_unit_than_the_references_are_reported(
+    tmp_path: Path, per_meter: float, oriented: bool
+) -> None:
+    truth = flight(9)
+    estimate = astray(truth, 9)
+    scaled = estimate.poses.copy()
+    scaled[:, :3, 3] *= per_meter
+    numbers = Path3D(estimate.ns, scaled).numbers()
+    (tmp_path / "truth.tum").write_text(tum(truth))
+    (tmp_path / "same.tum").write_text(tum(estimate))
+    (tmp_path / "other.txt").write_text(rows(truth.stamps("s"), numbers if oriented else [n[:3] for n in numbers]))
+    said = "times as large as"
+    assert any(said in sentence for sentence in compare(tmp_path / "truth.tum", tmp_path / "other.txt").verdict)
+    assert not any(said in sentence for sentence in compare(tmp_path / "truth.tum", tmp_path / "same.tum").verdict)
+    similar = compare(tmp_path / "truth.tum", tmp_path / "other.txt", align="sim3")
+    assert not any(said in sentence for sentence in similar.verdict)
+
+
+def test_one_whole_stamp_does_not_make_a_file_of_euroc(tmp_path: Path) -> None:
+    """Nor does it turn the order of quaternions between commas, which has to be shown by a straight path."""
+    straight = Path3D(tuple(10**9 + k * 10**8 for k in range(60)), np.tile(np.eye(4), (60, 1, 1)))
+    straight.poses[:, 0, 3] = np.arange(60.0)
+    (tmp_path / "a.tum").write_text(tum(straight, separator=","))
+    read = read_trajectory(tmp_path / "a.tum")
+    np.testing.assert_array_equal(read.rotation, straight.poses[:, :3, :3])
 
 
 def test_an_npz_in_nanoseconds_is_the_same_trajectory(tmp_path: Path) -> None:

@@ -174,6 +174,17 @@ def test_a_baseline_that_neither_unit_explains_is_refused(recording: data.Sequen
         diagnosis.calibrated(wrong)
 
 
+@pytest.mark.parametrize(("factor", "said"), [(1e3 * 180.0 / np.pi, "in m°/s"), (131.0 * 180.0 / np.pi, "")])
+def test_other_rates_than_those_of_a_unit_are_refused(factor: float, said: str, recording: data.Sequence) -> None:
+    assert recording.imu is not None
+    wrong = replace(recording, imu=in_units(recording.imu, 1.0 / factor, 1.0))
+    if said:
+        assert said in diagnosis.calibrated(wrong).findings[0].sentence
+        return
+    with pytest.raises(InputError, match=r"imu_angular_velocity: the cameras see rotations .* none of the units"):
+        diagnosis.calibrated(wrong)
+
+
 AXES = {
     "angular_axes": ("(-y,x,z)", np.eye(3), axes_matrix("-y,x,z")),
     "accelerometer_axes": ("opposite sign", -np.eye(3), np.eye(3)),
