@@ -27,7 +27,7 @@ import click
 
 from benchmarks.measured import Row, table
 from fgbaseline.reports.cli.main import NEW_OBJECTS
-from fgbaseline.reports.cli.recording_commands import DEFAULT_ESTIMATORS
+from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""
@@ -93,7 +93,7 @@ def rest(taken: Mapping[str, float]) -> float:
     return sum(seconds for stage, seconds in taken.items() if not stage.startswith(SOLVING))
 
 
-def rows(recording: Path, runs: int, estimators: str = DEFAULT_ESTIMATORS) -> list[Row]:
+def rows(recording: Path, runs: int, estimators: str = ",".join(DEFAULT_ESTIMATORS)) -> list[Row]:
     """What is wanted of all that is not an estimator, and each stage with its share of the whole."""
     every = measured(recording, runs, estimators)
     whole = statistics.median(sum(taken.values()) for taken in every)
@@ -116,7 +116,7 @@ def _seconds(values: list[float], whole: float) -> tuple[str, str]:
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @click.option("--runs", type=click.IntRange(min=1), default=3, show_default=True)
-@click.option("--estimators", default=DEFAULT_ESTIMATORS, show_default=True, help="Names, by commas.")
+@click.option("--estimators", default=",".join(DEFAULT_ESTIMATORS), show_default=True, help="Names, by commas.")
 @click.option("--stages", "one", is_flag=True, help="The seconds of one run in this process, as JSON.")
 def main(recording: Path, runs: int, estimators: str, one: bool) -> None:
     """Time the stages of `fgbaseline run RECORDING`."""

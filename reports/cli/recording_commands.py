@@ -5,13 +5,10 @@ from typing import Any
 
 import click
 
+from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from . import options
 from .options import PATH, Numbers
 
-DEFAULT_ESTIMATORS = "dead-reckoning,ekf,isam2,isam2-online"
-BATCH_OBSERVATIONS = 65_000
-"""observations of a problem up to which `batch` is a default too: its descent from the answer of isam2 takes less than
-a fifth of the time of isam2 (0.15 to 0.18 on the KITTI drives of 9,500 and 42,500)"""
 PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
 INTERVALS = ("after", "before", "mean")
 DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
@@ -25,8 +22,8 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.preset
 @click.option(
     "--estimators",
-    help=f"Names, separated by commas.  [default: {DEFAULT_ESTIMATORS}; up to {BATCH_OBSERVATIONS:,} observations also "
-    "batch, started at the answer of isam2 only]",
+    help=f"Names, separated by commas.  [default: {','.join(DEFAULT_ESTIMATORS)}; up to {BATCH_OBSERVATIONS:,} "
+    "observations also batch, started at the answer of isam2 only]",
 )
 @click.option(
     "--estimator",
@@ -107,8 +104,9 @@ def run(
     from ..run.problem import RunSettings
 
     functions = load_all(user_estimators)
-    asked = DEFAULT_ESTIMATORS if estimators is None else estimators
-    names = [name.strip() for name in asked.split(",") if name.strip()]
+    names = list(DEFAULT_ESTIMATORS)
+    if estimators is not None:
+        names = [name.strip() for name in estimators.split(",") if name.strip()]
     chosen = RunSettings(
         estimators=(*names, *(name for name in functions if name not in names)),
         batch_up_to=BATCH_OBSERVATIONS if estimators is None else 0,

@@ -25,8 +25,8 @@ from fgbaseline.geometry import InputError
 
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..keywords import for_python
+from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from .problem import (
-    DEFAULT_ESTIMATORS,
     RunSettings,
     build_problem,
     check_estimators,
@@ -45,7 +45,7 @@ Solver: TypeAlias = Callable[..., object]
 def run(
     recording: FilePath | Sequence | Problem | None = None,
     *,
-    estimators: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver] = DEFAULT_ESTIMATORS,
+    estimators: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver] | None = None,
     add: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike] = (),
     add_body: Literal["imu", "camera"] | None = None,
     add_time_unit: Literal["s", "ms", "us", "ns"] | None = None,
@@ -58,6 +58,13 @@ def run(
     as_recorded: bool = False,
     imu: FilePath | None = None,
     imu_calibration: FilePath | None = None,
+    velocities: FilePath | None = None,
+    extrinsic: FilePath | None = None,
+    right: FilePath | None = None,
+    calibration: FilePath | None = None,
+    times: FilePath | None = None,
+    topics: str | Iterable[str] = (),
+    settings: FilePath | None = None,
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     repairs: FilePath | None = None,
     held_out: float = 0.0,
@@ -74,7 +81,7 @@ def run(
     Args:
         recording: A file, a `Sequence` or a `Problem`; by default a simulated drive with known truth.
         estimators: Registered names, functions `solve(problem, progress=None) -> Estimate`, or "FILE:FUNCTION"; a
-            mapping names them. Functions alone run beside the default names.
+            mapping names them. Functions alone run beside the default names, which are those of the command.
         add: Trajectories beside the estimators: as those of `compare_trajectories`, aligned to the reference.
         add_body: Body whose poses they have; by default the imu.
         add_time_unit: Unit of their stamps, where a file leaves it open.
@@ -87,6 +94,13 @@ def run(
         as_recorded: No diagnosis and no repairs; the noise is assumed.
         imu: CSV of raw inertial samples, in place of the recording's velocities.
         imu_calibration: YAML of their noise; by default assumed.
+        velocities: CSV of body velocities, in place of the recording's motion.
+        extrinsic: File with imu_T_cam of the left camera, a line of 12 numbers.
+        right: Folder of the right images, where the recording is the folder of the left ones.
+        calibration: YAML of the cameras of two folders or a bag, Kalibr or OpenCV.
+        times: Stamps of the images of two folders, a line for each.
+        topics: Topics of a bag: left, right and, if any, the IMU; by default by their types.
+        settings: TOML file of the settings of the tracker.
         time_unit: Unit of the recording's stamps; by default detected.
         repairs: TOML file of user-specified repairs.
         held_out: Share of the tracks that diagnosis and estimators do not use; they rank the paths.
@@ -97,11 +111,13 @@ def run(
     Raises InputError, in one sentence, for an invalid recording or keyword. An estimator that raises an exception
     becomes a failed result; the others go on.
     """
-    names, functions = named_estimators(estimators)
-    settings = RunSettings(
+    names, functions = named_estimators(() if estimators is None else estimators)
+    is_default = estimators is None or (bool(names) and len(functions) == len(names))
+    chosen = RunSettings(
         sequence=Path(recording) if isinstance(recording, str | os.PathLike) else recording,
         preset=preset,
-        estimators=names,
+        estimators=(*DEFAULT_ESTIMATORS, *names) if is_default else names,
+        batch_up_to=BATCH_OBSERVATIONS if is_default else 0,
         features=features,
         landmarks=LandmarkMode(landmarks),
         truth=_in_memory(truth),
@@ -112,6 +128,13 @@ def run(
         held_out=held_out,
         imu=None if imu is None else Path(imu),
         imu_calibration=None if imu_calibration is None else Path(imu_calibration),
+        velocities=None if velocities is None else Path(velocities),
+        extrinsic=None if extrinsic is None else Path(extrinsic),
+        right=None if right is None else Path(right),
+        calibration=None if calibration is None else Path(calibration),
+        times=None if times is None else Path(times),
+        topics=tuple(topics.split(",")) if isinstance(topics, str) else tuple(topics),
+        tracker=None if settings is None else Path(settings),
         repairs=None if repairs is None else Path(repairs),
         functions=functions,
         add=tuple(opened(each, name=name) for name, each in by_name(add)),
@@ -119,20 +142,20 @@ def run(
         add_time_unit=add_time_unit,
         add_offset=add_offset,
     )
-    check_estimators(settings.estimators, settings.functions)
-    sequence = read_sequence(settings)
-    added = read_added(settings)
-    kept, held = hold_out_tracks(sequence, settings)
-    problem = build_problem(kept, settings, processes)
-    import_estimators(names)
-    solved = solve(problem, settings, _watch() if progress else no_progress, held, processes, added)
+    check_estimators(chosen.estimators, chosen.functions)
+    sequence = read_sequence(chosen)
+    added = read_added(chosen)
+    kept, held = hold_out_tracks(sequence, chosen)
+    problem = build_problem(kept, chosen, processes)
+    import_estimators(chosen.estimators)
+    solved = solve(problem, chosen, _watch() if progress else no_progress, held, processes, added)
     return RunReport(**{field.name: getattr(solved, field.name) for field in fields(solved)})
 
 
 def named_estimators(
     given: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver],
 ) -> tuple[tuple[str, ...], dict[str, Solver]]:
-    """All names in order, and the functions among them that are not registered; the default names before these alone.
+    """All names in order, and the functions among them that are not registered.
 
     Raises InputError for a function without a name of its own.
     """
@@ -159,8 +182,7 @@ def named_estimators(
             functions[name] = function
         elif find_estimator(name) is not function:
             raise InputError(f"estimators: '{name}' is installed already; name the function, such as {{'mine': solve}}")
-    beside = DEFAULT_ESTIMATORS if names and len(functions) == len(names) else ()
-    return (*beside, *names), functions
+    return tuple(names), functions
 
 
 def _name_of(function: Solver) -> str:

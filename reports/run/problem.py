@@ -29,6 +29,8 @@ from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units,
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
+from .defaults import DEFAULT_ESTIMATORS
+
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
 BESIDE = ("velocities", "extrinsic")
@@ -36,7 +38,6 @@ IMAGES = ("right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
 TRACKS = "tracks.npz"
 """of a run on images, in its folder"""
-DEFAULT_ESTIMATORS = ("dead-reckoning", "ekf", "isam2", "isam2-online")
 MARK = "summary.json"
 """the file that marks a run's folder"""
 

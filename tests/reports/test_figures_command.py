@@ -118,7 +118,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("compared") / "six"
     with pytest.MonkeyPatch.context() as patch:
         figures_left_out(patch)
-        six().write(place)
+        six().report(place)
     return place
 
 

@@ -23,7 +23,6 @@ from fgbaseline.reports.cli.main import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
 from fgbaseline.reports.keywords import in_python
 from fgbaseline.reports.run.api import named_estimators
-from fgbaseline.reports.run.problem import DEFAULT_ESTIMATORS
 from fgbaseline.reports.run.report import RunReport
 
 from ..builders.commands import everything_in
@@ -116,9 +115,9 @@ def test_compare_trajectories_answers_as_the_command(paths: Path, monkeypatch: p
 
 @pytest.mark.parametrize("name", ["run", "compare"])
 def test_every_option_of_the_command_is_a_keyword(name: str) -> None:
-    function, others = (fgbaseline.run, {"out", "force", "estimator", "rerun"})
+    function, others = (fgbaseline.run, {"out", "force", "open", "estimator", "rerun"})
     if name == "compare":
-        function, others = fgbaseline.compare_trajectories, {"out", "force"}
+        function, others = fgbaseline.compare_trajectories, {"out", "force", "open"}
     options = {
         option.removeprefix("--").replace("-", "_")
         for parameter in COMMANDS[name].params
@@ -197,7 +196,7 @@ def test_arrays_without_a_name_are_reference_and_estimates() -> None:
 def test_functions_run_under_their_names_beside_the_default_estimators(tmp_path: Path) -> None:
     assert named_estimators("ekf, isam2") == (("ekf", "isam2"), {})
     assert named_estimators(["ekf", mine]) == (("ekf", "mine"), {"mine": mine})
-    assert named_estimators(mine) == ((*DEFAULT_ESTIMATORS, "mine"), {"mine": mine})
+    assert named_estimators(mine) == (("mine",), {"mine": mine})
     assert named_estimators({"a": mine, "ekf": "ekf"}) == (("a", "ekf"), {"a": mine})
     assert named_estimators([ekf.joint_ekf]) == (("joint-ekf",), {})
     (tmp_path / "filters.py").write_text("def solve(problem, progress=None): ...\n")

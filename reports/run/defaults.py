@@ -1,0 +1,6 @@
+"""Estimators of a run that names none."""
+
+DEFAULT_ESTIMATORS = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+BATCH_OBSERVATIONS = 65_000
+"""observations of a problem up to which `batch` is a default too: its descent from the answer of isam2 takes less than
+a fifth of the time of isam2 (0.15 to 0.18 on the KITTI drives of 9,500 and 42,500)"""
