@@ -98,7 +98,7 @@ def render(
 
 def frames_of(images: Pictures) -> str:
     """Note on the frames whose images the page has; empty where all or none have one."""
-    return f"To keep the page small, every {images.step}th frame has its images." if images.step > 1 else ""
+    return f"To keep the page small, one frame in {images.step} has its images." if images.step > 1 else ""
 
 
 @cache
