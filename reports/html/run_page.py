@@ -109,7 +109,7 @@ def _sections(
     seen = plots is not None and plots["observations"] is not None
     frame: list[Block] = [Live("frame")]
     if images.step > 1:
-        frame.insert(0, Note(f"To keep the page small, every {images.step}th frame has its images."))
+        frame.insert(0, Note(f"To keep the page small, one frame in {images.step} has its images."))
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
         Section("behind", "What stands behind the numbers", _behind(run, plots), "Findings"),
