@@ -3,6 +3,7 @@
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -34,7 +35,11 @@ NAMES = (
 @cache
 def ten() -> Run:
     problem = plain_problem(scene())
-    return run_of(problem, *(answer(problem, name, (0.3 * i, 0.1 * i, 0.0)) for i, name in enumerate(NAMES)))
+    answers = [
+        answer(problem, name, (0.3 * i, 0.1 * i, 0.0), seconds=np.full(problem.n_frames, 1e-3 * (1 + i)))
+        for i, name in enumerate(NAMES)
+    ]
+    return run_of(problem, *answers)
 
 
 @cache

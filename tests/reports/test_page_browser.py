@@ -302,6 +302,7 @@ def test_a_run_with_little_data_is_drawn_without_warnings(chromium: Any, tmp_pat
     assert opened.said == []
     assert opened.count("#path-view .line") == 1
     assert opened.count("#path-view .here") == 0
+    assert opened.boxes("#path-view select") == []  # no reference to be offset from
     assert "12 in the problem" in opened.text(".frame-summary")
     assert opened.count('[data-side="left"] .measured') == 12
     opened.page.context.close()
