@@ -10,6 +10,7 @@ from fgbaseline.geometry import FloatArray, se3
 
 from ..statistics.chi_square import mahalanobis_squared
 from .covariance import CovarianceState, covariance_state, is_positive_definite
+from .nees import body_error
 
 NEGLIGIBLE = 1e-6
 """of the filter's own variance: below it the difference has no variance in a direction"""
@@ -55,7 +56,7 @@ def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
     k = np.flatnonzero(result.comparable)
     if estimate.covariance is None or reference.covariance is None or len(k) == 0:
         return result
-    d = se3.log(se3.inverse(estimate.world_T_imu[k]) @ reference.world_T_imu[k])
+    d = body_error(estimate, reference)[k]
     P, J = estimate.covariance[k], se3.inverse_right_jacobian(d)
     P_ref = J @ reference.covariance[k] @ np.swapaxes(J, 1, 2)
     difference, share = difference_covariance(P, P_ref), smallest_share(P, P_ref)

@@ -66,10 +66,10 @@ def drift(
     ]
     poses, truth = matched.estimate.world_T_body, reference.world_T_body
     rows = []
-    for quantity, unit, factor, what, stretch, length, said in rates:
+    for quantity, unit, factor, what, stretch, length, base in rates:
         errors = factor * relative_pose_error(poses, truth, stretch, what) / length
         mean = error_statistics(errors, confidence=confidence, repetitions=repetitions, seed=seed).loc["mean"]
-        rows.append((quantity, *mean, unit, said, len(stretch)))
+        rows.append((quantity, *mean, unit, base, len(stretch)))
     columns = ["quantity", "value", "low", "high", "unit", "over", "n"]
     return pd.DataFrame(rows, columns=columns).set_index("quantity")
 

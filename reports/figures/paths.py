@@ -94,6 +94,7 @@ def paths_side_by_side(run: RunData) -> Figure:
     figure, panels = _panels(box, -(-len(paths) // columns), columns)
     line = run.line()
     behind: list[Line2D] = []
+    ends: list[Line2D] = []
     for axes, (name, path) in zip(panels, paths.items(), strict=False):
         if name in run.landmarks:
             landmarks = run.landmarks[name][:, :2]
@@ -103,7 +104,7 @@ def paths_side_by_side(run: RunData) -> Figure:
         elif run.reference is not None and name != run.reference:
             behind = axes.plot(*paths[run.reference].T, **{**line(run.reference), "linewidth": 0.8})
         axes.plot(*path.T, **line(name))
-        _draw_ends(axes, path)
+        ends = _draw_ends(axes, path)
         axes.set_title(f"{label(name, run.reference)}{_divergence(run, name)}", color=run.colors[name])
         place = axes.get_subplotspec()
         assert place is not None
@@ -114,7 +115,7 @@ def paths_side_by_side(run: RunData) -> Figure:
     for axes in panels[len(paths) :]:
         axes.set_visible(False)
     apart = f", and the greatest distance of each from {safe_text(run.reference)}" if run.reference is not None else ""
-    title_and_legend(figure, f"Paths from above, side by side{apart}", behind)
+    title_and_legend(figure, f"Paths from above, side by side{apart}", [*behind, *ends])
     return figure
 
 

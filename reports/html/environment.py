@@ -15,7 +15,7 @@ from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..figures.style import dark_matrix
 from ..formatting import counted, number
-from ..results.metrics import TERMS
+from ..results.metric import TERMS
 from ..results.provenance import creation
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"

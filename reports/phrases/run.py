@@ -23,7 +23,7 @@ from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
 
-from ..formatting import counted, listed, number, per_cent
+from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
 from ..results.evidence import frame_ranges
 from ..results.statistics import PoseSigma
 from .evidence import (
@@ -123,7 +123,7 @@ def _maximum_divergence(run: Run) -> list[str]:
     sentences = threshold_sentences(
         "divergence",
         {
-            r.name: (divergence_threshold(r), number(divergence_summary(r.divergence)["max"]))
+            r.name: (divergence_threshold(r), resolved(divergence_summary(r.divergence)["max"], RESOLUTION))
             for r in rivals
             if r.divergence is not None
         },

@@ -15,7 +15,7 @@ from fgbaseline.compare.divergence_onset import path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.sample_sizes import insufficient_truth
 
-from ..formatting import counted, listed, number, per_cent
+from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
 from .evidence import ROUGH, no_difference
 
 
@@ -85,10 +85,10 @@ def divergence_sentences(run: Run) -> list[str]:
     if found.rmse:
         sentences += _ranked(run, rivals, found)
     elif rivals:
-        each = listed(f"{name} {number(r.divergence_rmse)} m" for name, r in rivals.items())
+        each = listed(f"{name} {resolved(r.divergence_rmse, RESOLUTION)} m" for name, r in rivals.items())
         sentences.append(f"Divergence from {run.reference} (RMSE, no frames in common, not ranked): {each}.")
     for result in known:
-        divergence = f"divergence {number(result.divergence_rmse)} m (RMSE)"
+        divergence = f"divergence {resolved(result.divergence_rmse, RESOLUTION)} m (RMSE)"
         if result.name in run.by_products:
             sentences.append(
                 f"{result.name}, a by-product of {run.reference} with pose k from data up to frame k: {divergence}."
@@ -102,7 +102,10 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     first, *others = found.rmse
 
     def each(names: Iterable[str]) -> str:
-        return listed(f"{name} {number(found.rmse[name])} m{_share(found.rmse[name], rivals[name])}" for name in names)
+        return listed(
+            f"{name} {resolved(found.rmse[name], RESOLUTION)} m{_share(found.rmse[name], rivals[name])}"
+            for name in names
+        )
 
     over = f"RMSE over a path of {number(path_length(rivals[first]))} m{_over(run, found)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]

@@ -12,7 +12,8 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..formatting import resolved
 from ..results.comparison import Summary
-from ..results.metrics import COMPARISON, MAP, SEGMENTS, Metric, Value, over_deltas, shown_in, value_at
+from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
+from ..results.metrics import over_deltas, shown_in
 from .table import Cell, Column, Row, Table, compared
 
 

@@ -15,7 +15,8 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
-from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
+from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
+from ..results.metrics import shown_in
 from ..results.run import Summary
 from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
@@ -121,7 +122,8 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
             return Cell(OVERCONFIDENT, note=mark)
         if not isfinite(value):
             return Cell(DASH, note=mark)
-        return Cell(m.text(value), first is not None and m.text(value) == m.text(first), mark)
+        marked = first is not None and m.text(value) == m.text(first) and not m.is_rounding(value)
+        return Cell(m.text(value), marked, mark)
 
     rows = tuple(
         Row(

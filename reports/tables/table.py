@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Self
 from fgbaseline.compare.limits import Better
 
 from ..formatting import interval, md, tex
-from ..results.metrics import Metric, Value
+from ..results.metric import Metric, Value
 
 UNWRAPPED = 160
 """columns of a table where no terminal says how many there are"""

@@ -40,7 +40,7 @@ def strict(text: str) -> dict[str, Any]:
     return read
 
 
-def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
+def test_a_clean_drive_exits_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], cwd=tmp_path)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "No fault detected" in result.stdout
@@ -48,7 +48,7 @@ def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) ->
     assert everything_in(tmp_path) == set()
 
 
-def test_findings_end_with_one_and_stand_in_the_table(files: dict[str, Path], tmp_path: Path) -> None:
+def test_findings_exit_with_one_and_are_in_the_table(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["biased"], "--out", "out/d", cwd=tmp_path)
     assert result.returncode == 1, result.stdout + result.stderr
     assert "angular_axes" in result.stdout
@@ -71,7 +71,7 @@ def test_findings_end_with_one_and_stand_in_the_table(files: dict[str, Path], tm
     assert "--force" in again.stderr
 
 
-def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: Path) -> None:
+def test_json_is_alone_on_standard_output(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], "--json", cwd=tmp_path)
     report = strict(result.stdout)
     assert report["schema"] == "fgbaseline/diagnosis/1"
@@ -82,7 +82,7 @@ def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: 
     assert "wrong_matches" in report["notes"]
 
 
-def test_an_undetermined_motion_ends_with_two_and_the_reason(files: dict[str, Path], tmp_path: Path) -> None:
+def test_an_undetermined_motion_exits_with_two_and_the_reason(files: dict[str, Path], tmp_path: Path) -> None:
     finished = fgbaseline("diagnose", files["blind"], cwd=tmp_path)
     assert finished.returncode == 2
     assert "the cameras determine the motion of only" in finished.stdout

@@ -17,8 +17,11 @@ from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
+from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.metrics import MAIN, shown_in
+from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.metric import MAIN
+from fgbaseline.reports.results.metrics import shown_in
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
@@ -85,6 +88,35 @@ def test_the_best_of_a_column_is_marked_and_the_reference_is_not_nearest_to_itse
     assert [row.name for row in table.rows if row.reference] == ["isam2"]
 
 
+def test_rounding_is_zero_with_its_resolution_and_never_the_best() -> None:
+    problem = plain_problem(scene())
+    drifts = {"ekf": 1e-9, "joint-ekf": 3.0, "isam2": 0.0}
+    run = run_of(problem, *(answer(problem, name, (drift, 0.0, 0.0)) for name, drift in drifts.items()))
+    table = main_table(run, as_dict(run)["estimators"])
+    at = [i for i, column in enumerate(table.columns) if column.group.startswith("divergence") and column.unit == "m"]
+    rows = {row.name: [row.cells[i] for i in at] for row in table.rows}
+    assert len(at) == 2
+    assert {(cell.text, cell.best) for cell in rows["ekf"]} == {("0 ± 1.00 × 10⁻⁶", False)}
+    assert all("10⁻⁶" not in cell.text for cell in rows["joint-ekf"])
+    sentences = " ".join(verdict(run))
+    assert "0 ± 1.00 × 10⁻⁶ m" in sentences
+    assert "10⁻⁹ m" not in sentences
+
+
+@pytest.mark.parametrize(("farthest", "logarithmic"), [(60.0, True), (6.0, False)])
+def test_a_chart_is_logarithmic_where_one_estimator_dwarfs_the_others(farthest: float, logarithmic: bool) -> None:
+    problem = plain_problem(scene())
+    drifts = {"dead-reckoning": farthest, "ekf": 3.0, "joint-ekf": 2.0, "isam2": 0.0}
+    run = run_of(problem, *(answer(problem, name, (0.0, drift, 0.0)) for name, drift in drifts.items()))
+    assert {chart["name"]: chart["log"] for chart in page_data(run)["charts"]}["divergence"] is logarithmic
+
+
+def test_bookmarks_are_in_the_order_of_time() -> None:
+    frames = [bookmark["frame"] for bookmark in page_data(standard_run())["bookmarks"]]
+    assert len(frames) >= 2
+    assert frames == sorted(frames)
+
+
 def test_nothing_is_loaded_from_anywhere() -> None:
     for tag, attributes in Elements(standard_page()).tags:
         assert tag not in ("link", "iframe", "object", "embed")
@@ -142,7 +174,7 @@ def test_only_the_script_of_the_page_itself_may_run() -> None:
     ]
 
 
-def test_what_the_plots_are_drawn_from_is_what_the_run_has() -> None:
+def test_the_plots_hold_the_data_of_the_run() -> None:
     run = standard_run()
     held = json.loads(standard_page().partition('id="run">')[2].partition("</script>")[0])
     ekf, problem = held["estimators"][1], run.problem
@@ -192,7 +224,7 @@ def test_a_run_without_observations_and_one_without_any_answer_have_their_page()
     assert "There is no reference" in rendered(nobody, with_figures=True)
 
 
-def test_what_the_mask_excluded_and_what_happened_is_counted_and_capped() -> None:
+def test_masked_observations_and_events_are_counted_and_capped() -> None:
     problem = plain_problem(scene())
     excluded = problem.excluded.copy()
     excluded[:31] = Excluded.PREDICTION

@@ -37,7 +37,7 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     assert "<li>Set by hand: velocity_scale = 1.5.</li>" in html
 
 
-def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -> None:
+def test_a_clean_recording_is_reported_as_such_and_an_undiagnosed_one_is_not() -> None:
     run = standard_run()
     assert "The recording:" not in rendered(run)
     clean = rendered(replace(run, problem=replace(run.problem, diagnosed=True)))

@@ -48,11 +48,13 @@ function thinned(line, [first, last], pixels) {
 
 const lineClass = key => `line estimator-${key}${isReference(key) ? " reference" : ""}`;
 
+const RESOLUTION = 1e-6;  // m and degrees, see formatting.py
+
 function quantity(value, unit = "") {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   let text;
-  if (size === 0) text = "0";
+  if (size === 0 || (size < RESOLUTION && (unit === "m" || unit === "°"))) text = "0";
   else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
   else if (size >= 999.5) text = Math.round(value).toLocaleString("en");
   else text = value.toPrecision(3);

@@ -1,0 +1,88 @@
+"""Legends: every line of a figure has an entry, inside the sheet, however many estimators there are."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.reports import figures
+from fgbaseline.reports.figures.run import draw_for_paper
+from fgbaseline.reports.figures.run_data import of_folder, of_run
+from fgbaseline.reports.figures.style import PAPER, in_style, label
+from fgbaseline.reports.run.folder import write_numbers
+
+from ..builders.runs import answer, run_of, scene
+from ..builders.synthetic import plain_problem
+
+NAMES = (
+    "dead-reckoning",
+    "ekf",
+    "joint-ekf",
+    "joint-ekf-first-estimate",
+    "fixed-lag",
+    "isam2",
+    "isam2-online",
+    "batch",
+    "my-filter",
+    "a-filter-with-a-long-name",
+)
+
+
+@cache
+def ten() -> Run:
+    problem = plain_problem(scene())
+    return run_of(problem, *(answer(problem, name, (0.3 * i, 0.1 * i, 0.0)) for i, name in enumerate(NAMES)))
+
+
+@cache
+def drawn_ten() -> dict[str, Figure]:
+    return figures.draw(ten())
+
+
+def assert_legend_is_whole(name: str, figure: Figure) -> None:
+    """Every labeled line has its entry, or a panel of its own, and every entry lies on the sheet."""
+    drawn = {str(line.get_label()) for axes in figure.axes for line in axes.get_lines()}
+    FigureCanvasAgg(figure).draw()
+    texts = [text for legend in figure.legends for text in legend.get_texts()]
+    entries = {text.get_text() for text in texts}
+    titles = figure.get_label() + "".join(axes.get_title(loc="left") for axes in figure.axes)
+    for text in drawn - entries:
+        assert text == "" or text.startswith("_") or text in titles, (name, text)
+    for text in texts:
+        box = text.get_window_extent()
+        assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.x1, (name, text.get_text())
+
+
+def test_on_the_screen() -> None:
+    with in_style():
+        for name, figure in drawn_ten().items():
+            assert_legend_is_whole(name, figure)
+
+
+def test_on_paper(tmp_path: Path) -> None:
+    write_numbers(ten(), tmp_path)
+    drawn = draw_for_paper(of_folder(tmp_path))
+    paths = {text.get_text() for legend in drawn["paths"][0].legends for text in legend.get_texts()}
+    assert paths >= {label(name, "isam2") for name in NAMES}
+    with in_style(PAPER):
+        for name, (figure, _) in drawn.items():
+            assert_legend_is_whole(name, figure)
+
+
+def test_estimators_with_the_same_map_of_the_image_are_side_by_side() -> None:
+    figure = drawn_ten()["image_regions"]
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
+    assert titles == [label(name, "isam2") for name in NAMES]
+    medians = of_run(ten()).observed
+    assert medians is not None
+    table = medians.classes["ekf"]
+    regions = table[table["by"] == "region"].set_index("of")["median"]
+    shown = figure.axes[1].images[0].get_array()
+    assert shown is not None
+    for row, vertical in enumerate(("top", "middle", "bottom")):
+        for column, horizontal in enumerate(("left", "middle", "right")):
+            expected = regions.get(f"{vertical} {horizontal}")
+            assert (shown[row, column] == pytest.approx(expected)) if expected is not None else shown.mask[row, column]

@@ -1,0 +1,58 @@
+"""Tables on terminals: no word, no figure and no interval is broken, however narrow the terminal."""
+
+import re
+from io import StringIO
+from typing import Any
+
+import pytest
+import rich.console
+
+from fgbaseline.reports.tables import Cell, Column, Row, Table, print_table
+
+HEADINGS = ("ATE RMSE", "divergence RMSE", "median reprojection", "claimed sigma", "reference NEES", "time")
+TEXTS = ("0.523 [0.412, 0.663]", "22.8", "1.03", "0.0536", "overconfident", "3.82")
+NAMES = ("dead-reckoning", "joint-ekf-first-estimate", "isam2-online")
+
+
+def printed(monkeypatch: pytest.MonkeyPatch, table: Table, columns: int, **how: Any) -> list[str]:
+    """Lines of a table on a terminal of so many columns."""
+    terminal = StringIO()
+    made = rich.console.Console
+    monkeypatch.setattr(
+        "rich.console.Console",
+        lambda **settings: made(**settings, file=terminal, force_terminal=True, width=columns, color_system=None),
+    )
+    print_table(table, **how)
+    return [re.sub(r"\x1b\[[0-9;]*m", "", line).rstrip() for line in terminal.getvalue().splitlines()]
+
+
+def example() -> Table:
+    rows = tuple(Row(name, (Cell("ok"), *map(Cell, TEXTS))) for name in NAMES)
+    failed = Row("mine", (), reason="its function raised ValueError: no tracks", status="failed")
+    return Table((Column("status", words=True), *(Column(h, unit="m") for h in HEADINGS)), (*rows, failed))
+
+
+@pytest.mark.parametrize("columns", [50, 80, 120, 200])
+def test_every_word_and_figure_is_whole(monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
+    lines = printed(monkeypatch, example(), columns)
+    assert max(map(len, lines)) <= columns
+    text = "\n".join(lines)
+    for figure in TEXTS:
+        assert text.count(figure) == len(NAMES)
+    for word in {word for heading in HEADINGS for word in heading.split()}:
+        assert re.search(rf"(?<![\w-]){word}(?![\w-])", text)
+    blocks = [block for block in text.split("\n\n") if "dead-reckoning" in block]
+    for block in blocks:
+        assert all(name in block for name in NAMES)
+    assert (len(blocks) == 1) == (columns >= 120)
+    assert "mine: its function raised ValueError: no tracks" in " ".join(text.split())
+
+
+def test_sentences_wrap_between_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    sentence = "Components w_y and w_z are recorded with the opposite sign, and the gyroscope has a bias at rest."
+    table = Table((Column("before"), Column("after")), (Row(sentence, (Cell("0.08 rad/s"), Cell("0.02 rad/s"))),))
+    lines = printed(monkeypatch, table, 60, spaced=True)
+    assert max(map(len, lines)) <= 60
+    names = " ".join(line[:36] for line in lines)
+    assert set(sentence.split()) <= set(names.replace("0.08", "").split())
+    assert any("0.08 rad/s" in line and "0.02 rad/s" in line for line in lines)
