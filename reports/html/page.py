@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from ..figures.style import TRUTH
 from ..phrases.evidence import FIRST
+from ..results.metric import TERMS
 from ..tables import Table
 from .environment import NO_SCRIPT, Picture, asset, environment
 from .explore import line_rules, policy, script
@@ -116,6 +117,7 @@ def render_page(page: Page) -> str:
             most=FIRST,
             sections=sections,
             css=Markup(styles),
+            glossary=TERMS if page.colors else {},
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),

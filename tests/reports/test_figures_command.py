@@ -157,7 +157,7 @@ def test_a_comparison_is_drawn_from_its_folder_as_from_memory(
     assert float(width[1]) == pytest.approx(72 * PAPER.width)
 
 
-def test_a_damaged_comparison_is_told_by_its_file(compared: Path, tmp_path: Path) -> None:
+def test_a_damaged_comparison_is_refused_by_file_name(compared: Path, tmp_path: Path) -> None:
     summary = json.loads((compared / "comparison.json").read_text())
     del summary["up"]
     (tmp_path / "comparison.json").write_text(json.dumps(summary))

@@ -197,7 +197,9 @@ def test_every_page_ends_with_date_command_line_versions_and_processor(
         "comparison": lambda: page_of(six()),
         "diagnosis": lambda: diagnosis_page.render(found_by(diagnose(drive(seconds=4.0))), {}),
     }
-    record = records(pages[kind]())
+    page = pages[kind]()
+    record = records(page)
+    assert ("glossary" in sections(page)) == (kind != "diagnosis")
     assert record["date"] == "1970-01-02 00:00:00 +0000"
     assert record["command line"] == "none: called from Python"
     assert {"python", "fgbaseline", "gtsam", "numpy", *LIBRARIES} <= record.keys()
