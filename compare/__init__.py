@@ -12,7 +12,7 @@ from .consistency.nees import body_error, nees, nees_table, sigma_ratio
 from .consistency.nis import NisSummary, nis_per_degree, nis_summary
 from .consistency.pose_sigma import PoseSigma, pose_sigma
 from .consistency.reference_nees import ReferenceNees, reference_nees
-from .consistency.state import quantity_summary, state_error, state_nees, velocity_and_bias_errors
+from .consistency.state import quantity_summary, state_error, state_nees, velocity_and_bias_errors, velocity_and_biases
 from .landmarks.dynamic_landmarks import dynamic_landmarks
 from .landmarks.map_difference import map_by_depth, map_difference
 from .residuals.cost import cost
@@ -190,6 +190,7 @@ __all__ = [
     "truth_errors",
     "used_by_all",
     "velocity_and_bias_errors",
+    "velocity_and_biases",
     "whitened_summary",
     "world_rotation_from_orientations",
     "world_rotation_from_positions",

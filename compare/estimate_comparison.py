@@ -75,6 +75,8 @@ class InertialEvidence(Displayed):
     For the columns see `compare.velocity_and_bias_errors`.
     """
 
+    values: pd.DataFrame
+    """see `compare.velocity_and_biases`"""
     errors: pd.DataFrame | None
     """from the truth as it is, the world of the sigmas"""
     aligned: pd.DataFrame | None
@@ -83,6 +85,20 @@ class InertialEvidence(Displayed):
     """from the reference; None for the reference itself"""
     nees: pd.DataFrame | None
     """of the 15 and of each block: see `compare.state_nees`"""
+
+    @property
+    def series(self) -> pd.DataFrame:
+        """All of it by frame: `velocity_x`, `truth_velocity_x` (unaligned), `divergence_velocity_x`, `nees_state`, ...
+
+        The sigmas stand beside the values alone.
+        """
+        parts = [self.values]
+        for prefix, errors in (("truth", self.errors), ("divergence", self.divergence)):
+            if errors is not None:
+                parts.append(errors[[c for c in errors if "_sigma_" not in str(c)]].add_prefix(f"{prefix}_"))
+        if self.nees is not None:
+            parts.append(self.nees.add_prefix("nees_state_").rename(columns={"nees_state_state": "nees_state"}))
+        return pd.concat(parts, axis=1)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -261,11 +277,13 @@ def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) 
 def _inertial_evidence(
     estimate: Estimate, truth: Truth | None, reference: Estimate | None, up: FloatArray
 ) -> InertialEvidence:
+    values = compare.velocity_and_biases(estimate)
     divergence = None if reference is None else compare.velocity_and_bias_errors(estimate, reference)
     if truth is None:
-        return InertialEvidence(None, None, divergence, None)
+        return InertialEvidence(values, None, None, divergence, None)
     rotation = compare.truth_alignment(estimate, truth, compare.Align.YAW, up).rotation
     return InertialEvidence(
+        values,
         compare.velocity_and_bias_errors(estimate, truth),
         compare.velocity_and_bias_errors(estimate, truth, rotation),
         divergence,

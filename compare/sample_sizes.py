@@ -10,7 +10,8 @@ from fgbaseline import compare
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
-from .estimate_comparison import Result, Run, known
+from .consistency.state import BLOCKS, QUANTITIES
+from .estimate_comparison import InertialEvidence, Result, Run, known
 
 
 def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
@@ -44,6 +45,20 @@ def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
         "map.median_sigmas": None if evidence.map is None else {"n": int(evidence.map["sigmas"].notna().sum())},
         "held_out": None if ranking is None or result.name not in ranking.index else {"n": int(ranking.attrs["n"])},
     }
+    known_ones = {key: sample for key, sample in every.items() if sample is not None}
+    return known_ones | ({} if result.inertial is None else _inertial(t, result.inertial))
+
+
+def _inertial(t: FloatArray, inertial: InertialEvidence) -> dict[str, dict[str, float]]:
+    """Frames of the velocity and the biases by their errors, and of the NEES of the state and of each block."""
+    values: dict[str, ArrayLike] = {}
+    if inertial.errors is not None and inertial.nees is not None:
+        values |= {name: inertial.errors[name] for name in QUANTITIES} | {"nees_state": inertial.nees["state"]}
+        values |= {"velocity_unaligned": inertial.errors["velocity"]}
+        values |= {f"nees_state.{name}": inertial.nees[name] for name in BLOCKS}
+    if inertial.divergence is not None:
+        values |= {f"{name}_divergence": inertial.divergence[name] for name in QUANTITIES}
+    every = {key: _of_values(t, column) for key, column in values.items()}
     return {key: sample for key, sample in every.items() if sample is not None}
 
 

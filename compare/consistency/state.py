@@ -72,19 +72,35 @@ def velocity_and_bias_errors(
     Q in `QUANTITIES`: `velocity` in m/s and world axes, `gyroscope_bias` in rad/s, `accelerometer_bias` in m/s^2, both
     in the axes of the IMU. `rotation` (3, 3), other_R_estimate, aligns the worlds. NaN where either lacks a value.
     """
-    T = len(estimate.world_T_imu)
+    table = velocity_and_biases(estimate, rotation)
     columns: dict[str, FloatArray] = {}
     for name in QUANTITIES:
-        here, there, P = getattr(estimate, name), getattr(other, name), estimate.state_covariance
-        unknown = np.full((T, 3), np.nan)
+        there = getattr(other, name)
+        each = [f"{name}_{axis}" for axis in AXES]
+        error = np.full((len(table), 3), np.nan) if there is None else table[each].to_numpy() - there
+        columns[name] = np.linalg.norm(error, axis=1)
+        columns |= dict(zip(each, error.T, strict=True))
+        columns |= {f"{name}_sigma_{axis}": table[f"{name}_sigma_{axis}"].to_numpy() for axis in AXES}
+    return pd.DataFrame(columns, index=table.index)
+
+
+def velocity_and_biases(estimate: Estimate, rotation: FloatArray | None = None) -> pd.DataFrame:
+    """Estimated velocity and biases, one row per `frame`, with the columns Q_x to Q_z and their 1-sigma Q_sigma_x to
+
+    Q_sigma_z for Q in `QUANTITIES`, in the units and axes of `velocity_and_bias_errors`; NaN for what is unknown.
+    `rotation` (3, 3), other_R_estimate, gives velocities in another world.
+    """
+    T, P = len(estimate.world_T_imu), estimate.state_covariance
+    columns: dict[str, FloatArray] = {}
+    for name in QUANTITIES:
+        value, unknown = getattr(estimate, name), np.full((T, 3), np.nan)
         variance = None if P is None else P[:, BLOCKS[name], BLOCKS[name]]
         if name == "velocity" and rotation is not None:
-            here = None if here is None else here @ rotation.T
+            value = None if value is None else value @ rotation.T
             variance = None if variance is None else rotation @ variance @ rotation.T
-        error = unknown if here is None or there is None else here - there
+        value = unknown if value is None else value
         sigma = unknown if variance is None else np.sqrt(np.maximum(np.einsum("tii->ti", variance), 0.0))
-        columns[name] = np.linalg.norm(error, axis=1)
-        columns |= {f"{name}_{axis}": error[:, i] for i, axis in enumerate(AXES)}
+        columns |= {f"{name}_{axis}": value[:, i] for i, axis in enumerate(AXES)}
         columns |= {f"{name}_sigma_{axis}": sigma[:, i] for i, axis in enumerate(AXES)}
     return pd.DataFrame(columns, index=pd.RangeIndex(T, name="frame"))
 

@@ -21,6 +21,12 @@ from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
 MIN_LANDMARKS = 10
 """of a class that has a median in sigmas: few of them have a covariance of the difference"""
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
+QUANTITIES = {
+    "velocity": ("velocity", "m/s"),
+    "gyroscope_bias": ("gyro bias", "rad/s"),
+    "accelerometer_bias": ("acc. bias", "m/s²"),
+}
+"""columns of `compare.velocity_and_bias_errors`, and how little room there is for their headings"""
 PAPER_BAND = "95 % if consistent"
 OVER_BAND, BELOW_ONE = "overconfident above the band", "overconfident below 1"
 
@@ -89,12 +95,38 @@ def three_sigma_of(
     scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
     with np.errstate(invalid="ignore"):
         sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
+    title = f"{safe_text(name)}: error in the body frame, and three sigmas (99.7 %)"
+    return _between_three_sigmas(
+        title, t, dict(zip(AXES, zip((scale * error).T, sigma.T, strict=True), strict=True)), look
+    )
+
+
+def velocity_and_biases(run: RunData, name: str) -> Figure | None:
+    """Unaligned errors of velocity and biases between three sigmas; None without covariance or truth of any."""
+    series = run.series[name]
+    shown = {
+        f"{heading} {axis}, {unit}": tuple(
+            series[column].to_numpy(dtype=np.float64) for column in (f"truth_{q}_{axis}", f"{q}_sigma_{axis}")
+        )
+        for q, (heading, unit) in QUANTITIES.items()
+        for axis in "xyz"
+        if f"truth_{q}" in series and series[f"truth_{q}"].notna().any() and series[f"{q}_sigma_x"].notna().any()
+    }
+    if not shown:
+        return None
+    title = f"{safe_text(name)}: unaligned errors of velocity and biases, and three sigmas (99.7 %)"
+    return _between_three_sigmas(title, run.t, shown, run.line()(name))
+
+
+def _between_three_sigmas(
+    title: str, t: FloatArray, shown: Mapping[str, tuple[FloatArray, ...]], look: Mapping[str, Any]
+) -> Figure:
+    """Columns of three panels, each with an error (n,) and its sigma (n,) by heading."""
     figure = Figure(figsize=(SCREEN.width, 5.4))
-    panels = figure.subplots(3, 2, sharex=True)
+    panels = figure.subplots(3, len(shown) // 3, sharex=True, squeeze=False)
     handles: list[Any] = []
-    for i, axis in enumerate(AXES):
+    for i, (axis, (e, s)) in enumerate(shown.items()):
         panel = panels[i % 3, i // 3]
-        e, s = scale[i] * error[:, i], sigma[:, i]
         band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="three sigmas")
         drawn = panel.plot(t, e, **{**look, "linewidth": 1.0, "label": "error"})
         panel.set_ylim(-(reach := _reach(e, s)), reach)
@@ -105,7 +137,7 @@ def three_sigma_of(
     for panel in panels[-1]:
         panel.set_xlim(float(t[0]), float(t[-1]))
         panel.set_xlabel("time, s")
-    title_and_legend(figure, f"{safe_text(name)}: error in the body frame, and three sigmas (99.7 %)", handles)
+    title_and_legend(figure, title, handles)
     return figure
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data.parallel import background_map
 
-from .evidence import consistency, held_out, map_difference, nees, three_sigma
+from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
 from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
 from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
@@ -76,7 +76,8 @@ def draw(run: "Run") -> dict[str, Figure]:
 
     `paths_overlaid`, `paths_side_by_side`, `path_NAME` for each estimator that answered, then those over time that
     have something to show: `error_to_truth` and `nees` need truth, the reprojections need observations. Last the
-    `three_sigma_NAME` of each that has covariances, where there is truth.
+    `three_sigma_NAME` of each that has covariances, where there is truth, and its `velocity_and_biases_NAME` where it
+    has them.
     """
     with in_style():
         drawn = {name: draw_one() for name, draw_one in figure_functions(of_run(run)).items()}
@@ -96,7 +97,10 @@ def figure_functions(run: RunData) -> dict[str, Callable[[], Figure | None]]:
     }
     paths = {f"path_{name}": partial(path_with_landmarks, run, name) for name in run.names}
     over_time = {draw_one.__name__: partial(draw_one, run) for draw_one in OVER_TIME}
-    bands = {f"three_sigma_{name}": partial(three_sigma, run, name) for name in run.names}
+    bands: dict[str, Callable[[], Figure | None]] = {}
+    for name in run.names:
+        bands |= {f"three_sigma_{name}": partial(three_sigma, run, name)}
+        bands |= {f"velocity_and_biases_{name}": partial(velocity_and_biases, run, name)}
     return {**overlaid, **paths, **over_time, **bands}
 
 

@@ -150,6 +150,8 @@ def _series(result: "Result", n_frames: int) -> pd.DataFrame:
         columns["nees_reference"] = evidence.difference.nees
     if estimate.innovations is not None:
         columns |= {"nis_per_row": evidence.nis_per_degree, "nis_degrees": estimate.innovations.degrees}
+    if result.inertial is not None:
+        columns |= {str(name): values.to_numpy() for name, values in result.inertial.series.items()}
     columns["seconds"] = estimate.seconds if len(estimate.seconds) == n_frames else np.full(n_frames, np.nan)
     return pd.DataFrame(columns)
 

@@ -15,7 +15,7 @@ from fgbaseline.reports.figures import EncodedFigure, encoded
 
 from ..figures.style import dark_matrix
 from ..formatting import counted, number
-from ..results.metric import TERMS
+from ..results.metric import INERTIAL_TERMS, TERMS
 from ..results.provenance import creation
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -92,6 +92,7 @@ def environment() -> Environment:
     jinja.filters |= {"number": number, "counted": counted, "flattened": flattened, "anchor": anchor}
     jinja.globals |= {"dark_matrix": " ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3]))}
     jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
+    jinja.globals |= {"terms": {term: text for term, text in TERMS.items() if term not in INERTIAL_TERMS}}
     jinja.globals |= {"classes": {}, "creation": creation}
     return jinja
 

@@ -99,6 +99,8 @@ class Page:
     """of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
     plots: Mapping[str, Any] | None = None
     """see `plot_data`"""
+    terms: Mapping[str, str] | None = None
+    """of the glossary; None for those of every page"""
     still_paths: Picture | None = None
     """in place of the paths where no script runs"""
 
@@ -121,6 +123,7 @@ def render_page(page: Page) -> str:
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
+            **({} if page.terms is None else {"terms": page.terms}),
             **({} if plots is None else _interactive(plots)),
         )
     )

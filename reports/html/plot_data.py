@@ -17,6 +17,7 @@ from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.strapdown import STATE
 from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, moving_sum
 from fgbaseline.reports.tables.run import REASONS
 
@@ -80,9 +81,10 @@ Lines = Mapping[str, FloatArray]
 def charts(run: Run) -> list[dict[str, Any]]:
     """The charts in their order: `name`, `title`, `unit`, `hint`, `log`, `band`, `middle`, `group` and `lines`.
 
-    `lines` has (T,) values by the number of the estimator in the run, as text.
+    `lines` has (T,) values by the number of the estimator in the run, as text; `bounds`, where there are any, how far
+    the band around such a line reaches to either side.
     """
-    drawn = [*_errors(run), *_pixels(run), *_consistency(run), *_cost(run)]
+    drawn = [*_errors(run), *_velocity_and_biases(run), *_pixels(run), *_consistency(run), *_cost(run)]
     return [one for one in drawn if one is not None]
 
 
@@ -101,6 +103,31 @@ def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
     yield chart(group, "height", "Height above the start", "m", {**_numbered(run, heights), **along})
 
 
+def _velocity_and_biases(run: Run) -> Iterable[dict[str, Any] | None]:
+    """Charts of a run on raw inertial data; none without."""
+    inertial = {r.name: r.inertial for r in run.answered if r.inertial is not None}
+    group, truth = "Velocity and biases", run.problem.sequence.truth
+    errors = {name: each.errors["velocity"].to_numpy() for name, each in inertial.items() if each.errors is not None}
+    yield chart(group, "velocity", "Unaligned velocity error", "m/s", _numbered(run, errors))
+    away = {
+        name: each.divergence["velocity"].to_numpy() for name, each in inertial.items() if each.divergence is not None
+    }
+    yield chart(group, "velocity-divergence", f"Velocity from {run.reference}, unaligned", "m/s", _numbered(run, away))
+    hint = "the estimates, and three of their sigmas to either side"
+    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s²")):
+        true = None if truth is None else getattr(truth, name)
+        for i, axis in enumerate("xyz"):
+            values = _numbered(run, {key: each.values[f"{name}_{axis}"].to_numpy() for key, each in inertial.items()})
+            sigmas = _numbered(
+                run, {key: each.values[f"{name}_sigma_{axis}"].to_numpy() for key, each in inertial.items()}
+            )
+            bounds = {key: floats(3.0 * sigma) for key, sigma in sigmas.items() if np.isfinite(sigma).any()}
+            lines = {**values, **({} if true is None else {TRUTH_LINE: true[:, i]})}
+            title = f"{name.replace('_', ' ').capitalize()}, {axis}"
+            key = f"{name.replace('_', '-')}-{axis}"
+            yield chart(group, key, title, unit, lines, hint=hint, bounds=bounds, log=False)
+
+
 def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
     medians = {r.name: _by_frame(run, r) for r in run.answered if len(r.reprojection)}
     title = "Median reprojection error by frame"
@@ -116,6 +143,12 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
     title = f"Reference NEES, to {run.reference}"
     yield chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
+    whole = {
+        r.name: r.inertial.nees["state"].to_numpy() for r in run.answered if r.inertial and r.inertial.nees is not None
+    }
+    dof = float(STATE)
+    state = {"log": True, "band": tuple(map(float, chi_square_bounds(dof))), "middle": dof, "hint": expected}
+    yield chart(group, "nees-state", "NEES of the state", "", _numbered(run, whole), **state)
     band = _innovation_band(run)
     nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
     innovations = "NIS per row"

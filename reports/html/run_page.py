@@ -13,6 +13,7 @@ from ..figures.style import colors
 from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
+from ..results.metric import TERMS
 from ..tables import Table
 from ..tables import run as tables
 from .environment import Picture, picture
@@ -23,7 +24,8 @@ PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
 MARKUP_BYTES = 500_000
 """of tables, style and script, generously"""
-EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "image_regions", "map_difference")
+BAND_FIGURES = ("three_sigma_", "velocity_and_biases_")
+EVIDENCE_FIGURES = ("held_out", *BAND_FIGURES, "reprojection_classes", "image_regions", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_distribution",)
 """figures that stand beside the interactive charts, because they show what these do not; the others are folded away"""
@@ -66,6 +68,7 @@ def render(
             settings={"Recording": recording, "Settings": summary["settings"]},
             colors=colors(run.results, run.reference),
             plots=plots,
+            terms=None if run.problem.imu is None else TERMS,
             still_paths=pictures.get("paths_overlaid"),
         )
     )
@@ -96,7 +99,7 @@ def _sections(
     estimators = summary["estimators"]
     evidence, components = tables.evidence_table(run, estimators), tables.components_table(estimators)
     excluded, events = tables.exclusions_table(summary), tables.events_tables(run)
-    bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
+    bands = [p for name, p in pictures.items() if name.startswith(BAND_FIGURES)]
     stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
         Grid(evidence),

@@ -27,6 +27,7 @@ from .evidence import (
     evidence_notes,
     summarize_evidence,
 )
+from .inertial import QuantityDivergence, QuantityError, StateNees, inertial_notes, summarize_inertial
 from .metrics import MEASURED, NOT_MEASURED, measured, with_measured
 from .statistics import INFINITE, Divergence, Number, Part, PoseSigma, Reprojection, Spread, nulls
 
@@ -106,6 +107,19 @@ class EstimatorSummary(Part):
     ]
 
 
+class InertialEstimatorSummary(EstimatorSummary):
+    """One estimator of a run on raw inertial data."""
+
+    velocity: Annotated[QuantityError | None, Field(description="error after alignment in yaw and position, m/s")]
+    velocity_unaligned: Annotated[QuantityError | None, Field(description="error without alignment, m/s")]
+    gyroscope_bias: Annotated[QuantityError | None, Field(description="error, rad/s")]
+    accelerometer_bias: Annotated[QuantityError | None, Field(description="error, m/s^2")]
+    velocity_divergence: Annotated[QuantityDivergence | None, Field(description="from the reference, unaligned, m/s")]
+    gyroscope_bias_divergence: Annotated[QuantityDivergence | None, Field(description="from the reference, rad/s")]
+    accelerometer_bias_divergence: Annotated[QuantityDivergence | None, Field(description="from the reference, m/s^2")]
+    nees_state: StateNees | None
+
+
 TOO_FEW = "it has too few common frames with the other estimators to be ranked"
 
 
@@ -130,6 +144,7 @@ def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
         "truth": None if result.truth is None else _truth_count(result.truth),
         **measured(run, result),
         **summarize_evidence(run, result),
+        **({} if run.problem.imu is None else summarize_inertial(result)),
         "landmarks": len(estimate.landmarks),
         "observations": {"offered": offered, "used": used, "share": used / offered if offered else math.nan},
         "samples": samples(run, result) if result.answered else {},
@@ -166,6 +181,7 @@ def _notes(run: Run, result: Result, absent: Iterable[tuple[str, bool]]) -> dict
         "ate_unaligned.rotation_final_deg": last,
         "truth": "the recording has no ground truth",
         **evidence_notes(run, result),
+        **({} if run.problem.imu is None else inertial_notes(run, result)),
         **{metric.key: metric.absent for metric in MEASURED},
         "observations.share": "the problem has no observations",
     }

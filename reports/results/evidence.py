@@ -165,13 +165,13 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
 
 
 def _nees(table: pd.DataFrame) -> dict[str, float | int]:
-    position, rotation = (_statistics(table[part].to_numpy())["mean"] for part in ("position", "rotation"))
-    return {**_statistics(table["pose"].to_numpy()), "position_mean": position, "rotation_mean": rotation}
+    position, rotation = (statistics_of(table[part].to_numpy())["mean"] for part in ("position", "rotation"))
+    return {**statistics_of(table["pose"].to_numpy()), "position_mean": position, "rotation_mean": rotation}
 
 
 def _difference(difference: compare.ReferenceNees) -> dict[str, float | int]:
     return {
-        **_statistics(difference.nees),
+        **statistics_of(difference.nees),
         "left_out": int(difference.left_out.sum()),
         "overconfident": int(difference.overconfident.sum()),
     }
@@ -183,12 +183,13 @@ def summarize_sigma(sigma: compare.PoseSigma) -> dict[str, float] | None:
     return values if math.isfinite(sigma.position_rmse) else None
 
 
-def _statistics(nees: FloatArray) -> dict[str, float | int]:
+def statistics_of(nees: FloatArray, degrees: float = 6.0) -> dict[str, float | int]:
+    """Mean, median, share inside the 95 % bounds and number of the frames of a NEES (T,) with so many degrees."""
     known = nees[~np.isnan(nees)]
     return {
         "mean": float(np.mean(known)) if len(known) else math.nan,
         "median": float(np.median(known)) if len(known) else math.nan,
-        "inside_95": share_inside_bounds(known, 6.0),
+        "inside_95": share_inside_bounds(known, degrees),
         "frames": len(known),
     }
 

@@ -16,6 +16,7 @@ from fgbaseline.compare import time_coverage
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.limits import Better
 
+from .inertial_metrics import BLOCK_NEES, MAIN_STATE_NEES, VELOCITY_AND_BIASES
 from .metric import (
     ATE,
     BENCH,
@@ -120,10 +121,12 @@ METRICS = (
     Metric(("divergence", "max"), DIVERGENCE, "max", "m", LOWER, MAIN),
     Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, EVIDENCE),
     Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    *VELOCITY_AND_BIASES,
     Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed 1-sigma"),
     Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),
     Metric(("sigma_ratio", "position"), CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
     Metric(("nees", "median"), CONSISTENCY, "NEES", tables=MAIN, term=NEES, absent="no positive definite covariance"),
+    *MAIN_STATE_NEES,
     Metric(
         ("nees_reference", "median"),
         CONSISTENCY,
@@ -213,6 +216,7 @@ METRICS = (
     Metric(("held_out", "behind"), HELD_OUT, "above the best", "px", tables=EVIDENCE),
     Metric(("held_out", "behind_low"), HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
     Metric(("nees", "mean"), NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
+    *BLOCK_NEES,
     Metric(("nees_reference", "mean"), REFERENCE_NEES, "mean", tables=EVIDENCE),
     Metric(("nees_reference", "left_out"), REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
     Metric(("nis", "per_degree"), CONSISTENCY, "NIS per row", tables=EVIDENCE, term="NIS per row"),

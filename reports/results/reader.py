@@ -27,11 +27,15 @@ COMPARISON = "comparison.json"
 TRUTH = "truth.tum"
 BASELINE = "fgbaseline/baseline/1"
 NO_SUCH_METRIC = "it has no such metric"
+NOT_INERTIAL = "the run has no raw inertial data"
 DIGITS = 5
 """significant ones, of a baseline: what lies beyond differs between processors and libraries"""
 NO_METRICS = frozenset({"status", "reason", "notes", "events"})
 """keys of an estimator beside its metrics (a kind of event that did not occur is not even a zero)"""
-ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"})
+DIVERGENCES = frozenset(f"{name}_divergence" for name in ("velocity", "gyroscope_bias", "accelerometer_bias"))
+INERTIAL = DIVERGENCES | {"velocity", "velocity_unaligned", "gyroscope_bias", "accelerometer_bias", "nees_state"}
+"""keys that an estimator has only in a run on raw inertial data"""
+ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"}) | DIVERGENCES
 """metrics that are measured from the reference"""
 
 
@@ -237,9 +241,16 @@ def missing_in(estimator: Mapping[str, Any], metric: str) -> int:
 
 
 def has_metric(estimator: Mapping[str, Any], metric: str) -> bool:
-    """Whether a path leads to a number, or to where one is missing: a null at its end or on the way."""
+    """Whether a path leads to a number, or to where one is missing: a null at its end or on the way.
+
+    What only runs on raw inertial data have is missing in the others.
+    """
     found = _at(estimator, metric)
-    return found is None or (isinstance(found, int | float) and not isinstance(found, bool))
+    return (
+        found is None
+        or is_inertial_in_other_run(estimator, metric)
+        or (isinstance(found, int | float) and not isinstance(found, bool))
+    )
 
 
 def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, str]:
@@ -247,6 +258,8 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     if (reason := failure(estimator)) is not None:
         return None, reason
     found = _at(estimator, metric)
+    if is_inertial_in_other_run(estimator, metric):
+        return None, NOT_INERTIAL
     if found is _ABSENT:
         return None, NO_SUCH_METRIC
     if is_finite_number(found):
@@ -256,6 +269,12 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     notes = estimator.get("notes") or {}
     keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
     return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")
+
+
+def is_inertial_in_other_run(estimator: Mapping[str, Any], metric: str) -> bool:
+    """Whether a metric needs raw inertial data, which the run did not have."""
+    first = metric.partition(".")[0]
+    return first in INERTIAL and first not in estimator
 
 
 def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] | None:

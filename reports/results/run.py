@@ -13,7 +13,7 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
-from .estimator import EstimatorSummary, summarize_estimator
+from .estimator import EstimatorSummary, InertialEstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
 from .provenance import machine, versions
 from .statistics import Number, Part, PoseSigma, finite
@@ -112,7 +112,7 @@ class Summary(Part):
     problem: ProblemSummary
     reference: ReferenceSummary
     held_out: Annotated[HeldOutSummary | None, Field(description="null where no tracks were held out")]
-    estimators: dict[str, EstimatorSummary]
+    estimators: dict[str, InertialEstimatorSummary | EstimatorSummary]
     added: Annotated[
         dict[str, str],
         Field(default_factory=dict, description="trajectories from files among the estimators: pairing and alignment"),

@@ -104,7 +104,10 @@ def _write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:
 
 
 def _series(run: Run, result: Result) -> pd.DataFrame:
-    """One row per frame: time stamp, divergence, error to truth, reprojection, NEES and seconds spent."""
+    """One row per frame: time stamp, divergence, error to truth, reprojection, NEES and seconds spent.
+
+    With raw inertial data also velocity and biases: see `InertialEvidence.series`.
+    """
     T = run.problem.n_frames
     stamps = [repr(t) for t in run.problem.sequence.t.tolist()]  # in full: nine digits of a Unix time are seconds
     table = pd.DataFrame({"t": stamps}, index=pd.RangeIndex(T, name="frame"))
@@ -113,6 +116,8 @@ def _series(run: Run, result: Result) -> pd.DataFrame:
             table = table.join(errors.add_prefix(f"{prefix}_"))
     table = table.join(reprojection_by(result.reprojection, "frame").add_prefix("reprojection_"))
     table = table.join(_consistency(result))
+    if result.inertial is not None:
+        table = table.join(result.inertial.series)
     table["seconds"] = result.estimate.seconds if len(result.estimate.seconds) == T else np.nan
     return table
 

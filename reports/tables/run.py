@@ -17,6 +17,7 @@ from fgbaseline.data.finding import Finding
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
 from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import shown_in
+from ..results.reader import DIVERGENCES, INERTIAL
 from ..results.run import Summary
 from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
@@ -78,7 +79,9 @@ def evidence_table(run: Run, estimators: Estimators) -> Table:
 
 def terminal_table(estimators: Estimators, reference: str | None) -> Table:
     """The few figures of every estimator that a terminal has room for."""
-    metrics = [m for m in shown_in(TERMINAL) if m.path[0] != "ate" or any(at(e, "ate") for e in estimators.values())]
+    needed = {"ate", *INERTIAL}
+    there = {key for e in estimators.values() for key in needed if at(e, key)}
+    metrics = [m for m in shown_in(TERMINAL) if m.path[0] not in needed or m.path[0] in there]
     if len({e["coverage"] for e in estimators.values()}) == 1:
         metrics = [metric for metric in metrics if not metric.uneven_only]
     rows = []
@@ -181,7 +184,8 @@ def _stands_for(run: Run, name: str, estimator: Mapping[str, Any], metric: Metri
 
 
 def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
-    return set(answered) - ({run.reference, *run.unranked} if metric.group in (DIVERGENCE, MAP) else set())
+    is_divergence = metric.group in (DIVERGENCE, MAP) or metric.path[0] in DIVERGENCES
+    return set(answered) - ({run.reference, *run.unranked} if is_divergence else set())
 
 
 def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:

@@ -42,13 +42,13 @@ def leads_to_a_number(schema: dict[str, Any], model: str, path: tuple[str, ...])
 def test_the_path_of_a_metric_leads_to_a_figure(metric: Metric) -> None:
     assert metric.tables or metric.name
     if metric.tables & NOT_OF_A_COMPARISON:
-        assert leads_to_a_number(Summary.model_json_schema(), "EstimatorSummary", metric.path)
+        assert leads_to_a_number(Summary.model_json_schema(), "InertialEstimatorSummary", metric.path)
     if metric.tables & COMPARISON:
         assert leads_to_a_number(Comparison.model_json_schema(), "EstimateSummary", metric.path)
 
 
 def test_a_path_that_leads_nowhere_is_noticed() -> None:
-    assert not leads_to_a_number(Summary.model_json_schema(), "EstimatorSummary", ("divergence", "rsme"))
+    assert not leads_to_a_number(Summary.model_json_schema(), "InertialEstimatorSummary", ("divergence", "rsme"))
 
 
 def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -75,6 +75,7 @@ class TimeChart {
       high = Math.max(high, value);
     };
     this.shown().forEach(([, line]) => line.subarray(first, last + 1).forEach(take));
+    this.narrowest(first, last).forEach(take);
     if (this.chart.band) this.chart.band.forEach(take);
     if (this.chart.middle !== null) take(this.chart.middle);
     if (low > high) return this.log ? [0.1, 10] : [0, 1];
@@ -82,9 +83,24 @@ class TimeChart {
       low = Math.max(low, high * 1e-6);
       return low === high ? [low / 2, high * 2] : [low / 1.15, high * 1.15];
     }
-    if (low >= 0) low = 0;
+    if (low >= 0 && this.chart.bounds.size === 0) low = 0;
     const more = 0.04 * (high - low) || 1;
     return [low < 0 ? low - more : low, high + more];
+  }
+
+  // Ends of the band around a line that reaches least far, which is to be seen as a whole; the others may be cut off.
+  narrowest(first, last) {
+    const ends = this.shown().filter(([key]) => this.chart.bounds.has(key)).map(([key, line]) => {
+      const bound = this.chart.bounds.get(key);
+      let [low, high] = [Infinity, -Infinity];
+      for (let k = first; k <= last; k++) {
+        if (!Number.isFinite(line[k] + bound[k])) continue;
+        low = Math.min(low, line[k] - bound[k]);
+        high = Math.max(high, line[k] + bound[k]);
+      }
+      return [low, high];
+    }).filter(([low, high]) => low <= high);
+    return ends.sort((a, b) => a[1] - a[0] - b[1] + b[0])[0] || [];
   }
 
   timeAt(x) {
@@ -132,6 +148,12 @@ class TimeChart {
     const view = svg("svg", { ...inner, y: 0, height: HEIGHT, viewBox: `${ROOM.left} 0 ${inner.width} ${HEIGHT}` });
     for (const [key, line] of this.shown()) {
       const chosenFrames = thinned(line, frames, 2 * inner.width);
+      const bound = this.chart.bounds.get(key);
+      if (bound && !this.log) {
+        const around = chosenFrames.filter(k => Number.isFinite(line[k] + bound[k]));
+        const edge = sign => around.map(k => `${bounded(this.x(seconds[k]))} ${bounded(y(line[k] + sign * bound[k]))}`);
+        view.append(svg("polygon", { class: "bounds estimator-" + key, points: [...edge(1), ...edge(-1).reverse()].join(" ") }));
+      }
       const d = polyline(chosenFrames.length, i => {
         const k = chosenFrames[i];
         return Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null;

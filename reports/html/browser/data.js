@@ -32,9 +32,11 @@ run.estimators.forEach((estimator, i) => {
 });
 if (run.truth) trajectories.set(TRUTH, { key: TRUTH, name: "truth", path: floats(run.truth) });
 
+const unpacked = texts => new Map(Object.entries(texts).map(([key, text]) => [key, floats(text)]));
 const charts = run.charts.map(chart => ({
   ...chart,
-  lines: new Map(Object.entries(chart.lines).map(([key, text]) => [key, floats(text)])),
+  lines: unpacked(chart.lines),
+  bounds: unpacked(chart.bounds || {}),
 }));
 
 const observations = run.observations && {
