@@ -23,6 +23,7 @@ from fgbaseline.reports.cli.main import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
 from fgbaseline.reports.keywords import in_python
 from fgbaseline.reports.run.api import named_estimators
+from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 from fgbaseline.reports.run.report import RunReport
 
 from ..builders.commands import everything_in
@@ -193,7 +194,12 @@ def test_arrays_without_a_name_are_reference_and_estimates() -> None:
     assert [found.reference.name, *found.results] == ["reference", "estimate", "estimate-2"]
 
 
-def test_functions_run_under_their_names_beside_the_default_estimators(tmp_path: Path) -> None:
+def test_functions_alone_run_beside_the_defaults_of_the_command(sequence: Sequence) -> None:
+    found = fgbaseline.run(sequence, estimators=[mine], as_recorded=True)
+    assert list(found.results) == [*DEFAULT_ESTIMATORS, "mine", "batch"]
+
+
+def test_functions_run_under_their_names(tmp_path: Path) -> None:
     assert named_estimators("ekf, isam2") == (("ekf", "isam2"), {})
     assert named_estimators(["ekf", mine]) == (("ekf", "mine"), {"mine": mine})
     assert named_estimators(mine) == (("mine",), {"mine": mine})
