@@ -18,8 +18,6 @@ from .result import Diagnosis
 
 MIN_INTERVALS = 20
 """with a motion from odometry"""
-SURE_SHIFT = 2.0
-"""standard errors from a usual shift, beyond which another one is used; `time_delay.INFLATION` is in them already"""
 SNAP = 0.15
 """intervals: a shift this near to a usual one (`Shift`) is taken for it"""
 
@@ -75,7 +73,7 @@ def calibrate_with_axes(
                 return half_cost(sequence, seen_by_cameras, twist(shift), white, processes)
 
             when = integer_delay(cost, dt) or when
-    found = _usual(when.shift / dt, when.deviation / dt) if when.identifiable else float(Shift.AFTER)
+    found = _usual(when.shift / dt) if when.identifiable else float(Shift.AFTER)
     shift = found if given_shift is None else given_shift
     if fit is None or shift != Shift.AFTER:
         fit = fit_windows(sequence, seen_by_cameras, twist(shift), processes)
@@ -83,9 +81,6 @@ def calibrate_with_axes(
     return Diagnosis(sequence, reason, seen_by_cameras, angular, linear, when, shift, fit, copies)
 
 
-def _usual(shift: float, deviation: float) -> float:
-    """The usual shift that is near, or within the error; else the shift itself. All in intervals."""
+def _usual(shift: float) -> float:
     nearest = min(Shift, key=lambda usual: abs(shift - usual))
-    if abs(shift - nearest) < SNAP:
-        return float(nearest)
-    return next((float(usual) for usual in Shift if abs(shift - usual) <= SURE_SHIFT * deviation), shift)
+    return float(nearest) if abs(shift - nearest) < SNAP else shift

@@ -13,15 +13,15 @@ from fgbaseline.geometry import FloatArray
 from ..conventions.axes import Axes
 from ..conventions.units import LABELS, NAMES, unit_findings
 from ..estimation.result import Diagnosis
-from ..estimation.velocity_calibration import SURE_SHIFT
-from ..noise.calibration_fit import SIGNIFICANT
-from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
+from ..repairs.significance import SIGNIFICANT, significant_bias, significant_misalignment, significant_offset
 from .phrases import listed, vector
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
 
 MIN_SCALE = 0.02
 """share by which velocities and stereo must disagree"""
+SURE_SHIFT = 2.0
+"""standard errors from both usual shifts; `time_delay.INFLATION` is in the standard error already"""
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
 """intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)

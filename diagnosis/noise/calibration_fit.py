@@ -21,10 +21,6 @@ FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
 """px, baselines/s and rad/s: no noise is less"""
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
-EFFICIENCY = 0.37
-"""of a variance from a median, in degrees of freedom of one from all residuals"""
-SIGNIFICANT = 4.0
-"""standard errors, from which on an estimate is significant"""
 MIN_REDUNDANCY = 0.05
 """of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
 its residual is no evidence of noise"""
@@ -39,11 +35,7 @@ class CalibrationFit:
     shared: FloatArray
     """(8,) see `residuals.SHARED`"""
     deviation: FloatArray
-    """(8,) standard errors, from the spread between windows where that is larger than the formal ones
-
-    They are widened for the few residuals from which short recordings estimate the noise (Student's t): SIGNIFICANT of
-    them are as improbable as in a long recording.
-    """
+    """(8,) standard errors, from the spread between windows where that is larger than the formal ones"""
     windows: int
     inflation: Inflation
     white: NoiseSettings
@@ -80,18 +72,8 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, proce
         sigmas.angular_velocity * inflation.velocity,
     )
     residual, redundancy = _redundant_residuals(fits)
-    if sigmas.angular_velocity > FLOOR.angular_velocity:
-        deviation = deviation * _widening(np.where(np.isnan(residual), 0.0, redundancy))
     motion = residual / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3) / np.sqrt(redundancy)
     return CalibrationFit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
-
-
-def _widening(redundancy: FloatArray) -> float:
-    """Factor of standard errors by the redundancies (n, 6) of the velocities from which the noise is estimated."""
-    from scipy.special import ndtr, stdtrit
-
-    freedom = EFFICIENCY * min(float(redundancy[:, :3].sum()), float(redundancy[:, 3:].sum()))
-    return float(-stdtrit(max(freedom, 1.0), float(ndtr(-SIGNIFICANT))) / SIGNIFICANT)
 
 
 def half_cost(

@@ -1,7 +1,5 @@
 """Windows of a recording for bundle adjustment: which frames, and their tracks, initial poses and points."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from fgbaseline.data.sequence import Sequence
@@ -28,17 +26,10 @@ Span = tuple[int, int]
 
 
 def spread_spans(n_frames: int) -> list[Span]:
-    """Windows spread evenly over the recording, of at most FRAMES frames.
-
-    Neighbors share a frame where all intervals fit into MAX_WINDOWS, and never more: an interval in two windows would
-    count twice.
-    """
-    intervals, longest = n_frames - 1, FRAMES - 1
-    count = max(1, min(MAX_WINDOWS, -(-intervals // longest)))
-    if count * longest >= intervals:
-        edges = np.round(np.linspace(0, intervals, count + 1)).astype(int)
-        return [(int(a), int(b - a) + 1) for a, b in pairwise(edges)]
-    return [(int(start), FRAMES) for start in np.linspace(0, n_frames - FRAMES, count).astype(int)]
+    """Windows spread evenly over the recording; neighbors share a frame, so that no interval is left out."""
+    size = min(FRAMES, n_frames)
+    count = max(1, min(MAX_WINDOWS, -(-(n_frames - 1) // (size - 1))))
+    return [(int(start), size) for start in np.unique(np.linspace(0, n_frames - size, count).astype(int))]
 
 
 def unbroken_spans(odometry: Odometry) -> list[Span]:
