@@ -114,7 +114,7 @@ def velocity_and_biases(run: RunData, name: str) -> Figure | None:
     }
     if not shown:
         return None
-    title = f"{safe_text(name)}: unaligned errors of velocity and biases, and three sigmas (99.7 %)"
+    title = f"{safe_text(name)}: unaligned errors of velocity and biases, % within three sigmas (99.7)"
     return _between_three_sigmas(title, run.t, shown, run.line()(name))
 
 
@@ -124,6 +124,7 @@ def _between_three_sigmas(
     """Columns of three panels, each with an error (n,) and its sigma (n,) by heading."""
     figure = Figure(figsize=(SCREEN.width, 5.4))
     panels = figure.subplots(3, len(shown) // 3, sharex=True, squeeze=False)
+    within = " inside" if len(shown) <= 6 else ""  # three columns have no room for it
     handles: list[Any] = []
     for i, (axis, (e, s)) in enumerate(shown.items()):
         panel = panels[i % 3, i // 3]
@@ -132,7 +133,7 @@ def _between_three_sigmas(
         panel.set_ylim(-(reach := _reach(e, s)), reach)
         both = np.isfinite(e) & np.isfinite(s) & (s > 0)
         inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
-        panel.set_title(f"{axis}: {100.0 * inside:.1f} % inside")
+        panel.set_title(f"{axis}: {100.0 * inside:.1f} %{within}")
         handles = handles or [*drawn, band]
     for panel in panels[-1]:
         panel.set_xlim(float(t[0]), float(t[-1]))
