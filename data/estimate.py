@@ -60,7 +60,7 @@ class EventKind(StrEnum):
     SINGULAR_INNOVATION = "innovation covariance singular"
     COVARIANCE_LOST = "covariance lost"
     """the covariance of a filter's state was no longer positive definite"""
-    GYROSCOPE_BIAS = "gyroscope bias"
+    GYROSCOPE_BIAS = "estimated gyroscope bias"
     """estimate of the bias, if it is part of the state"""
     BEHIND_CAMERA = "behind the camera"
     """observations rejected because their landmark violates cheirality"""

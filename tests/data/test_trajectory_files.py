@@ -146,7 +146,7 @@ BAD_TEXT = {
     "NaN stamp": (f"#h\n{GOOD}\nnan,0,0,1,1,0,0,0\n", "line 3: the time stamp is NaN"),
     "infinite": (f"#h\n{GOOD}\n2000000000,0,0,inf,1,0,0,0\n", "line 3: 'inf' is no finite number"),
     "missing": (f"{GOOD}\n2000000000,0,0,1,0,0,0\n", "line 2: expected 8 numbers, got 7"),
-    "empty cell": (f"{GOOD}\n2000000000,0,,0,1,0,0,0\n", "line 2: '' is no finite number"),
+    "empty stamp": (f"{GOOD}\n,0,0,0,1,0,0,0\n", "line 2: the time stamp is NaN"),
     "half a nanosecond": ("#t [ns],x,y,z,qw,qx,qy,qz\n1.5,0,0,0,1,0,0,0\n", "line 2: the time stamp 1.5 is no whole n"),
     "long quaternion": (f"{GOOD}\n2000000000,0,0,0,1,0.1,0,0\n", r"line 2: the quaternion \[0.1, 0.0, 0.0, 1.0\] has"),
     "unsorted": (

@@ -108,7 +108,7 @@ def test_a_gyroscope_bias_bends_the_path_unless_it_is_estimated() -> None:
 
 def test_the_final_bias_estimate_is_an_event() -> None:
     estimate = ekf.joint_ekf_bias(matched(biased("town", 1, 5.0)))
-    (event,) = (event for event in estimate.events if event.kind == "gyroscope bias")
+    (event,) = (event for event in estimate.events if event.kind == "estimated gyroscope bias")
     assert estimate.gyro_bias is not None
     assert event.frame == 49
     assert f"{estimate.gyro_bias.mean[-1, 0]:+.4f} ± " in event.reason
@@ -129,7 +129,7 @@ def test_a_path_without_a_finite_pose_determines_no_bias() -> None:
     problem = replace(plain_problem(Scene().sequence()), initial_pose=np.full((4, 4), np.nan))
     estimate = ekf.joint_ekf_bias(problem)
     assert estimate.status == "failed"
-    assert not [event for event in estimate.events if event.kind == "gyroscope bias"]
+    assert not [event for event in estimate.events if event.kind == "estimated gyroscope bias"]
 
 
 @pytest.mark.parametrize("wrong", [{"deviation": 0.0}, {"deviation": np.nan}, {"walk": -1.0}, {"walk": np.inf}])
@@ -161,7 +161,7 @@ def test_the_bias_is_an_event_with_its_sigma_on_each_axis() -> None:
     deviation = np.sqrt(np.diagonal(estimate.gyro_bias.covariance[-1]))
     said = ", ".join(f"{m:+.4f} ± {d:.4f}" for m, d in zip(estimate.gyro_bias.mean[-1], deviation, strict=True))
     assert estimate.events[-1] == data.Event(
-        49, "gyroscope bias", f"at rest the gyroscope reads ({said}) rad/s on the IMU's axes"
+        49, "estimated gyroscope bias", f"at rest the gyroscope reads ({said}) rad/s on the IMU's axes"
     )
     assert estimate.gyro_bias.mean.shape == (50, 3)
     assert np.isfinite(estimate.gyro_bias.covariance).all()
