@@ -1,7 +1,7 @@
 """Stereo front end: from images to tracks, with OpenCV (extra `fgbaseline[images]`)."""
 
 from .pictures import Picture, Pictures
-from .pipeline import TrackedRecording, track
+from .pipeline import TrackedRecording, opened_images, track, track_images
 from .settings import TrackerSettings
 from .sources import ImageOptions, has_images
 from .stereo_tracker import StereoTracker, Tracks
@@ -15,5 +15,7 @@ __all__ = [
     "TrackerSettings",
     "Tracks",
     "has_images",
+    "opened_images",
     "track",
+    "track_images",
 ]

@@ -109,14 +109,29 @@ def track(
     motion: bool = False,
     pictures: Pictures | None = None,
 ) -> TrackedRecording:
-    """Tracks of the recording of images at `path`; `progress` gets the number of pairs done, and of all.
+    """Tracks of the recording of images at `path`: `opened_images` and `track_images` in one call."""
+    return track_images(opened_images(path, options, motion=motion), settings, progress, pictures)
 
-    `pictures` gets the rectified pairs. Frames with an unreadable image are left out, counted and named. Raises
-    InputError for what is missing; with `motion` also where `sequence` would raise, before the images are read.
+
+def opened_images(path: Path, options: ImageOptions, *, motion: bool = False) -> ImageRecording:
+    """Recording of images at `path`, none of them read.
+
+    Raises InputError for what is missing; with `motion` also where `TrackedRecording.sequence` would raise.
     """
     recording = open_recording(path, options)
     if motion:
         _require_motion(recording)
+    return recording
+
+
+def track_images(
+    recording: ImageRecording, settings: TrackerSettings, progress: Progress | None, pictures: Pictures | None
+) -> TrackedRecording:
+    """Tracks of a recording of images; `progress` gets the number of pairs done, and of all.
+
+    `pictures` gets the rectified pairs. Frames with an unreadable image are left out, counted and named. Raises
+    InputError for images that do not fit.
+    """
     rectified = rectify(recording.left, recording.right)
     tracker = StereoTracker(rectified.camera, settings)
     T = len(recording.t)

@@ -10,7 +10,15 @@ from fgbaseline.data.formats.atomic_write import require_new
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.plural import plural
 from fgbaseline.data.toml_file import read_toml
-from fgbaseline.data.tracking import ImageOptions, Pictures, TrackedRecording, TrackerSettings, has_images, track
+from fgbaseline.data.tracking import (
+    ImageOptions,
+    Pictures,
+    TrackedRecording,
+    TrackerSettings,
+    has_images,
+    opened_images,
+    track_images,
+)
 from fgbaseline.data.tracking.sources.image_recording import TruthFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.progress import reporter
@@ -26,8 +34,9 @@ def tracked(
 ) -> TrackedRecording:
     """Tracks of a recording of images, with progress on standard error. Raises InputError."""
     chosen = TrackerSettings() if settings is None else read_toml(settings, TrackerSettings).content
+    recording = opened_images(source, options, motion=motion)  # bad input is refused before progress is printed
     with reporter().estimator("tracking") as progress:
-        return track(source, options, chosen, progress, motion=motion, pictures=pictures)
+        return track_images(recording, chosen, progress, pictures)
 
 
 def image_sequence(
