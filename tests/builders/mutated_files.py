@@ -21,7 +21,7 @@ import pytest
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.reports import html
-from fgbaseline.reports.html import comparison_page, run_page
+from fgbaseline.reports.html import page
 from fgbaseline.reports.html.environment import environment
 
 from .commands import fgbaseline
@@ -205,8 +205,7 @@ class _Commands:
             os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})
             patch = pytest.MonkeyPatch()
             figures_left_out(patch)
-            for page in (run_page, comparison_page):
-                patch.setattr(page, "environment", _templates)
+            patch.setattr(page, "environment", _templates)
 
 
 @cache
