@@ -226,7 +226,8 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
         return _BesideBatch(Verdict.TRUSTED, f"not compared with a batch solution{why}")
-    if any(event.kind == EventKind.ONE_START for event in batch.events):
+    kinds = {event.kind for event in batch.events}
+    if EventKind.ONE_START in kinds:
         return _BesideBatch(
             Verdict.DOUBTFUL,
             "a batch solution was found from one start only: nothing says that it is the lowest",
@@ -240,10 +241,9 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     baselines = rmse / problem.sequence.camera.baseline
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
-    said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"
-    if any(event.kind == EventKind.STARTED_AT_ISAM2 for event in batch.events):
-        said = said.replace("solution", "solution started at isam2's answer")
-    text = f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
+    start = " started at isam2's answer" if EventKind.STARTED_AT_ISAM2 in kinds else ""
+    agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
+    text = f"a batch solution{start} {agrees}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
     return _BesideBatch(verdict, text, criteria)
 
 

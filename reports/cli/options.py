@@ -155,8 +155,3 @@ def images(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed((*_MOTION, *_IMAGES)):
         command = option(command)
     return command
-
-
-def topic_names(text: str | None) -> tuple[str, ...]:
-    """Names separated by commas."""
-    return tuple(name.strip() for name in (text or "").split(",") if name.strip())

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ..names import names_in
 from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from . import options
 from .options import PATH, Numbers
@@ -104,16 +105,14 @@ def run(
     from ..run.problem import RunSettings
 
     functions = load_all(user_estimators)
-    names = list(DEFAULT_ESTIMATORS)
-    if estimators is not None:
-        names = [name.strip() for name in estimators.split(",") if name.strip()]
+    names = DEFAULT_ESTIMATORS if estimators is None else names_in(estimators)
     chosen = RunSettings(
         estimators=(*names, *(name for name in functions if name not in names)),
         batch_up_to=BATCH_OBSERVATIONS if estimators is None else 0,
         functions=functions,
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
-        topics=options.topic_names(topics),
+        topics=names_in(topics),
         tracker=settings,
         **given,
     )
@@ -137,7 +136,7 @@ def track(source: Path, out: Path, force: bool, settings: Path | None, topics: s
 
     from ..run.images import write_tracks
 
-    return write_tracks(source, out, ImageOptions(topics=options.topic_names(topics), **given), settings, force=force)
+    return write_tracks(source, out, ImageOptions(topics=names_in(topics), **given), settings, force=force)
 
 
 @click.command(epilog="Example: fgbaseline estimators")
@@ -190,9 +189,7 @@ def diagnose(
     from ..run.problem import RunSettings, read_sequence
 
     unit = None if time_unit is None else TimeUnit(time_unit)
-    chosen = RunSettings(
-        sequence=sequence, time_unit=unit, topics=options.topic_names(topics), tracker=settings, **given
-    )
+    chosen = RunSettings(sequence=sequence, time_unit=unit, topics=names_in(topics), tracker=settings, **given)
     recording = read_sequence(chosen)
     return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force, opened=opened)
 
@@ -224,7 +221,7 @@ def export(out: Path, force: bool, topics: str | None, settings: Path | None, **
     from ..run.command import export as export_problem
     from ..run.problem import RunSettings
 
-    chosen = RunSettings(topics=options.topic_names(topics), tracker=settings, **given)
+    chosen = RunSettings(topics=names_in(topics), tracker=settings, **given)
     return export_problem(chosen, out, force=force)
 
 

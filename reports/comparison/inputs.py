@@ -18,10 +18,12 @@ from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Sourc
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Landmarks, Problem
-from fgbaseline.data.formats import read_kitti, read_landmarks, read_times
+from fgbaseline.data.formats import read_landmarks, read_times
 from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.trajectory_reader import read_extrinsic
 from fgbaseline.geometry import FloatArray, InputError, se3
 
+from ..names import names_in
 from .reference_run import ReferenceRun, load_problem, read_reference_run, reference_in_memory
 from .sources import TrajectoryLike, opened, split_name
 
@@ -124,17 +126,14 @@ def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None
         if settings.extrinsic.shape != (4, 4):
             raise InputError(f"extrinsic: expected imu_T_cam (4, 4), got an array {settings.extrinsic.shape}")
         return np.asarray(settings.extrinsic, dtype=np.float64)
-    poses = read_kitti(settings.extrinsic)
-    if len(poses) != 1:
-        raise InputError(f"{settings.extrinsic}: expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
-    return np.asarray(poses[0], dtype=np.float64)
+    return read_extrinsic(settings.extrinsic)
 
 
 def _beside(run: ReferenceRun, wanted: str) -> list[str]:
     others = [name for name in run.names if name != run.reference]
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
-    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    names = list(names_in(wanted))
     for name in names:
         if name not in others:
             raise InputError(f"beside: the run has no '{name}' besides its reference; it has {', '.join(others)}")

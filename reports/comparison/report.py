@@ -28,6 +28,7 @@ from ..results.comparison_summary import summarize
 from ..tables import Table, latex, markdown
 from ..tables.comparison import comparison_table, main_frame, main_table, metrics_table
 from .inputs import Given, GivenLandmarks, read_entries
+from .sources import as_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -149,19 +150,14 @@ def compare(
         times = () if times is None else (times,)
     if not isinstance(times, Iterable):
         raise InputError(f"times: expected files or arrays of stamps, got {type(times).__name__}")
-    options["times"] = tuple(map(_as_path, times))
-    options |= {name: _as_path(options[name]) for name in FILES if name in options}
+    options["times"] = tuple(map(as_path, times))
+    options |= {name: as_path(options[name]) for name in FILES if name in options}
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
     of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
     with np.errstate(all="ignore"):
         entries = read_entries(reference, estimates, of_them, settings)
         comparison = compare_entries(entries, settings)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
-
-
-def _as_path(given: Any) -> Any:
-    """A name as a path; anything in memory as it is."""
-    return Path(given) if isinstance(given, str | os.PathLike) else given
 
 
 def _write_series(result: Result, path: Path) -> None:

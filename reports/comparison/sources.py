@@ -24,6 +24,11 @@ ONE = (str, os.PathLike, Trajectory, ParsedTrajectory, Estimate, Truth, np.ndarr
 """types of a single trajectory, besides a tuple of stamps and poses"""
 
 
+def as_path(given: Any) -> Any:
+    """A name as a path; anything in memory, and None, as it is."""
+    return Path(given) if isinstance(given, str | os.PathLike) else given
+
+
 def by_name(given: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike]) -> list[tuple[str, Any]]:
     """Name and trajectory of each one that is given; the name is empty where it has its own, "estimate" of arrays."""
     if isinstance(given, Mapping):

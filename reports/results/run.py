@@ -122,6 +122,11 @@ class Summary(Part):
     machine: dict[str, str | int]
 
 
+def as_dict(summary: Summary) -> dict[str, Any]:
+    """The content of `summary.json`."""
+    return summary.model_dump(mode="json", by_alias=True)
+
+
 def summarize(run: Run) -> Summary:
     """Summary of a run; a figure that is not finite is None, with its reason in `notes`."""
     sequence, problem = run.problem.sequence, run.problem

@@ -23,8 +23,9 @@ from fgbaseline.data.solving import Watch, no_progress
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
-from ..comparison.sources import Array, TrajectoryLike, by_name, opened
+from ..comparison.sources import Array, TrajectoryLike, as_path, by_name, opened
 from ..keywords import for_python
+from ..names import names_in
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from .problem import (
     RunSettings,
@@ -114,7 +115,7 @@ def run(
     names, functions = named_estimators(() if estimators is None else estimators)
     is_default = estimators is None or (bool(names) and len(functions) == len(names))
     chosen = RunSettings(
-        sequence=Path(recording) if isinstance(recording, str | os.PathLike) else recording,
+        sequence=as_path(recording),
         preset=preset,
         estimators=(*DEFAULT_ESTIMATORS, *names) if is_default else names,
         batch_up_to=BATCH_OBSERVATIONS if is_default else 0,
@@ -126,16 +127,16 @@ def run(
         as_recorded=as_recorded,
         time_unit=None if time_unit is None else TimeUnit(time_unit),
         held_out=held_out,
-        imu=None if imu is None else Path(imu),
-        imu_calibration=None if imu_calibration is None else Path(imu_calibration),
-        velocities=None if velocities is None else Path(velocities),
-        extrinsic=None if extrinsic is None else Path(extrinsic),
-        right=None if right is None else Path(right),
-        calibration=None if calibration is None else Path(calibration),
-        times=None if times is None else Path(times),
-        topics=tuple(topics.split(",")) if isinstance(topics, str) else tuple(topics),
-        tracker=None if settings is None else Path(settings),
-        repairs=None if repairs is None else Path(repairs),
+        imu=as_path(imu),
+        imu_calibration=as_path(imu_calibration),
+        velocities=as_path(velocities),
+        extrinsic=as_path(extrinsic),
+        right=as_path(right),
+        calibration=as_path(calibration),
+        times=as_path(times),
+        topics=names_in(topics) if isinstance(topics, str) else tuple(topics),
+        tracker=as_path(settings),
+        repairs=as_path(repairs),
         functions=functions,
         add=tuple(opened(each, name=name) for name, each in by_name(add)),
         add_body=add_body,
@@ -169,7 +170,7 @@ def named_estimators(
     functions: dict[str, Solver] = {}
     for wanted, one in each:
         if isinstance(one, str) and ":" not in one and wanted in ("", one):
-            names += [name.strip() for name in one.split(",") if name.strip()]
+            names += names_in(one)
             continue
         if isinstance(one, str):
             ((name, function),) = load_all((f"{wanted}={one}" if wanted else one,)).items()

@@ -66,9 +66,10 @@ def run(
     with background_map(lambda _: build_problem(kept, settings, cores()), 1, cores()) as built:
         # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
         from ..phrases.run import verdict
+        from ..results.run import as_dict
         from ..tables import print_table
         from ..tables.run import terminal_table
-        from .folder import as_dict, write_run
+        from .folder import write_run
         from .solution import solve
 
         import_estimators(settings.estimators)

@@ -5,7 +5,6 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from fgbaseline.data import Estimate, write_tum
 from fgbaseline.data.tracking import Pictures
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.run import Summary, summarize
+from fgbaseline.reports.results.run import Summary, as_dict, summarize
 from fgbaseline.reports.run.problem import MARK
 from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.run import main_table, main_values, metrics_table
@@ -55,12 +54,13 @@ def write_numbers(run: Run, folder: Path) -> Summary:
         write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
     _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
-    estimators = as_dict(summary)["estimators"]
+    document = as_dict(summary)
+    estimators = document["estimators"]
     main_values(estimators).to_csv(folder / "table.csv")
     table = main_table(run, estimators).transposed("figure")
     (folder / "table.md").write_text(markdown(table), encoding="utf-8")
     (folder / "table.tex").write_text(latex(table), encoding="utf-8")
-    text = json.dumps(as_dict(summary), indent=2, allow_nan=False)
+    text = json.dumps(document, indent=2, allow_nan=False)
     (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
     return summary
 
@@ -84,11 +84,6 @@ def write_page(
 ) -> None:
     """Writes `report.html` with the given figures and images."""
     (folder / "report.html").write_text(render(run, as_dict(summary), drawn, pictures), encoding="utf-8")
-
-
-def as_dict(summary: Summary) -> dict[str, Any]:
-    """The content of `summary.json`."""
-    return summary.model_dump(mode="json", by_alias=True)
 
 
 def _write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:

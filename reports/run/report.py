@@ -14,7 +14,7 @@ from fgbaseline.data.formats.atomic_folder import atomic_folder
 from ..keywords import for_python
 from ..notebook import NotebookResult
 from ..phrases.run import verdict
-from ..results.run import Summary, summarize
+from ..results.run import Summary, as_dict, summarize
 from ..tables import Table
 from ..tables.run import main_frame, main_table, metrics_table
 from .problem import MARK
@@ -87,5 +87,5 @@ class RunReport(NotebookResult, Run):
 
     @cached_property
     def _estimators(self) -> Mapping[str, Any]:
-        estimators: Mapping[str, Any] = self.summary.model_dump(mode="json", by_alias=True)["estimators"]
+        estimators: Mapping[str, Any] = as_dict(self.summary)["estimators"]
         return estimators
