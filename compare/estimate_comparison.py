@@ -227,13 +227,9 @@ def compare_all(
     with background_map(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
         parts = compared()
     results = {name: Result(estimates[name], **part) for name, part in zip(names, parts, strict=True)}
-    divergences = {
-        n: r.divergence for n, r in results.items() if n not in added and r.answered and r.divergence is not None
-    }
-    truths = {
-        n: r.truth_aligned for n, r in results.items() if n not in added and r.answered and r.truth_aligned is not None
-    }
-    from_reference, to_truth = common_rmse(divergences), common_rmse(truths)
+    ranked = {name: r for name, r in results.items() if name not in added and r.answered}
+    from_reference = common_rmse({name: r.divergence for name, r in ranked.items() if r.divergence is not None})
+    to_truth = common_rmse({name: r.truth_aligned for name, r in ranked.items() if r.truth_aligned is not None})
     results = {
         name: replace(result, divergence_common=from_reference.get(name), ate_common=to_truth.get(name))
         for name, result in results.items()

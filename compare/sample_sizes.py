@@ -45,11 +45,12 @@ def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
         "map.median_sigmas": None if evidence.map is None else {"n": int(evidence.map["sigmas"].notna().sum())},
         "held_out": None if ranking is None or result.name not in ranking.index else {"n": int(ranking.attrs["n"])},
     }
-    known_ones = {key: sample for key, sample in every.items() if sample is not None}
-    return known_ones | ({} if result.inertial is None else _inertial(t, result.inertial))
+    if result.inertial is not None:
+        every |= _inertial(t, result.inertial)
+    return {key: sample for key, sample in every.items() if sample is not None}
 
 
-def _inertial(t: FloatArray, inertial: InertialEvidence) -> dict[str, dict[str, float]]:
+def _inertial(t: FloatArray, inertial: InertialEvidence) -> dict[str, dict[str, float] | None]:
     """Frames of the velocity and the biases by their errors, and of the NEES of the state and of each block."""
     values: dict[str, ArrayLike] = {}
     if inertial.errors is not None and inertial.nees is not None:
@@ -58,8 +59,7 @@ def _inertial(t: FloatArray, inertial: InertialEvidence) -> dict[str, dict[str, 
         values |= {f"nees_state.{name}": inertial.nees[name] for name in BLOCKS}
     if inertial.divergence is not None:
         values |= {f"{name}_divergence": inertial.divergence[name] for name in QUANTITIES}
-    every = {key: _of_values(t, column) for key, column in values.items()}
-    return {key: sample for key, sample in every.items() if sample is not None}
+    return {key: _of_values(t, column) for key, column in values.items()}
 
 
 def truth_sample(run: Run) -> Mapping[str, float] | None:

@@ -47,6 +47,11 @@ class StereoCamera:
     """distance from the left to the right camera, m"""
 
     @property
+    def K(self) -> FloatArray:  # noqa: N802
+        """Camera matrix (3, 3)."""
+        return np.array([[self.fu, 0.0, self.cu], [0.0, self.fv, self.cv], [0.0, 0.0, 1.0]])
+
+    @property
     def min_depth(self) -> float:
         """Smallest depth (m) of a point in front of the camera: `MIN_DEPTH` baselines."""
         return MIN_DEPTH * self.baseline

@@ -60,7 +60,7 @@ def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
     d = body_error(estimate, reference)[k]
     P, J = estimate.covariance[k], se3.inverse_right_jacobian(d)
     P_ref = J @ reference.covariance[k] @ np.swapaxes(J, 1, 2)
-    difference, share = difference_covariance(P, P_ref), smallest_share(P, P_ref)
+    difference, share = _difference_and_share(P, P_ref)
     result.overconfident[k] = share < -SMALLER
     positive = np.isfinite(difference).all(axis=(1, 2))
     result.nees[k[positive]] = mahalanobis_squared(d[positive], difference[positive])
@@ -73,10 +73,15 @@ def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
     Judged by the eigenvalues of L^-1 (P - P_ref) L^-T with P = L L^T: the share of the filter's variance that the
     reference removes in each direction. A share up to `NEGLIGIBLE` counts as zero.
     """
+    return _difference_and_share(P, P_ref)[0]
+
+
+def _difference_and_share(P: FloatArray, P_ref: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`difference_covariance` and the `smallest_share` by which it is judged."""
     P, P_ref = 0.5 * (P + np.swapaxes(P, 1, 2)), 0.5 * (P_ref + np.swapaxes(P_ref, 1, 2))
-    difference = P - P_ref
-    difference[~((smallest_share(P, P_ref) > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
-    return np.asarray(difference, dtype=np.float64)
+    difference, share = P - P_ref, smallest_share(P, P_ref)
+    difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
+    return np.asarray(difference, dtype=np.float64), share
 
 
 def smallest_share(P: FloatArray, P_ref: FloatArray) -> FloatArray:

@@ -44,8 +44,10 @@ def with_lever_arm(entry: Entry, arm: FloatArray) -> Entry:
 
 def with_length_unit_recognized(reference: Trajectory, entry: Entry, settings: Settings) -> Entry:
     """The estimate with a remark where the positions of one of the two files are not in meters."""
+    if settings.align == compare.Align.SIM3:
+        return entry
     matched = paired(reference, entry.trajectory, settings, oriented=False)
-    found = None if matched is None or settings.align == compare.Align.SIM3 else compare.length_unit(matched)
+    found = None if matched is None else compare.length_unit(matched)
     if found is None:
         return entry
     unit, scale = found

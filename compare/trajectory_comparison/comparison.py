@@ -16,7 +16,6 @@ from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.compare.trajectory_comparison.ranking import Ranking
 from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
 from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
-from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Sequence
 from fgbaseline.data.display import Displayed
@@ -57,6 +56,8 @@ class Result(Displayed):
     pixels: Pixels | None
     map: pd.DataFrame | None
     """see `compare.map_difference`; the landmarks are aligned as the path is"""
+    resolution: dict[str, float]
+    """smallest difference that the files resolve, by its unit, `m` and `°`"""
     notes: dict[str, str]
     """why figures are missing, by key"""
 
@@ -69,12 +70,6 @@ class Result(Displayed):
     def rmse(self) -> float:
         """RMSE of the positions over all paired poses, m."""
         return float(self.statistics["translation"]["value"]["rmse"])
-
-    @property
-    def resolution(self) -> dict[str, float]:
-        """Smallest difference that the files resolve, by its unit, `m` and `°`."""
-        paths = self.matched.reference.position, self.entry.trajectory.position
-        return {"m": position_resolution(*paths), "°": rotation_resolution_deg(*paths)}
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

@@ -21,6 +21,7 @@ from fgbaseline.compare.trajectory_comparison.reprojection import (
     pixels_of,
     up_of_problem,
 )
+from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
 from fgbaseline.geometry import FloatArray, InputError
 
@@ -126,6 +127,7 @@ def _compared(
     bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
     relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
+    positions = matched.reference.position, entry.trajectory.position
     return Result(
         entry=entry,
         matched=matched,
@@ -146,6 +148,7 @@ def _compared(
             for delta, table in tables.items()
         },
         pixels=pixels,
+        resolution={"m": position_resolution(*positions), "°": rotation_resolution_deg(*positions)},
         map=_or_note("map", notes, lambda: map_of(entries.problem, paths, reference, entry, matched)),
         notes=notes,
     )

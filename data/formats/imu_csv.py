@@ -12,7 +12,7 @@ from .columns import names_of
 from .imu_samples import RawSamples, imu_samples
 from .named_file import FilePath, reading, regular_file
 from .number_table import Lines, numbers_of, read_lines
-from .stamps import Stamps, possible_units, stamps_of
+from .stamps import Stamps, likely_seconds, stamps_of
 
 GYROSCOPE = re.compile(r"(w_rs_s|gyro\w*|gyr|angular_?velocity|angular_?rate|omega|w|g|rot\w*)[._]?([xyz])")
 ACCELEROMETER = re.compile(r"(a_rs_s|accel\w*|acc|linear_?acceleration|specific_?force|a|f)[._]?([xyz])")
@@ -90,4 +90,4 @@ def _seconds(stamps: Stamps, *, named: bool) -> FloatArray:
     """The stamps in s; whole ones without a unit are nanoseconds, as EuRoC writes them."""
     if not named and stamps.whole is not None:
         return stamps.seconds(TimeUnit.NS)
-    return stamps.seconds(possible_units(stamps)[0][0] if len(stamps.value) > 1 else TimeUnit.S)
+    return likely_seconds(stamps)

@@ -40,9 +40,17 @@ class ImuCalibration(NamedTuple):
         return (self.assumed, *turned) if self.assumed else turned
 
 
+NO_CALIBRATION = "no imu-calibration is given"
+
+
 def assumed_calibration(why: str) -> ImuCalibration:
     """Stands in for a calibration that is missing."""
     return ImuCalibration(ASSUMED_NOISE, STANDARD_GRAVITY, assumed=assumed_noise(why))
+
+
+def calibration_or_assumed(path: FilePath | None, why: str) -> ImuCalibration:
+    """The calibration in a YAML file; without one what stands in for it. Raises as `read_imu_calibration`."""
+    return assumed_calibration(why) if path is None else read_imu_calibration(path)
 
 
 def read_imu_calibration(path: FilePath) -> ImuCalibration:

@@ -24,15 +24,11 @@ def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False, force: 
     instead, for recordings of many short tracks. Raises InputError when the file cannot be written, exists and `force`
     is false, or a pixel coordinate is exactly -1, which in the block means 'not observed'.
     """
-    if flat:
-        with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
-            _write(archive, _arrays(sequence) | observation_arrays(sequence.observations))
-        return
-    if (sequence.observations.pixel == UNOBSERVED).any():
+    if not flat and (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
     with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
-        _write(archive, _arrays(sequence))
-        if sequence.n_landmarks:
+        _write(archive, _arrays(sequence) | (observation_arrays(sequence.observations) if flat else {}))
+        if not flat and sequence.n_landmarks:
             shape = (4, sequence.n_landmarks, sequence.n_frames)
             write_member(archive, "features", shape, _feature_chunks(sequence))
 
@@ -64,7 +60,7 @@ def _write(archive: zipfile.ZipFile, arrays: dict[str, FloatArray]) -> None:
 
 def _calibration(camera: StereoCamera) -> dict[str, FloatArray]:
     return {
-        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
+        "K": camera.K,
         "b": np.array(camera.baseline),
     }
 

@@ -8,7 +8,7 @@
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
 from ..observations import IntArray, Observations
 from .npz_archive import NpzArchive
@@ -41,14 +41,11 @@ def read_observation_list(archive: NpzArchive, T: int) -> tuple[Observations, in
         raise InputError(f"{FRAME}: frame {int(frame.max())} is named, but there are {T} time stamps")
     if not np.isfinite(pixel).all():
         raise InputError(f"{PIXEL}: it has values that are not finite; leave out what was not observed")
-    order = np.lexsort((landmark, frame))
-    if _repeats(frame[order], landmark[order]):
-        raise InputError(f"{FRAME}: a landmark is observed twice in one frame; keep one of the observations")
-    return Observations.sort(frame, landmark, pixel.T), int(landmark.max()) + 1 if n else 0
-
-
-def _repeats(frame: IntArray, landmark: IntArray) -> bool:
-    return bool(((np.diff(frame) == 0) & (np.diff(landmark) == 0)).any())
+    try:
+        observations = Observations.sort(frame, landmark, pixel.T)
+    except FgbaselineError:  # shapes and values are right: what is left is a repeat
+        raise InputError(f"{FRAME}: a landmark is observed twice in one frame; keep one of the observations") from None
+    return observations, int(landmark.max()) + 1 if n else 0
 
 
 def _indices(archive: NpzArchive, key: str) -> IntArray:

@@ -13,7 +13,7 @@ from ..time_unit import TimeUnit, in_seconds
 from .course import NO_VELOCITIES, read_course
 from .ground_truth import BodyFrame, attach_truth
 from .imu_attachment import attach_imu, read_imu
-from .imu_yaml import assumed_calibration, read_imu_calibration
+from .imu_yaml import NO_CALIBRATION, calibration_or_assumed
 from .mat_file import MatFile
 from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
@@ -65,8 +65,7 @@ def read(
 
 
 def _with_imu(sequence: Sequence, imu: FilePath, calibration: FilePath | None) -> Sequence:
-    unknown = assumed_calibration("no imu-calibration is given")
-    raw = read_imu(imu, unknown if calibration is None else read_imu_calibration(calibration))
+    raw = read_imu(imu, calibration_or_assumed(calibration, NO_CALIBRATION))
     with reading(imu):
         return attach_imu(sequence, raw, shown(imu), velocities=NO_VELOCITIES not in sequence.remarks)
 

@@ -85,6 +85,11 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
     return Stamps(value, whole, known, max(words, key=significant_digits, default=""))
 
 
+def likely_seconds(stamps: Stamps) -> FloatArray:
+    """The stamps in s, in the likeliest of their `possible_units`; a single one is in s."""
+    return stamps.seconds(possible_units(stamps)[0][0] if len(stamps.value) > 1 else TimeUnit.S)
+
+
 def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
     """Possible units of the stamps, likeliest first, and True if header or size determine the unit.
 

@@ -4,11 +4,10 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..time_unit import TimeUnit
 from .named_file import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
 from .stamped_poses import require_rising
-from .stamps import possible_units, stamps_of
+from .stamps import likely_seconds, stamps_of
 
 
 def read_velocity_csv(path: FilePath, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -22,7 +21,7 @@ def read_velocity_csv(path: FilePath, t: FloatArray) -> tuple[FloatArray, FloatA
         table = numbers_of(lines)
         stamps = stamps_of(lines.column(0), table.values[:, 0], None)
         require_rising(stamps, table.line)
-        recorded = stamps.seconds(possible_units(stamps)[0][0] if len(stamps.value) > 1 else TimeUnit.S)
+        recorded = likely_seconds(stamps)
         slack = float(np.median(np.diff(recorded))) if len(recorded) > 1 else 0.0
         if recorded[0] - slack > t[0] or recorded[-1] + slack < t[-1]:
             raise InputError(

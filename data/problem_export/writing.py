@@ -38,7 +38,7 @@ def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
         "t": sequence.t,
         "linear_velocity": sequence.linear_velocity,
         "angular_velocity": sequence.angular_velocity,
-        "K": np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]]),
+        "K": camera.K,
         "b": np.array(camera.baseline),
         "imu_T_cam": sequence.imu_T_cam,
         "up": sequence.up,

@@ -22,7 +22,9 @@ def rotation_between(recording: ImageRecording, imu_R_cam: FloatArray, before: i
         a, b = np.searchsorted(samples.t, [first, last])
         ends = np.concatenate([[first], samples.t[a:b], [last]])
         middle = 0.5 * (ends[1:] + ends[:-1])
-        rate = np.stack([np.interp(middle, samples.t, axis) for axis in samples.angular_velocity[:, :].T], axis=1)
+        near = slice(max(a - 1, 0), b + 1)
+        rates = samples.angular_velocity[near].T
+        rate = np.stack([np.interp(middle, samples.t[near], axis) for axis in rates], axis=1)
         steps = rate * np.diff(ends)[:, None]
     else:
         return None

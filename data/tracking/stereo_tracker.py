@@ -7,7 +7,6 @@ the rig rejects is not tracked on, and a corner found there later is a new track
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
@@ -15,9 +14,9 @@ from ..observations import BoolArray, IntArray
 from .corners import detect_corners
 from .local_contrast import equalized
 from .opencv import opencv
+from .rig import Image
 from .settings import TrackerSettings
 
-Image = NDArray[np.uint8]
 MIN_POINTS = 8
 """points that the motion of the rig is estimated from"""
 RANSAC_ITERATIONS = 200
@@ -71,9 +70,7 @@ class StereoTracker:
         step before; without it both are those of the step before.
         """
         even_left, even_right = equalized(left), equalized(right)
-        if self._left is None:
-            self.tracks = Tracks.none()
-        elif len(self.tracks.number):
+        if self._left is not None and len(self.tracks.number):
             self.tracks = self._tracked(self._left, even_left, even_right, rotation)
         corners = self._new_corners(left)
         self.tracks = self._with_matches(corners, even_left, even_right)
@@ -81,15 +78,13 @@ class StereoTracker:
         return self.tracks
 
     def _tracked(self, before: Image, left: Image, right: Image, rotation: FloatArray | None) -> Tracks:
-        old, limit = self.tracks, self.settings.forward_backward
+        old = self.tracks
         motion = self._motion.copy()
         if rotation is not None:
             motion[:3, :3] = rotation
         points = self.camera.triangulate(old.pixel)
         predicted = self._projected(motion, points, old.pixel)
-        new, found = self._flow(before, left, old.pixel[:, :2], predicted[:, :2])
-        back, returned = self._flow(left, before, new, old.pixel[:, :2])
-        found &= returned & (np.linalg.norm(back - old.pixel[:, :2], axis=1) < limit) & _inside(new, left)
+        new, found = self._flow_and_back(before, left, old.pixel[:, :2], predicted[:, :2])
         old, points, new, predicted = old.select(found), points[found], new[found], predicted[found]
         offset = predicted[:, 2:] - predicted[:, :2]
         other, matched = self._match(left, right, new, offset)
@@ -101,8 +96,7 @@ class StereoTracker:
         everything = np.ones(len(points), dtype=np.bool_)
         if len(points) < MIN_POINTS:
             return everything
-        cv2, camera, gate = self._cv2, self.camera, self.settings.reprojection_gate
-        K = np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]])
+        cv2, K, gate = self._cv2, self.camera.K, self.settings.reprojection_gate
         found, rotation, translation, inlier = cv2.solvePnPRansac(
             points,
             pixel[:, :2].copy(),
@@ -150,14 +144,20 @@ class StereoTracker:
         )
         return new.reshape(n, 2).astype(np.float64), status.reshape(n).astype(np.bool_)
 
+    def _flow_and_back(
+        self, first: Image, second: Image, points: FloatArray, guess: FloatArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Points (n, 2) of the second image, and those of them that flow back to where they were."""
+        new, found = self._flow(first, second, points, guess)
+        back, returned = self._flow(second, first, new, points)
+        apart = np.linalg.norm(back - points, axis=1)
+        return new, found & returned & (apart < self.settings.forward_backward) & _inside(new, second)
+
     def _match(self, left: Image, right: Image, points: FloatArray, offset: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Points (n, 2) of the right image of points (n, 2) of the left one, searched at an offset (n, 2), px."""
-        other, found = self._flow(left, right, points, points + offset)
-        back, returned = self._flow(right, left, other, points)
-        settings = self.settings
-        found &= returned & (np.linalg.norm(back - points, axis=1) < settings.forward_backward)
-        found &= np.abs(other[:, 1] - points[:, 1]) < settings.row_gate
-        found &= (points[:, 0] - other[:, 0] > settings.min_disparity) & _inside(other, right)
+        other, found = self._flow_and_back(left, right, points, points + offset)
+        found &= np.abs(other[:, 1] - points[:, 1]) < self.settings.row_gate
+        found &= points[:, 0] - other[:, 0] > self.settings.min_disparity
         return other, found
 
     def _new_corners(self, left: Image) -> FloatArray:

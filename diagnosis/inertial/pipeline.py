@@ -37,18 +37,19 @@ def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnos
         return InertialDiagnosis(sequence, sequence, f"its computation failed ({type(error).__name__}: {error})")
 
 
-def found_start(sequence: Sequence, pixel: float) -> tuple[Start, InertialPath, Odometry]:
-    """Start, path and odometry of samples in SI units at `pixel` px of noise, for a recording taken as it is.
+def found_start(sequence: Sequence, pixel: float, seen: Odometry | None) -> tuple[Start, InertialPath]:
+    """Start and path of samples in SI units at `pixel` px of noise, for a recording taken as it is.
 
-    Raises ValueError with the reason where there is no start.
+    `seen` is its odometry, where it is known. Raises ValueError with the reason where there is no start.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         assert sequence.imu is not None
-        seen, imu = odometry(sequence), imu_intervals(sequence.imu, sequence.t)
+        seen = odometry(sequence) if seen is None else seen
+        imu = imu_intervals(sequence.imu, sequence.t)
         start = inertial_start(sequence, seen, imu, pixel)
         if start is None:
             raise ValueError(no_start(seen))
-        return start, inertial_path(sequence, seen, imu, start), seen
+        return start, inertial_path(sequence, seen, imu, start)
 
 
 def no_start(seen: Odometry) -> str:

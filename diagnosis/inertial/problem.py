@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import Problem
@@ -61,11 +62,13 @@ def as_recorded_inertial(
 
     Raises InputError where no start is found, and for samples and a baseline in other units than rad/s, m/s^2 and m.
     """
-    seen = odometry(usual_baseline(sequence)) if len(sequence.observations) else None
+    usual = usual_baseline(sequence)
+    with threadpool_limits(limits=1, user_api="blas"):
+        seen = odometry(usual) if len(sequence.observations) else None
     units = imu_units(sequence, seen)
     require_si(sequence, (*baseline_findings(baseline_unit(sequence, seen), sequence), *imu_unit_findings(units)))
     try:
-        start, path, _ = found_start(sequence, pixel)
+        start, path = found_start(sequence, pixel, seen if usual is sequence else None)
     except ValueError as error:
         raise InputError(f"{_source(sequence)}: {error}") from error
     excluded = exclusions(sequence, path.states.pose, mask)

@@ -91,13 +91,12 @@ def _start(solution: Solution, source: str, standing: float) -> Start:
     turn = np.eye(4)
     turn[:3, :3] = so3.rotation_to_z(first[2, :3]) @ first[:3, :3].T
     states = solution.states.moved(turn)
-    axes = np.eye(strapdown.STATE)
-    axes[strapdown.VELOCITY, strapdown.VELOCITY] = turn[:3, :3]
+    R = turn[:3, :3]
     state = InertialStart(
         states.velocity[0],
         states.gyroscope_bias[0],
         states.accelerometer_bias[0],
-        axes @ solution.covariance @ axes.T,
+        strapdown.rotated_velocity(solution.covariance, R, R),
         source,
     )
     return Start(states.pose[0], state, standing)

@@ -100,9 +100,8 @@ def _axes_of_plane(points: FloatArray) -> FloatArray:
 def _truncated_costs(camera: StereoCamera, links: TrackSegments, count: IntArray, motions: FloatArray) -> FloatArray:
     """(h, p) sum of the squared pixel residuals of each pair's links under h motions (3, 4, h, p) of it, each
     truncated; no whitening, for speed. The pairs have `count` (p,) links each."""
-    rows = np.array([[camera.fu, 0.0, camera.cu], [0.0, camera.fv, camera.cv], [0.0, 0.0, 1.0]])
     h, p = motions.shape[2:]
-    P = np.ascontiguousarray((rows @ motions.reshape(3, -1)).reshape(3, 4, h, p).transpose(3, 0, 2, 1))
+    P = np.ascontiguousarray((camera.K @ motions.reshape(3, -1)).reshape(3, 4, h, p).transpose(3, 0, 2, 1))
     point = np.concatenate([links.point.T, np.ones((1, len(links)))])
     starts, costs = np.cumsum(count) - count, np.empty((h, p))
     first = 0

@@ -54,7 +54,8 @@ def batch(
     elif progress is not None:
         progress(problem.n_frames, problem.n_frames)
     with threadpool_limits(limits=1, user_api="blas"):
-        return replace(_solve(problem, answer, both=from_dead_reckoning), by_products=by_products)
+        both = from_dead_reckoning or answer.status is Status.FAILED
+        return replace(_solve(problem, answer, both=both), by_products=by_products)
 
 
 def _solve(problem: Problem, answer: Estimate, *, both: bool) -> Estimate:
@@ -66,7 +67,7 @@ def _solve(problem: Problem, answer: Estimate, *, both: bool) -> Estimate:
     while used.any():
         kept = restricted_problem(problem, used)
         graph = full_graph(kept, around)
-        minima = _minima(graph, kept, None if failed else answer, events, both=both or failed)
+        minima = _minima(graph, kept, None if failed else answer, events, both=both)
         if not minima:
             break
         best = min(minima, key=lambda minimum: minimum.cost)
@@ -85,7 +86,7 @@ def _solve(problem: Problem, answer: Estimate, *, both: bool) -> Estimate:
                 status=status,
                 reason=reason,
                 seconds_total=time.perf_counter() - start,
-                events=(*events, _costs(minima, T - 1, both=both or failed)),
+                events=(*events, _costs(minima, T - 1, both=both)),
             )
             return states.answer(estimate)
         # A cheirality violation has no gradient and a meaningless residual: costs with it are not comparable.

@@ -76,7 +76,7 @@ def open_bag(path: Path, calibration: Path | None, topics: tuple[str, ...]) -> I
         name=path.stem,
         form="rosbag",
         source=shown(path),
-        t=np.array([stamp / 10**9 for stamp in paired.stamp.tolist()]) + rig.time_shift,
+        t=paired.t + rig.time_shift,
         pairs=_reader(path, chosen, paired.left, paired.right),
         left=rig.left,
         right=rig.right,

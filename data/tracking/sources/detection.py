@@ -7,7 +7,7 @@ from fgbaseline.geometry import InputError, se3
 
 from ...formats.bag_file import is_bag
 from ...formats.imu_attachment import read_imu
-from ...formats.imu_yaml import assumed_calibration, read_imu_calibration
+from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
 from ...formats.named_file import shown
 from ...formats.trajectory_reader import read_extrinsic
 from ...formats.velocity_csv import read_velocity_csv
@@ -96,11 +96,8 @@ def _with_motion(recording: ImageRecording, options: ImageOptions) -> ImageRecor
         return replace(recording, velocities=velocities, imu=None)
     if options.imu is None:
         return recording
-    unknown = assumed_calibration("no imu-calibration is given")
-    known = None if options.imu_calibration is None else read_imu_calibration(options.imu_calibration)
-    return replace(
-        recording, imu=read_imu(options.imu, known or unknown), imu_source=shown(options.imu), velocities=None
-    )
+    raw = read_imu(options.imu, calibration_or_assumed(options.imu_calibration, NO_CALIBRATION))
+    return replace(recording, imu=raw, imu_source=shown(options.imu), velocities=None)
 
 
 def _with_noise(recording: ImageRecording, calibration: Path) -> ImageRecording:

@@ -16,7 +16,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ...formats.imu_attachment import read_imu
-from ...formats.imu_yaml import ImuCalibration, assumed_calibration, read_imu_calibration
+from ...formats.imu_yaml import ImuCalibration, calibration_or_assumed
 from ...formats.named_file import reading, shown
 from ...observations import IntArray
 from ...plural import plural
@@ -49,7 +49,7 @@ def open_euroc(folder: Path) -> ImageRecording:
         name=place.parent.name if place.name == "mav0" else place.name,
         form="euroc",
         source=shown(folder),
-        t=np.array([stamp / 10**9 for stamp in paired.stamp.tolist()]) + rig.time_shift,
+        t=paired.t + rig.time_shift,
         pairs=file_pairs(both),
         left=rig.left,
         right=rig.right,
@@ -111,4 +111,4 @@ def _imu_calibration(mav: Path) -> ImuCalibration | None:
         return None
     files = [mav / "imu0" / "sensor.yaml", *(mav.parent / name for name in IMU_CONFIGS)]
     file = next((file for file in files if file.is_file()), None)
-    return assumed_calibration(f"{shown(files[0])} is missing") if file is None else read_imu_calibration(file)
+    return calibration_or_assumed(file, f"{shown(files[0])} is missing")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, se3
+from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ...formats.kitti import nearest_rotations
 from ...formats.named_file import reading, regular_file, shown
@@ -167,15 +167,7 @@ def _oxts(folder: Path, frames: IntArray) -> FloatArray | None:
 def _motion(oxts: FloatArray) -> Motion:
     """Linear and angular velocity (T, 3) in the body, and poses (T, 4, 4) in east, north, up (Mercator)."""
     latitude, longitude, altitude, roll, pitch, yaw = oxts[:, :6].T
-    zero, one = np.zeros_like(roll), np.ones_like(roll)
-
-    def stacked(*rows: tuple[FloatArray, ...]) -> FloatArray:
-        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-    cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
-    Rx = stacked((one, zero, zero), (zero, cr, -sr), (zero, sr, cr))
-    Ry = stacked((cp, zero, sp), (zero, one, zero), (-sp, zero, cp))
-    Rz = stacked((cy, -sy, zero), (sy, cy, zero), (zero, zero, one))
+    Rx, Ry, Rz = (so3.exp_so3(angle[:, None] * axis) for angle, axis in zip((roll, pitch, yaw), np.eye(3), strict=True))
     poses = np.tile(np.eye(4), (len(oxts), 1, 1))
     poses[:, :3, :3] = Rz @ Ry @ Rx
     scale = EARTH * np.cos(np.deg2rad(latitude[0]))
@@ -187,9 +179,7 @@ def _motion(oxts: FloatArray) -> Motion:
     return np.einsum("tji,tj->ti", poses[:, :3, :3], velocity), oxts[:, RATE].copy(), poses
 
 
-def _at_images(
-    motion: tuple[FloatArray, FloatArray, FloatArray], later: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _at_images(motion: Motion, later: FloatArray) -> Motion:
     """The motion at images that are `later` (T,), s, than the lines of the unit: some milliseconds."""
     linear, angular, poses = motion
     return linear, angular, poses @ se3.exp(np.hstack([linear, angular]) * later[:, None])

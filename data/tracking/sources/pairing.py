@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.geometry import InputError
+from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.ground_truth import match_stamps
 from ...observations import IntArray
@@ -27,6 +27,11 @@ class Paired(NamedTuple):
     """(T,) indices into the left images"""
     right: IntArray
     remarks: tuple[str, ...]
+
+    @property
+    def t(self) -> FloatArray:
+        """(T,) stamps in s."""
+        return np.array([stamp / 10**9 for stamp in self.stamp.tolist()])
 
 
 def pair(left: IntArray, right: IntArray, source: str) -> Paired:

@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.kitti import read_times
@@ -41,7 +39,7 @@ def open_two_folders(left: Path, right: Path, calibration: Path | None, times: P
     elif stamps[0] is not None and stamps[1] is not None:
         paired = pair(stamps[0], stamps[1], shown(left))
         remarks = paired.remarks
-        t = np.array([stamp / 10**9 for stamp in paired.stamp.tolist()])
+        t = paired.t
         files = [(both[0][a], both[1][b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)]
     else:
         raise InputError(f"{shown(left)}: the images' names are no stamps; add --times FILE with a line for each image")
