@@ -44,12 +44,12 @@ def evaluate(
         for name, estimator, values in matching(limits, index, measured):
             lines += _lines(limits, index, (name, measured.runs[name]), (estimator, values), baseline, updating)
     needed = limits.content.reference
-    sentences = [_reference(name, run, several=len(measured.runs) > 1) for name, run in measured.runs.items()]
+    several = len(measured.runs) > 1
     return Checked(
         lines=tuple(lines),
-        references=tuple(sentence for sentence in sentences if sentence),
-        sigmas=tuple(sentence for name, run in measured.runs.items() if (sentence := _sigma(name, run, measured))),
-        shortages=_shortages(lines, several=len(measured.runs) > 1),
+        references=tuple(filter(None, (_reference(*run, several=several) for run in measured.runs.items()))),
+        sigmas=tuple(filter(None, (_sigma(*run, several=several) for run in measured.runs.items()))),
+        shortages=_shortages(lines, several=several),
         undecided=needed is not Needed.NONE and any(is_undertrusted(run, needed) for run in measured.runs.values()),
         measured=measured,
         limits=shown(limits.path),
@@ -194,12 +194,12 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
         raise limits.wrong(place, "this limit needs a baseline; name one with --baseline FILE")
 
 
-def _sigma(name: str, run: MeasuredRun, measured: Measured) -> str:
+def _sigma(name: str, run: MeasuredRun, *, several: bool) -> str:
     """The sentence on the 1-sigma of a run's reference; empty where it is unknown."""
     reference = run.reference
     if reference.sigma is None or reference.name is None:
         return ""
-    where = f"{name}: " if len(measured.runs) > 1 else ""
+    where = f"{name}: " if several else ""
     return where + reference_sigma_sentence(reference.name, reference.sigma.model_dump())
 
 

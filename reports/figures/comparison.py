@@ -118,8 +118,7 @@ def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
             handles += panel.plot(table["travelled"], table[column].to_numpy(dtype=np.float64), **line(name))
     axes[0].set_ylabel("distance, m")
     fit_log_or_linear(axes[0], columns(data.series, "position"))
-    if not style.titled and axes[0].get_yscale() == "log":
-        few_ticks(axes[0])
+    few_ticks(axes[0], style)
     if has_heading:
         axes[1].set_ylabel("heading, °")
         axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)

@@ -70,8 +70,7 @@ def time_panels(
             fit_log(on, series, panel.decades)
         if panel.expected is not None:
             handles += panel.expected(run, on)
-        if not style.titled and on.get_yscale() == "log":
-            few_ticks(on)
+        few_ticks(on, style)
         on.set_ylabel(panel.label)
         on.set_title(panel.title)
     time_axis(run, axes, style)
@@ -132,8 +131,7 @@ def component_panels(
             panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
         else:
             fit_log_or_linear(panel, series)
-            if not style.titled and panel.get_yscale() == "log":
-                few_ticks(panel)
+            few_ticks(panel, style)
     return figure, axes, handles
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.compare import chi_square_bounds
 from fgbaseline.geometry import FloatArray
 
-from .style import BAND, GREEN, note, safe_text
+from .style import BAND, GREEN, Style, note, safe_text
 
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
@@ -60,8 +60,13 @@ def log_where_positive(axes: Axes) -> None:
         axes.set_yscale("log")
 
 
-def few_ticks(axes: Axes) -> None:
-    """Limits the ticks of a low logarithmic panel: plain numbers at 1, 2, 5 where there are less than two decades."""
+def few_ticks(axes: Axes, style: Style) -> None:
+    """Limits the ticks of a low logarithmic panel: plain numbers at 1, 2, 5 where there are less than two decades.
+
+    Panels are low in a style without titles; others, and linear ones, are left as they are.
+    """
+    if style.titled or axes.get_yscale() != "log":
+        return
     low, high = axes.get_ylim()
     if high < 100.0 * low:
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30.0 * low else (1.0, 3.0), numticks=6))

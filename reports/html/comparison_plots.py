@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fgbaseline.compare import reprojection_by
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData
 from ..figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS
-from .plot_data import chart, floats, integers
+from .plot_data import chart, floats, integers, median_by_frame, numbered, position_covariances
 
 MOMENTS = 4000
 """of the slider, at most"""
@@ -80,9 +79,8 @@ def _estimator(
     about |= {"cameras": None, "covariance": None, "landmarks": None, "points": None, "used": None}
     if result is not None and result.reported_covariance is not None:
         body = np.stack([view.ahead, view.left, view.up]) @ result.matched.estimate.rotation
-        P = body @ result.reported_covariance.covariance[:, :3, :3] @ np.swapaxes(body, 1, 2)
-        row, column = np.triu_indices(3)
-        about["covariance"] = floats(_at(t, data.t[entry.name], P[:, row, column]))
+        P = position_covariances(body, result.reported_covariance.covariance)
+        about["covariance"] = floats(_at(t, data.t[entry.name], P))
     if entry.landmarks is not None and len(entry.landmarks):
         points = entry.landmarks.position
         if result is not None:
@@ -108,11 +106,11 @@ def _differences(data: ComparisonData, t: FloatArray) -> Charts:
     }
     for column, (name, title, unit) in wanted.items():
         lines = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
-        yield chart("Differences", name, title, unit, _numbered(data, lines))
+        yield chart("Differences", name, title, unit, numbered((data.reference, *data.names), lines))
 
 
 def _heights(lines: Mapping[str, FloatArray]) -> Charts:
-    heights = {str(i): path[:, 2] for i, path in enumerate(lines.values())}
+    heights = numbered(lines, {name: path[:, 2] for name, path in lines.items()})
     yield chart("Differences", "height", "Height above the reference's start", "m", heights)
 
 
@@ -121,7 +119,7 @@ def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) ->
     lines = {n: _at(t, data.t[n], of.nees) for n, of in reported.items() if of is not None}
     hint = "the band holds 95 % of the poses of a consistent estimator"
     look = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": hint}
-    yield chart("Consistency", "nees", "NEES", "", _numbered(data, lines), **look)
+    yield chart("Consistency", "nees", "NEES", "", numbered((data.reference, *data.names), lines), **look)
 
 
 def _pixels(comparison: Comparison, t: FloatArray) -> Charts:
@@ -134,10 +132,17 @@ def _pixels(comparison: Comparison, t: FloatArray) -> Charts:
     lines = {}
     for name, pixels in comparison.pixels.items():
         if pixels.along is not None and len(pixels.along):
-            median = reprojection_by(pixels.along, "frame")["median"].reindex(range(sequence.n_frames))
-            lines[str(names.index(name))] = _at(t, stamps, median)
+            lines[name] = _at(t, stamps, median_by_frame(pixels.along, sequence.n_frames))
     hint = "with landmarks triangulated along each path"
-    yield chart("Pixels", "reprojection", "Median reprojection error by frame", "px", lines, log=True, hint=hint)
+    yield chart(
+        "Pixels",
+        "reprojection",
+        "Median reprojection error by frame",
+        "px",
+        numbered(names, lines),
+        log=True,
+        hint=hint,
+    )
 
 
 def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> list[dict[str, Any]]:
@@ -151,8 +156,3 @@ def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> l
         text = f"{name} {'first' if first else 'farthest,'} {far:.3g} m from {data.reference}"
         found.append({"frame": int(np.argmin(np.abs(t - data.t[name][k]))), "text": text})
     return sorted(found, key=lambda bookmark: int(bookmark["frame"]))
-
-
-def _numbered(data: ComparisonData, lines: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Lines by the number of their trajectory: 0 is the reference."""
-    return {str(1 + data.names.index(name)): values for name, values in lines.items()}

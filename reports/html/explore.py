@@ -4,13 +4,12 @@ from base64 import b64encode
 from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
-from importlib.resources import files
 
 import numpy as np
 from markupsafe import Markup
 
 from ..figures.style import DASHES, on_dark
-from .environment import NO_SCRIPT
+from .environment import NO_SCRIPT, asset
 
 SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
 """a page's script in the order of its dependencies"""
@@ -19,8 +18,7 @@ SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js"
 @cache
 def script() -> Markup:
     """The page's own script, as it stands between its tags."""
-    folder = files("fgbaseline.reports.html").joinpath("browser")
-    text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    text = "\n".join(asset(f"browser/{name}") for name in SCRIPTS)
     return Markup(f'\n"use strict";\n(() => {{\n{text}}})();\n')  # nosec: it is our own
 
 

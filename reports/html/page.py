@@ -27,12 +27,11 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Sentences:
-    """A list; what is beyond the first `most` is folded away."""
+    """A list."""
 
     shape: ClassVar[str] = "sentences"
     texts: Sequence[str]
     style: str = "verdict"
-    most: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,7 +129,9 @@ def _velocity_and_biases(run: Run) -> Iterable[dict[str, Any] | None]:
 
 
 def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
-    medians = {r.name: _by_frame(run, r) for r in run.answered if len(r.reprojection)}
+    medians = {
+        r.name: median_by_frame(r.reprojection, run.problem.n_frames) for r in run.answered if len(r.reprojection)
+    }
     title = "Median reprojection error by frame"
     hint = "over all observations of the landmarks that an estimator has"
     yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
@@ -205,14 +207,19 @@ def _column(run: Run, table: str, column: str) -> Lines:
     return _numbered(run, {r.name: read(r)[column].to_numpy() for r in compared if read(r) is not None})
 
 
-def _by_frame(run: Run, result: Result) -> FloatArray:
-    median = reprojection_by(result.reprojection, "frame")["median"]
-    values: FloatArray = median.reindex(range(run.problem.n_frames)).to_numpy(dtype=np.float64)
-    return values
+def median_by_frame(reprojection: Any, n_frames: int) -> FloatArray:
+    """Median error (T,) of each frame, px, from a table of `compare.reprojection`; NaN without an observation."""
+    median = reprojection_by(reprojection, "frame")["median"]
+    return np.asarray(median.reindex(range(n_frames)).to_numpy(dtype=np.float64))
 
 
 def _numbered(run: Run, lines: Lines) -> Lines:
-    number = {name: str(i) for i, name in enumerate(run.results)}
+    return numbered(run.results, lines)
+
+
+def numbered(names: Iterable[str], lines: Lines) -> Lines:
+    """Lines by the number of their name among `names`, as text."""
+    number = {name: str(i) for i, name in enumerate(names)}
     return {number[name]: np.asarray(values, dtype=np.float64) for name, values in lines.items()}
 
 
@@ -269,10 +276,14 @@ def _position_covariance(estimate: Estimate, axes: FloatArray) -> str | None:
     """(T, 6) m^2: xx, xy, xz, yy, yz, zz; the covariance is of the right perturbation, so the body's axes turn it."""
     if estimate.covariance is None:
         return None
-    R = axes @ estimate.world_T_imu[:, :3, :3]
-    P = R @ estimate.covariance[:, :3, :3] @ np.swapaxes(R, 1, 2)
+    return floats(position_covariances(axes @ estimate.world_T_imu[:, :3, :3], estimate.covariance))
+
+
+def position_covariances(view_R_body: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(n, 6) m^2: xx, xy, xz, yy, yz, zz in the view, of pose covariances (n, 6, 6) in the axes of their body."""
+    P = view_R_body @ covariance[:, :3, :3] @ np.swapaxes(view_R_body, 1, 2)
     row, column = np.triu_indices(3)
-    return floats(P[:, row, column])
+    return np.asarray(P[:, row, column])
 
 
 def image_data(run: Run, images: Pictures) -> dict[str, list[str]]:

@@ -47,8 +47,9 @@ def render(
     plots = None
     if run.answered or run.problem.sequence.truth is not None:
         plots = page_data(run, images.size)
-        rest = len(embedded_json(plots)) + sum(len(each.source) for each in pictures.values()) + MARKUP_BYTES
-        images.thin(max(0, PAGE_BYTES - rest) * 3 // 4)  # base64 has four letters for three bytes
+        if images.size is not None:
+            rest = len(embedded_json(plots)) + sum(len(each.source) for each in pictures.values()) + MARKUP_BYTES
+            images.thin(max(0, PAGE_BYTES - rest) * 3 // 4)  # base64 has four letters for three bytes
         plots["images"] = image_data(run, images)
     sequence, problem = summary["sequence"], summary["problem"]
     table = Grid(tables.main_table(run, summary["estimators"]))

@@ -24,8 +24,7 @@ from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
 
 from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
-from ..results.evidence import frame_ranges
-from ..results.statistics import PoseSigma
+from ..results.evidence import frame_ranges, summarize_sigma
 from .evidence import (
     DEGREES_OF_FREEDOM,
     held_out_sentences,
@@ -86,10 +85,10 @@ def _reference_sigma(run: Run) -> list[str]:
     """Possible distance of the reference itself from the truth, by its own covariances."""
     if run.reference is None:
         return []
-    sigma = run.results[run.reference].evidence.sigma
-    if not np.isfinite(sigma.position_rmse):
+    sigma = summarize_sigma(run.results[run.reference].evidence.sigma)
+    if sigma is None:
         return [f"{run.reference} has no covariances: its own distance from the truth is unknown."]
-    return [reference_sigma_sentence(run.reference, {name: getattr(sigma, name) for name in PoseSigma.model_fields})]
+    return [reference_sigma_sentence(run.reference, sigma)]
 
 
 def _coverage(run: Run) -> list[str]:

@@ -6,7 +6,7 @@ from fgbaseline.data import Sequence
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
-from ..formatting import number, per_cent
+from ..formatting import listed, number, per_cent
 
 ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "center", "right")
 EMPTY = 0.25
@@ -39,6 +39,5 @@ def _empty(pixel: FloatArray, size: tuple[float, float]) -> str:
     places = [f"{ROWS[k // 3]} {COLUMNS[k % 3]}" for k in np.flatnonzero(share < EMPTY / 9.0)]
     if not places:
         return "No ninth of the left image is empty."
-    names = places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
     few = f"less than {per_cent(EMPTY)} of an even share of the observations"
-    return f"Empty ninths of the left image ({few}): {names}."
+    return f"Empty ninths of the left image ({few}): {listed(places)}."

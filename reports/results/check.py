@@ -91,6 +91,11 @@ class Checked:
     baseline: str | None
 
     @property
+    def notices(self) -> tuple[str, ...]:
+        """Sentences before the table: too small samples, untrusted references and the sigma of references."""
+        return (*self.shortages, *self.references, *self.sigmas)
+
+    @property
     def exit_code(self) -> int:
         """0 all hold, 1 some fall short, 2 none does but some cannot be judged."""
         if self.count[Outcome.FALLS_SHORT]:

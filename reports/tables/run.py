@@ -94,8 +94,8 @@ def terminal_table(estimators: Estimators, reference: str | None) -> Table:
 
 
 def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table:
-    shown, answered, even = _shown(run, estimators, metrics)
-    values = {m: {name: m.value(estimators[name]).value for name in answered} for m in shown}
+    values, answered, even = _shown(run, estimators, metrics)
+    shown = list(values)
     rivals = {m: _rivals(run, m, answered) if even or m.same_data else set[str]() for m in shown}
     firsts = {m: best(m.better, {name: values[m][name] for name in rivals[m]}) for m in shown}
     notes: dict[str, str] = {}
@@ -107,10 +107,10 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
         why = _left_out(estimators[name], m) if isfinite(value) else _why_absent(estimators[name], m)
         if why == INFINITE:
             return Cell(INFINITY)
-        if _stands_for(run, name, estimators[name], m):
-            value, why = nan, NOT_POSITIVE_DEFINITE
+        overconfident = _stands_for(run, name, m)
+        why = NOT_POSITIVE_DEFINITE if overconfident else why
         mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
-        if why == NOT_POSITIVE_DEFINITE:
+        if overconfident:
             return Cell(OVERCONFIDENT, note=mark)
         if not isfinite(value):
             return Cell(DASH, note=mark)
@@ -132,28 +132,30 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
     return Table(columns, rows, notes=tuple((mark, text) for text, mark in notes.items()))
 
 
-def _shown(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> tuple[list[Metric], list[str], bool]:
-    """The metrics that a table shows, the estimators that answered, and whether these cover the same frames."""
+def _shown(
+    run: Run, estimators: Estimators, metrics: Iterable[Metric]
+) -> tuple[dict[Metric, dict[str, float]], list[str], bool]:
+    """Values of the metrics that a table shows, by estimator that answered, and whether these cover the same frames."""
     answered = [name for name in run.results if name in estimators and run.results[name].answered]
     even = same_frames(np.isfinite(run.results[n].estimate.world_T_imu[:, 0, 0]) for n in answered)
 
-    def is_shown(m: Metric) -> bool:
+    def is_shown(m: Metric, values: Mapping[str, float]) -> bool:
         if (m.group == DIVERGENCE and len(answered) < 2) or (even and m.uneven_only):
             return False
-        values = {name: m.value(estimators[name]).value for name in answered}
         return any(
-            _stands_for(run, name, estimators[name], m) or (isfinite(value) and (value != 0.0 or not m.nonzero_only))
+            _stands_for(run, name, m) or (isfinite(value) and (value != 0.0 or not m.nonzero_only))
             for name, value in values.items()
         )
 
-    return [m for m in metrics if is_shown(m)], answered, even
+    values = {m: {name: m.value(estimators[name]).value for name in answered} for m in metrics}
+    return {m: of_each for m, of_each in values.items() if is_shown(m, of_each)}, answered, even
 
 
 def main_frame(run: Run, estimators: Estimators) -> pd.DataFrame:
     """The figures of `main_table`, one metric a row and one estimator a column; NaN where there is none."""
-    shown, answered, _ = _shown(run, estimators, shown_in(MAIN))
-    rows = [[m.value(e).value if name in answered else nan for name, e in estimators.items()] for m in shown]
-    return pd.DataFrame(rows, pd.Index([m.full_title for m in shown], name="metric"), list(estimators))
+    values, _, _ = _shown(run, estimators, shown_in(MAIN))
+    rows = [[of_each.get(name, nan) for name in estimators] for of_each in values.values()]
+    return pd.DataFrame(rows, pd.Index([m.full_title for m in values], name="metric"), list(estimators))
 
 
 def trust_table(criteria: Iterable[Criterion]) -> Table:
@@ -175,12 +177,12 @@ def _criterion(c: Criterion) -> Row:
     return Row(f"{c.name}, {c.unit}" if c.unit else c.name, cells)
 
 
-def _stands_for(run: Run, name: str, estimator: Mapping[str, Any], metric: Metric) -> bool:
+def _stands_for(run: Run, name: str, metric: Metric) -> bool:
     """Whether OVERCONFIDENT stands for the median reference NEES: P is smaller than P_ref in most frames of both."""
     if metric.path != ("nees_reference", "median") or name in run.unranked:
         return False
-    counts: Mapping[str, int] = at(estimator, "nees_reference") or {}
-    return 2 * counts.get("overconfident", 0) > counts.get("frames", 0) + counts.get("left_out", 0)
+    difference = run.results[name].evidence.difference
+    return difference is not None and difference.is_overconfident
 
 
 def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
