@@ -121,10 +121,12 @@ def rmse_of_inverse_poses(matched: MatchedTrajectories) -> tuple[float, float]:
 
 
 def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> BodyRotation:
+    n = len(estimate)
+    moments = (estimate.reshape(n, 9).T @ reference.reshape(n, 9)).reshape(3, 3, 3, 3)  # all sums over the poses
     W, B = world, np.eye(3)
     for _ in range(ITERATIONS):
-        B = _nearest(np.einsum("tji,jk,tkl->il", estimate, W.T, reference))
-        W = _nearest(np.einsum("tij,jk,tlk->il", reference, B.T, estimate))
+        B = _nearest(np.einsum("jikl,kj->il", moments, W))
+        W = _nearest(np.einsum("lkij,kj->il", moments, B))
     left = np.swapaxes(reference, 1, 2) @ (W @ estimate @ B)
     return BodyRotation(B, float(np.rad2deg(np.median(so3.rotation_angle(left)))))
 

@@ -1,19 +1,28 @@
-"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line."""
+"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line.
 
-import gzip
+In plain Python, so that a fault is reported before numpy is imported; `NumberTable` has arrays.
+"""
+
 import re
-import zlib
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from math import isfinite, isnan
+from operator import itemgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+from fgbaseline.geometry import InputError
 
-from fgbaseline.geometry import FloatArray, InputError
+if TYPE_CHECKING:
+    from fgbaseline.geometry import FloatArray
 
-from ..observations import IntArray
+    from ..observations import IntArray
 
 GZIP = b"\x1f\x8b"
+AT_ONCE = 10_000
+"""lines that are split at a time"""
 MOST_BYTES = 2**30
 """of a file once unpacked"""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -25,19 +34,33 @@ WINDOWS_NAN = re.compile(r"nan\([a-z]*\)", re.IGNORECASE)
 class NumberTable:
     """n lines of m numbers, and where in the file each of them stands."""
 
-    values: FloatArray
-    """(n, m)"""
-    line: IntArray
+    numbers: "array[float]"
+    """n times m, line by line"""
+    number: Sequence[int]
     """(n,) line numbers, from 1"""
+
+    @property
+    def values(self) -> "FloatArray":
+        """(n, m)"""
+        import numpy as np
+
+        return np.array(self.numbers).reshape(len(self.number), -1)
+
+    @property
+    def line(self) -> "IntArray":
+        """(n,) line numbers, from 1"""
+        import numpy as np
+
+        return np.array(self.number, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
     """The lines of a text file that hold data, without comments, and what stands above them."""
 
-    number: list[int]
+    number: Sequence[int]
     """where in the file each stands, from 1"""
-    text: list[str]
+    text: Sequence[str]
     separator: str | None
     """a comma, a semicolon, or None for blanks and tabs"""
     title: str | None
@@ -64,7 +87,7 @@ class Lines:
 
     def column(self, k: int) -> list[str]:
         """The k-th word of each line, without blanks or quotes; all lines must be as wide as the first."""
-        return [line.split(self.separator)[k].strip(' \t"') for line in self.text]
+        return [line.split(self.separator, k + 1)[k].strip(' \t"') for line in self.text]
 
 
 def read_lines(file: Path) -> Lines:
@@ -72,29 +95,42 @@ def read_lines(file: Path) -> Lines:
 
     Raises InputError naming the line for what is no text or has decimal commas; OSError as `open` does.
     """
-    numbers: list[int] = []
-    texts: list[str] = []
+    every = _text(file).split("\n")
     comments: list[str] = []
     title, title_line = None, 1
-    for number, line in enumerate(_text(file).split("\n"), start=1):
-        bare, _, comment = line.partition("#")
-        content = bare.strip()
-        if content.startswith("%"):
-            content, comment = "", content
-        if not texts and comment.strip():
+    for first, line in enumerate(every):
+        content, comment = _without_comment(line)
+        if comment.strip():
             comments.append(comment.strip("# \t,;"))
-        content = content.rstrip(" \t")
-        if not content:
-            continue
-        if not texts and title is None and _has_no_number(content):
-            title, title_line = content, number
-            continue
-        numbers.append(number)
-        texts.append(content)
+        if content and title is None and _has_no_number(content):
+            title, title_line = content, first + 1
+        elif content:
+            break
+    else:
+        first = len(every)
+    numbers, texts = _lines_of_data(every, first)
     separator = _separator(texts[0], numbers[0]) if texts else None
     if separator is not None:
         texts = [text.removesuffix(separator).rstrip() for text in texts]
     return Lines(numbers, texts, separator, title, tuple(comments), title_line)
+
+
+def _without_comment(line: str) -> tuple[str, str]:
+    """The data of a line, and its comment."""
+    bare, _, comment = line.partition("#")
+    content = bare.strip()
+    return ("", content) if content.startswith("%") else (content, comment)
+
+
+def _lines_of_data(every: Sequence[str], first: int) -> tuple[Sequence[int], list[str]]:
+    """Line numbers, from 1, and texts of all lines from `first` on, without blank lines and comments."""
+    texts = [line.strip() for line in every[first:]]
+    while texts and not texts[-1]:
+        texts.pop()
+    if all(texts) and not any("#" in text or "%" in text for text in texts):
+        return range(first + 1, first + 1 + len(texts)), texts
+    data = [(number, _without_comment(text)[0]) for number, text in enumerate(texts, start=first + 1)]
+    return [number for number, text in data if text], [text for _, text in data if text]
 
 
 def split(text: str, separator: str | None) -> list[str]:
@@ -110,20 +146,37 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
     """
     lines.require_some()
     width = lines.width
-    for number, text in zip(lines.number, lines.text, strict=True):
-        if (words := _count(text, lines.separator)) != width:
-            raise InputError(f"line {number}: expected {width} numbers, got {words}: {_short(text)}")
     wanted = list(range(width)) if columns is None else list(columns)
-    texts = [WINDOWS_NAN.sub("nan", text) for text in lines.text] if nan else lines.text
     try:
-        values = np.loadtxt(
-            texts, np.float64, comments=None, ndmin=2, delimiter=lines.separator, usecols=wanted, quotechar='"'
-        )
-    except ValueError as error:
-        raise _culprit(lines, wanted, nan=nan) from error
-    if len(values) != len(texts) or np.isinf(values).any() or (np.isnan(values).any() and not nan):
-        raise _culprit(lines, wanted, nan=nan)
-    return NumberTable(values, np.array(lines.number, dtype=np.int64))
+        numbers = _floats(lines, lines.text, width, wanted)
+    except ValueError:
+        if not nan:
+            raise _culprit(lines, wanted, nan=nan) from None
+        try:
+            numbers = _floats(lines, [WINDOWS_NAN.sub("nan", text) for text in lines.text], width, wanted)
+        except ValueError:
+            raise _culprit(lines, wanted, nan=nan) from None
+    odd = any("_" in text or not text.isascii() for text in lines.text)  # Python's float reads more than others do
+    if odd or not all(map(isfinite, numbers)):
+        _require_numbers(lines, wanted, nan=nan)
+    return NumberTable(numbers, lines.number)
+
+
+def _floats(lines: Lines, texts: Sequence[str], width: int, wanted: Sequence[int]) -> "array[float]":
+    """The numbers in the `wanted` columns of texts. Raises InputError for a line of another width, and ValueError."""
+    numbers = array("d")
+    quoted = any('"' in text for text in texts)
+    chosen = itemgetter(*wanted) if len(wanted) > 1 else lambda row: (row[wanted[0]],)
+    for k in range(0, len(texts), AT_ONCE):
+        rows = [text.split(lines.separator) for text in texts[k : k + AT_ONCE]]
+        for i, row in enumerate(rows, start=k):
+            if len(row) != width:
+                raise InputError(
+                    f"line {lines.number[i]}: expected {width} numbers, got {len(row)}: {_short(lines.text[i])}"
+                )
+        words: Iterable[str] = chain.from_iterable(map(chosen, rows) if len(wanted) < width else rows)
+        numbers.extend(map(float, (word.strip(' \t"') for word in words) if quoted else words))
+    return numbers
 
 
 def require_width(lines: Lines, counts: dict[int, str]) -> None:
@@ -158,6 +211,9 @@ def _text(file: Path) -> str:
 
 
 def _unpacked(file: Path) -> bytes:
+    import gzip
+    import zlib
+
     try:
         with gzip.open(file) as packed:
             content = packed.read(MOST_BYTES + 1)
@@ -200,19 +256,21 @@ def _has_no_number(text: str) -> bool:
     return len(words) > 1 and not any(is_number(word) for word in words)
 
 
-def _count(text: str, separator: str | None) -> int:
-    return len(text.split()) if separator is None else text.count(separator) + 1
+def _require_numbers(lines: Lines, columns: Sequence[int], *, nan: bool) -> None:
+    """Raises InputError for the first line whose `columns` are not all numbers."""
+    for number, text in zip(lines.number, lines.text, strict=True):
+        words = split(WINDOWS_NAN.sub("nan", text) if nan else text, lines.separator)
+        for word in (words[k] for k in columns):
+            if not (is_number(word) and (isfinite(float(word)) or (nan and isnan(float(word))))):
+                raise InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
 
 
 def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
-    """The error for the first line whose `columns` are not all numbers."""
-    for i, number in enumerate(lines.number):
-        words = lines.words(i)
-        for k in columns:
-            word = words[k]
-            if is_number(word) and (np.isfinite(float(word)) or (nan and np.isnan(float(word)))):
-                continue
-            return InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
+    """The error of `_require_numbers`, or of a file in which each word is a number and the whole is no table."""
+    try:
+        _require_numbers(lines, columns, nan=nan)
+    except InputError as error:
+        return error
     return InputError(f"the file is no table of {lines.width} numbers a line; check that it is the right one")
 
 

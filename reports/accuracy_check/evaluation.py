@@ -10,6 +10,7 @@ from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
 from ..results.check import NEW, Checked, Line, Shortage
+from ..results.json_tree import INFINITE
 from ..results.reader import (
     DIGITS,
     NO_SUCH_METRIC,
@@ -23,7 +24,6 @@ from ..results.reader import (
     sample_of,
     value_of,
 )
-from ..results.statistics import INFINITE
 from .baseline import baseline_value, is_timing
 from .limits_file import Limit, Limits, Needed
 

@@ -19,8 +19,8 @@ from ..html.environment import environment, picture
 from ..phrases.bench import FIGURES, NEES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
+from ..results.json_tree import INFINITE, at
 from ..results.reader import RunFolder
-from ..results.statistics import INFINITE, at
 from ..tables import latex, markdown
 from ..tables.bench import main_table, ranking_tables, runs_table
 from .job import Planned

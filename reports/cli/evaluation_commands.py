@@ -128,14 +128,15 @@ def compare(
     from fgbaseline.geometry import InputError
 
     from ..comparison import compare as compare_files
-    from ..results.comparison import MARK
-    from ..tables import print_table
+    from ..results.documents import COMPARISON
 
     if out is not None:
-        require_free(out, force=force, mark=MARK)
+        require_free(out, force=force, mark=COMPARISON)
     elif force:
         raise InputError("force: there is no folder to replace; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
+    from ..tables import print_table
+
     page = None if out is None else report.write(out, force=force)
     first, *others = report.verdict
     click.echo(f"{first}\n")
@@ -180,6 +181,12 @@ def check(
     undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
     untrusted, or when there is no baseline to compare with.
     """
+    from fgbaseline.data.toml_text import toml_values
+
+    from ..results.documents import measured_file, read_document
+
+    toml_values(limits)  # faults of the files are reported before their models are imported
+    read_document(measured_file(folder))
     from ..accuracy_check.command import Outputs
     from ..accuracy_check.command import check as check_folder
 
@@ -203,6 +210,9 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     from fgbaseline.data.formats.atomic_folder import atomic_folder
     from fgbaseline.data.plural import plural
 
+    from ..results.documents import run_summary
+
+    run_summary(folder)  # a fault is reported before matplotlib is imported
     from ..figures.run import draw_for_paper
     from ..figures.run_data import of_folder
     from ..figures.saving import CAPTIONS, save, save_captions

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,15 +11,19 @@ from fgbaseline.compare.trajectory_comparison.bodies import moved_body, with_bod
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
-from fgbaseline.data import Landmarks, Problem, Trajectory
-from fgbaseline.data.formats import read_kitti, read_landmarks, read_times, read_trajectory_file
+from fgbaseline.data import Trajectory
+from fgbaseline.data.formats import read_kitti, read_landmarks, read_times
 from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.formats.trajectory_reader import parsed_file
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from .reference_run import ReferenceRun, load_problem, read_reference_run
+from .opening import split_name
 
-Given = str | Path | Trajectory
-"""`[NAME=]FILE`, or a trajectory in memory"""
+if TYPE_CHECKING:
+    from fgbaseline.data import HeldOut, Landmarks, Problem
+
+    from .opening import Given
+    from .reference_run import ReferenceRun
 
 CUT_OFF = 0.01
 """largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
@@ -26,11 +31,12 @@ ONLINE = "-online"
 """suffix of a smoother's by-product: pose k from data up to frame k"""
 
 
-def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequence[str], settings: Settings) -> Entries:
+def read_entries(
+    reference: "Given", estimates: "Sequence[Given]", landmarks: Sequence[str], settings: Settings
+) -> Entries:
     """Reads all inputs. Raises InputError with the file and its fault."""
-    run = read_reference_run(Path(str(reference))) if _is_folder(reference) else None
-    problem, held = load_problem(settings, run)
-    own = [_opened(given, settings) for given in (estimates if run is not None else [reference, *estimates])]
+    run, problem, held = _background(reference, settings)
+    own = [_parsed(given) for given in (estimates if run is not None else [reference, *estimates])]
     sources = own if run is None else [run.files.trajectory(run.reference), *own]
     first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
     beside = []
@@ -48,19 +54,23 @@ def read_entries(reference: Given, estimates: Sequence[Given], landmarks: Sequen
     return Entries(entries[0], tuple(entries[1:]), problem, held, up, run is not None)
 
 
-def _is_folder(given: Given) -> bool:
-    return isinstance(given, str | Path) and Path(given).is_dir()
+def _background(reference: "Given", settings: Settings) -> "tuple[ReferenceRun | None, Problem | None, HeldOut | None]":
+    """The run that a reference is the folder of, the problem, and the held-out tracks."""
+    if not isinstance(reference, Path) and settings.sequence is None and not settings.held_out:
+        return None, None, None
+    from .reference_run import load_problem, read_reference_run
+
+    run = read_reference_run(reference) if isinstance(reference, Path) else None
+    return run, *load_problem(settings, run)
 
 
-def _opened(given: Given, settings: Settings) -> Source:
-    if isinstance(given, Trajectory):
-        return given
-    name, file = _split(str(given))
-    return read_trajectory_file(file, settings.form, name)
+def _parsed(given: "Given") -> Source:
+    assert not isinstance(given, Path)
+    return given if isinstance(given, Trajectory) else parsed_file(given)
 
 
 def _in_one_body(
-    every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
+    every: list[Resolved], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None"
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
@@ -93,17 +103,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def _split(given: str) -> tuple[str | None, str]:
-    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
-    name, mark, file = given.partition("=")
-    if not mark or Path(given).exists() or "/" in name:
-        return None, given
-    if not name or not file:
-        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
-    return name, file
-
-
-def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
+def _times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         return [read_times(file, settings.unit) for file in settings.times]
@@ -113,7 +113,7 @@ def _times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
     return [t[: len(t) - k] for k in range(int(CUT_OFF * len(t)) + 1)]
 
 
-def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:
+def _extrinsic(settings: Settings, problem: "Problem | None") -> FloatArray | None:
     if settings.extrinsic is None:
         return None if problem is None else problem.sequence.imu_T_cam
     poses = read_kitti(settings.extrinsic)
@@ -122,7 +122,7 @@ def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None
     return np.asarray(poses[0], dtype=np.float64)
 
 
-def _beside(run: ReferenceRun, wanted: str) -> list[str]:
+def _beside(run: "ReferenceRun", wanted: str) -> list[str]:
     others = [name for name in run.names if name != run.reference]
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
@@ -156,13 +156,15 @@ def _file_name(name: str) -> str:
     return name
 
 
-def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], problem: Problem | None) -> list[Entry]:
+def _with_landmarks(
+    entries: list[Entry], files: Sequence[str], own: list[str], problem: "Problem | None"
+) -> list[Entry]:
     """The entries with landmarks of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
     if files and problem is None:
         raise InputError("landmarks: their reprojection needs the observations of a recording; add --sequence")
     found: dict[str, Landmarks] = {}
     for given in files:
-        name, file = _split(given)
+        name, file = split_name(given)
         if name is None:
             if len(own) != 1:
                 raise InputError(f"{shown(file)}: it may belong to any of {len(own)} estimates; name one: NAME=FILE")
@@ -176,7 +178,7 @@ def _with_landmarks(entries: list[Entry], files: Sequence[str], own: list[str], 
     return merged
 
 
-def _require_known(entry: Entry, problem: Problem | None) -> None:
+def _require_known(entry: Entry, problem: "Problem | None") -> None:
     if problem is None or entry.landmarks is None or not len(entry.landmarks):
         return
     last, n = int(entry.landmarks.index[-1]), problem.sequence.n_landmarks

@@ -11,7 +11,8 @@ from fgbaseline.data import HeldOut, LandmarkMode, Problem, read, read_problem
 from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.geometry import InputError
 
-from ..results.reader import SUMMARY, RunFolder
+from ..results.documents import SUMMARY
+from ..results.reader import RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 
 

@@ -8,49 +8,55 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
-from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
-from fgbaseline.data import Trajectory, write_tum
+from fgbaseline.compare.trajectory_comparison.settings import Settings
+from fgbaseline.data import write_tum
 from fgbaseline.data.formats.atomic_folder import atomic_folder
 
 from ..phrases import comparison as phrases
-from ..results.comparison import MARK, Summary
-from ..results.comparison_summary import summarize
+from ..results.comparison_summary import results_by_name, summarize
+from ..results.documents import COMPARISON
 from ..tables import Table, latex, markdown
 from ..tables.comparison import comparison_table, main_table, metrics_table
-from .inputs import Given, read_entries
+from .inputs import read_entries
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
-FILES = ("sequence", "extrinsic")
+    from ..results.comparison import Summary
+    from .opening import Given
 
 
 class ComparisonReport(Comparison):
     """A comparison with pandas tables, sentences, matplotlib figures, and a folder with all of them."""
 
     @cached_property
-    def summary(self) -> Summary:
+    def by_name(self) -> dict[str, dict[str, Any]]:
+        """Figures of the reference and of every estimate, as `comparison.json` has them."""
+        return results_by_name(self)
+
+    @cached_property
+    def summary(self) -> "Summary":
         """All metrics, as in `comparison.json`."""
-        return summarize(self, self.caption)
+        return summarize(self, self.by_name, self.caption)
 
     @property
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """One row per estimate, one column per main metric; see `caption`."""
-        return main_table(self, self.summary)
+        return main_table(self, self.by_name)
 
     @property
     def text_table(self) -> Table:
         """The main metrics as text, one column per trajectory, for `tables.markdown`, `latex` and `print_table`."""
-        return comparison_table(self, self.summary)
+        return comparison_table(self, self.by_name, self.caption)
 
     @property
-    def metrics(self) -> pd.DataFrame:
+    def metrics(self) -> "pd.DataFrame":
         """Every metric: estimate, metric, value, and low and high of its 95 % interval."""
-        return metrics_table(self.summary)
+        return metrics_table(self, self.by_name)
 
     @property
     def caption(self) -> str:
@@ -74,7 +80,7 @@ class ComparisonReport(Comparison):
         Raises InputError where the folder exists without `force` or is not that of a comparison.
         """
         place = Path(folder)
-        with atomic_folder(place, force=force, mark=MARK) as building:
+        with atomic_folder(place, force=force, mark=COMPARISON) as building:
             self._fill(building)
         return place / "report.html"
 
@@ -99,37 +105,16 @@ class ComparisonReport(Comparison):
         for file, text in {
             "table.md": markdown(self.text_table),
             "table.tex": latex(self.text_table),
-            "report.html": render(self, self.summary, figures),
-            MARK: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
+            "report.html": render(self, self.by_name, self.summary, figures),
+            COMPARISON: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
         }.items():
             (folder / file).write_text(text, encoding="utf-8")
 
 
-def compare(
-    reference: Given,
-    *estimates: Given,
-    landmarks: Sequence[str | Path] = (),
-    deltas: Sequence[str] = (),
-    **options: Any,
-) -> ComparisonReport:
-    """Compares estimates with a reference, each a `[NAME=]FILE` (TUM, KITTI, EuRoC, npz) or a `Trajectory`.
-
-    The reference may be the folder of a run: then its other estimators are compared too. `landmarks` are CSV files
-    (`[NAME=]FILE`), `deltas` are texts such as "1s" or "10m"; the other options are the fields of `Settings`.
-
-        result = compare("truth.tum", "mine.tum", align="se3")
-        result.table, result.caption, result.verdict
-        result.write("out/comparison")
-
-    Raises InputError, in one sentence, for an invalid file or option.
-    """
-    options |= {name: Path(options[name]) for name in FILES if options.get(name) is not None}
-    times = options.pop("times", None) or ()
-    options["times"] = tuple(map(Path, [times] if isinstance(times, str | Path) else times))
-    settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
-    given = [item if isinstance(item, Trajectory) else str(item) for item in (reference, *estimates)]
+def report_of(opened: "Sequence[Given]", landmarks: Sequence[str], settings: Settings) -> ComparisonReport:
+    """Compares opened inputs, the reference first. Raises InputError."""
     with np.errstate(all="ignore"):
-        entries = read_entries(given[0], given[1:], [str(file) for file in landmarks], settings)
+        entries = read_entries(opened[0], opened[1:], landmarks, settings)
         comparison = compare_entries(entries, settings)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
 
@@ -137,7 +122,10 @@ def compare(
 def _write_series(result: Result, path: Path) -> None:
     """One row per pair of poses: stamps of both, and all errors."""
     reference, estimate = result.matched.reference, result.matched.estimate
-    table = result.departure.drop(columns="t").assign(pose=result.absolute["pose"].to_numpy())
+    import pandas as pd
+
+    columns = {name: column for name, column in result.departure.items() if name != "t"}
+    table = pd.DataFrame({**columns, "pose": result.absolute["pose"]})
     if result.reported_covariance is not None:
         table["nees"] = result.reported_covariance.nees
     for column, t in (("t_estimate", estimate.t), ("t", reference.t)):

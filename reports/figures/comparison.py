@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, MatchedTrajectories
+from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
@@ -106,7 +108,7 @@ def growth(comparison: "Comparison") -> Figure:
     handles: list[Any] = []
     for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
         for name, table in tables.items():
-            handles += panel.plot(table["travelled"], table[column].to_numpy(dtype=np.float64), **line(name))
+            handles += panel.plot(table["travelled"], table[column], **line(name))
     axes[0].set_ylabel("distance, m")
     fit_log_or_linear(axes[0], columns(tables, "position"))
     if has_heading:
@@ -136,11 +138,11 @@ def relative(comparison: "Comparison") -> Figure | None:
     return figure
 
 
-def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, pd.DataFrame], column: str) -> None:
+def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, Columns], column: str) -> None:
     color, names = colors(comparison), list(comparison.results)
     for name, table in motions.items():
         panel.boxplot(
-            [table[column].dropna().to_numpy()],
+            [without_nan(table[column])],
             positions=[names.index(name)],
             orientation="horizontal",
             widths=0.55,
@@ -160,7 +162,7 @@ def _boxes(comparison: "Comparison", panel: Axes, motions: Mapping[str, pd.DataF
 def segments(comparison: "Comparison") -> Figure | None:
     """KITTI's segment errors by the length of the segments; None where none has two lengths."""
     known = {n: r.segments for n, r in comparison.results.items() if r.segments is not None}
-    if not any(len(found.by_length) > 1 for found in known.values()):
+    if not any(len(found.means_by_length["n"]) > 1 for found in known.values()):
         return None  # the table says as much
     figure = Figure(figsize=(SCREEN.width, 3.4))
     panels = figure.subplots(1, 2)
@@ -170,7 +172,8 @@ def segments(comparison: "Comparison") -> Figure | None:
     for panel, (column, title) in zip(panels, columns_shown.items(), strict=True):
         for name, found in known.items():
             look = {**line(name), "marker": "o", "markersize": 4}
-            handles += panel.plot(found.by_length.index, found.by_length[column], **look)
+            means = found.means_by_length
+            handles += panel.plot(means["length"], means[column], **look)
         panel.set_ylabel(title)
         panel.set_xlabel("length of the segments, m")
         panel.set_ylim(bottom=0.0)
@@ -207,7 +210,7 @@ def _three_sigma(comparison: "Comparison", result: "Result") -> Figure | None:
     return three_sigma_of(result.name, t, reported.error, reported.covariance, _lines(comparison)(result.name))
 
 
-def _departures(comparison: "Comparison") -> dict[str, pd.DataFrame]:
+def _departures(comparison: "Comparison") -> dict[str, Columns]:
     return {name: result.departure for name, result in comparison.results.items()}
 
 

@@ -12,7 +12,7 @@ from ..figures.style import colors
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables import Row
-from ..tables.comparison import comparison_table
+from ..tables.comparison import Results, comparison_table
 from .environment import environment, picture
 
 CAPTIONS: Mapping[str, str] = {
@@ -31,10 +31,10 @@ CAPTIONS: Mapping[str, str] = {
 """captions by the beginning of a figure's name"""
 
 
-def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
+def render(comparison: Comparison, results: Results, summary: Summary, figures: Mapping[str, Figure]) -> str:
     """`report.html`. All text that comes from files is escaped."""
     reference, estimates = summary.reference, summary.estimates
-    table = comparison_table(comparison, summary, mark_reference=True)
+    table = comparison_table(comparison, results, summary.caption, mark_reference=True)
     palette = colors([reference.name, *estimates], reference.name)
     titles = {name: f"{name} (reference)" if name == reference.name else name for name in palette}
     notes = {f"Missing figures of {name}": estimate.notes for name, estimate in estimates.items()}

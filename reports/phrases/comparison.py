@@ -101,7 +101,7 @@ def _position_rmse(comparison: Comparison) -> list[str]:
     if not others:
         return by_products
     if comparison.ranking.same:
-        path = float(others[0].departure["travelled"].iloc[-1])
+        path = float(others[0].departure["travelled"][-1])
         share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
@@ -150,8 +150,7 @@ def _signed(meters: float) -> str:
 
 def _rmse(result: Result) -> str:
     """Position RMSE with its interval: `0.52 m [0.41, 0.66]`."""
-    low, high = (float(result.statistics["translation"][bound]["rmse"]) for bound in ("low", "high"))
-    value, mark, bounds = interval(result.rmse, low, high).partition(" [")
+    value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
     return f"{value} m{mark}{bounds}"
 
 
@@ -159,7 +158,7 @@ def _maximum_errors(comparison: Comparison) -> list[str]:
     """Largest position error of each estimate, and when it first exceeds the threshold."""
     sentences = []
     for result in comparison.ranked:
-        most = float(result.departure["position"].max())
+        most = float(np.nanmax(result.departure["position"]))
         sentence = f"{result.name}: maximum position error {number(most)} m; {threshold(result.bound)}."
         if result.passing is not None:
             t = result.passing.t - float(result.matched.reference.t[0])
@@ -183,7 +182,7 @@ def _decompositions(comparison: Comparison) -> list[str]:
 
 
 def _share(result: Result, name: str) -> str:
-    value, low, high = (float(x) for x in result.share_intervals.loc[name, ["value", "low", "high"]].to_numpy())
+    value, low, high = result.share_intervals.by_name[name]
     if not np.isfinite(low):
         return per_cent(max(value, 0.0))
     return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
@@ -243,7 +242,7 @@ def _undetermined_alignments(comparison: Comparison) -> list[str]:
 
 def _rough_intervals(comparison: Comparison) -> list[str]:
     """Estimates with fewer than ten independent blocks."""
-    names = [r.name for r in comparison.results.values() if not r.statistics["translation"].attrs["reliable"]]
+    names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
     if not names:
         return []
     return [f"The intervals of {listed(names)} are rough: fewer than 10 independent blocks fit the path."]

@@ -1,13 +1,17 @@
 """Sentences that a run and a comparison share: trust in the reference, sample size, held-out tracks, thresholds."""
 
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
-import pandas as pd
-
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, Trust, Verdict
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 
 from ..formatting import listed, number, per_cent
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fgbaseline.compare import Trust
 
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
@@ -19,10 +23,10 @@ MEANING: Mapping[str, str] = {
 ROUGH = "The interval is rough: fewer than 10 independent blocks fit the path."
 
 
-def reference_sentence(name: str, trust: Trust, *, is_compared: bool = True) -> str:
+def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
     """Trust in a reference, with its first three reasons and what it means for divergence from it."""
     word, reasons = trust.verdict.name.lower(), "; ".join(trust.reasons[:3])
-    if trust.verdict is Verdict.TRUSTED or not is_compared:
+    if word == "trusted" or not is_compared:
         return f"The reference, {name}, is {word}: {reasons}."
     return f"The reference, {name}, is {word}: {reasons}; {MEANING[word]}."
 
@@ -41,7 +45,7 @@ def threshold(bound: float) -> str:
     )
 
 
-def held_out_sentences(ranking: pd.DataFrame, sample: str) -> list[str]:
+def held_out_sentences(ranking: "pd.DataFrame", sample: str) -> list[str]:
     """Median held-out errors in a sentence, and the paths without a significant difference from the first in another.
 
     `ranking` has a row for each path, best first, with `median` and `behind_low`; `sample` names what it is taken over.

@@ -1,14 +1,12 @@
 """Model of `comparison.json`; `make schema` writes docs/comparison.schema.json."""
 
 import json
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from fgbaseline.reports.results.statistics import Nees, Number, Part, Reprojection
 
-MARK = "comparison.json"
-"""the file by which a comparison's folder is known"""
 SCHEMA: Final = "fgbaseline/comparison/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
 
@@ -247,12 +245,6 @@ class Summary(Part):
     sequence: Annotated[str | None, Field(description="the recording that the reprojection is of")]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
-
-    @property
-    def by_name(self) -> dict[str, dict[str, Any]]:
-        """Figures of the reference and of every estimate, as JSON has them."""
-        parts = {self.reference.name: self.reference, **self.estimates}
-        return {name: part.model_dump(mode="json") for name, part in parts.items()}
 
 
 def json_schema() -> str:

@@ -8,17 +8,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Flag, auto
 from math import isfinite, nan
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from pydantic import Field, create_model
 
 from fgbaseline.compare import time_coverage
-from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.limits import Better
 
 from ..formatting import interval, number
-from .statistics import Number, Part, at
+from .json_tree import at
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Result, Run
 
 LOWER, HIGHER, PERCENT = Better.LOWER, Better.HIGHER, 100.0
 
@@ -90,7 +91,7 @@ class Metric:
     """whether it is a whole number"""
     absent: str = ""
     """why it may be missing, where the results do not say"""
-    measure: Callable[[Run, Result], float] | None = None
+    measure: "Callable[[Run, Result], float] | None" = None
     """its figure, where no model of the results has it"""
 
     @property
@@ -139,12 +140,12 @@ def _float(value: object) -> float:
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
 
 
-def _coverage(run: Run, result: Result) -> float:
+def _coverage(run: "Run", result: "Result") -> float:
     t = run.problem.sequence.t
     return time_coverage(t[np.isfinite(result.estimate.world_T_imu[:, 0, 0])], t)
 
 
-def _frames_per_second(run: Run, result: Result) -> float:
+def _frames_per_second(run: "Run", result: "Result") -> float:
     seconds = result.estimate.seconds_total
     return run.problem.n_frames / seconds if seconds > 0 else nan
 
@@ -352,19 +353,8 @@ def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric
 
 
 MEASURED = tuple(metric for metric in METRICS if metric.measure is not None)
-Model = TypeVar("Model", bound=Part)
 
 
-def with_measured(model: type[Model]) -> type[Model]:
-    """The model of an estimator's results with a key for each metric that has its own `measure`."""
-    fields: dict[str, Any] = {metric.path[0]: (Number, Field(description=_description(metric))) for metric in MEASURED}
-    return create_model(model.__name__, __base__=model, __module__=model.__module__, __doc__=model.__doc__, **fields)
-
-
-def _description(metric: Metric) -> str:
-    return TERMS.get(metric.term or metric.group, f"{metric.title}, {metric.unit}")
-
-
-def measured(run: Run, result: Result) -> dict[str, float]:
+def measured(run: "Run", result: "Result") -> dict[str, float]:
     """Figures of the metrics that have their own `measure`, by key."""
     return {metric.path[0]: metric.measure(run, result) for metric in MEASURED if metric.measure is not None}

@@ -17,7 +17,8 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
 from .estimator import EstimatorSummary, summarize_estimator
-from .statistics import Number, Part, finite
+from .json_tree import finite
+from .statistics import Number, Part
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""

@@ -2,22 +2,26 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
-from ..results.comparison import Summary
 from ..results.metrics import COMPARISON, SEGMENTS, Metric, Value, over_deltas, shown_in, value_at
 from .table import Column, Row, Table, compared
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def comparison_table(comparison: Comparison, summary: Summary, *, mark_reference: bool = False) -> Table:
+Results = Mapping[str, Mapping[str, Any]]
+"""figures of the reference and of every estimate, as JSON has them: see `comparison_summary.results_by_name`"""
+
+
+def comparison_table(comparison: Comparison, results: Results, caption: str, *, mark_reference: bool = False) -> Table:
     """A row for each figure, a column for each trajectory: the reference is one of them where it has a figure."""
-    results, reference = summary.by_name, comparison.reference.name
+    reference = comparison.reference.name
     metrics = _metrics(comparison, results)
     rivals = [name for name, result in comparison.results.items() if not result.entry.by_product]
     names = list(comparison.results)
@@ -30,12 +34,13 @@ def comparison_table(comparison: Comparison, summary: Summary, *, mark_reference
     rows = tuple(
         Row(name, tuple(of[name] for of in cells), reference=mark_reference and name == reference) for name in names
     )
-    return Table(tuple(map(Column.of, metrics)), rows, caption=summary.caption).transposed()
+    return Table(tuple(map(Column.of, metrics)), rows, caption=caption).transposed()
 
 
-def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
+def main_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
     """One row per estimate: the figures, and behind each that has an interval its `low` and `high`."""
-    results = summary.by_name
+    import pandas as pd
+
     table: dict[str, list[float]] = {}
     for m in _metrics(comparison, results):
         values = [m.value(results[name]) for name in comparison.results]
@@ -46,10 +51,11 @@ def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
     return pd.DataFrame(table, index=pd.Index(comparison.results, name="estimate"))
 
 
-def metrics_table(summary: Summary) -> pd.DataFrame:
+def metrics_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
     """`metrics.csv`: estimate, metric (its path in comparison.json), value, low, high."""
-    results = summary.by_name
-    rows = [(name, metric, *value) for name in summary.estimates for metric, value in _figures(results[name])]
+    import pandas as pd
+
+    rows = [(name, metric, *value) for name in comparison.results for metric, value in _figures(results[name])]
     return pd.DataFrame(rows, columns=["estimate", "metric", *Value._fields])
 
 

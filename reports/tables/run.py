@@ -14,9 +14,9 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
+from ..results.json_tree import INFINITE, at, leaves
 from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
 from ..results.run import Summary
-from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")

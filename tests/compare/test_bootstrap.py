@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
-from fgbaseline.compare.statistics.block_bootstrap import (
+from fgbaseline.compare.statistics.block_bootstrap import autocovariance, block_length
+from fgbaseline.compare.statistics.block_draws import (
     BlockDraws,
-    autocovariance,
-    block_length,
     draw_blocks,
     percentile_interval,
 )
