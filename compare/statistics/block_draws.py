@@ -12,7 +12,7 @@ from fgbaseline.geometry import FloatArray
 CONFIDENCE = 0.95
 AT_ONCE = 500_000
 """numbers per batch: few enough to stay in the processor's cache"""
-FEW = 16
+FEW = 8
 """series whose quantiles are computed one by one"""
 
 
@@ -33,10 +33,6 @@ class BlockDraws:
         """Number of values of a series."""
         return int(self.length.sum())
 
-    def chosen(self, rows: BoolArray | slice) -> "BlockDraws":
-        """Some of the draws."""
-        return replace(self, start=self.start[rows])
-
     def sums(self, values: FloatArray) -> FloatArray:
         """Sums (r, d) of values (n, d) over each drawn series."""
         return np.stack([self._sums(column) for column in values.T], axis=1)
@@ -45,9 +41,9 @@ class BlockDraws:
         """Means (r,) of values (n,) in each drawn series."""
         return self._sums(values) / self.n
 
-    def counts(self, chosen: BoolArray) -> IntArray:
-        """Number (r,) of values, `chosen` (n,) True, in each drawn series."""
-        return self._sums(chosen.astype(np.int32)).astype(np.int64)
+    def counts(self, chosen: BoolArray, draws: IntArray | None = None) -> IntArray:
+        """Number (r,) of values, `chosen` (n,) True, in each drawn series, or (k,) in some of the `draws`."""
+        return self._sums(chosen.astype(np.int32), draws).astype(np.int64)
 
     def quantiles(self, values: FloatArray, at: tuple[float, ...]) -> FloatArray:
         """Quantiles (r, q) `at` (0 to 1) of values (n,) in each drawn series, linear between ranks as numpy's."""
@@ -71,42 +67,51 @@ class BlockDraws:
         values below a threshold shows on which side of it the quantile of a series lies.
         """
         r, rising = len(self), np.sort(values)
+        first = int(np.floor(at * (self.n - 1)))
+        counts = self.counts(values <= rising[first])
         bounds = []
         for rank in (np.array([0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence]) * (r - 1)).tolist():
-            near, below = self._near(values, rising, at, int(rank))
-            found = np.sort(near.quantiles(values, (at,))[:, 0])
+            near, below = self._near(values, rising, first, counts, int(rank))
+            found = np.sort(replace(self, start=self.start[near]).quantiles(values, (at,))[:, 0])
             here, there = found[int(rank) - below], found[min(int(rank) + 1, r - 1) - below]
             bounds.append(here + (rank - int(rank)) * (there - here))
         return np.array(bounds)
 
-    def _near(self, values: FloatArray, rising: FloatArray, at: float, rank: int) -> tuple["BlockDraws", int]:
+    def _near(
+        self, values: FloatArray, rising: FloatArray, first: int, counts: IntArray, rank: int
+    ) -> tuple[IntArray, int]:
         """Draws among which are those of this `rank` (0 to r - 1) and the next by their quantiles; how many lie below.
 
-        A quantile lies between the values of two neighboring ranks of its series. Thresholds bisect: draws are left
-        out below one that at most `rank` quantiles can reach, and above one that `rank` + 2 surely do.
+        A quantile lies between the values of ranks `first` and `first` + 1 of its series. Draws are left out below a
+        threshold that at most `rank` quantiles can reach, and above one that `rank` + 2 surely do. The first threshold
+        is `rising[first]`, with the `counts` (r,); the next two are around Bahadur's (1966) linear guess from it; then
+        they bisect.
         """
-        last = min(int(np.floor(at * (self.n - 1))) + 2, self.n)
-        first = min(last, int(np.floor(at * (self.n - 1))) + 1)
-        near, below, low, high = self, 0, -1, self.n - 1
-        while len(near) > FEW and high - low > 1:
-            middle = (low + high) // 2
-            counts = near.counts(values <= rising[middle])
-            surely, perhaps = counts >= last, counts >= first
+        guess, margin = int(np.sort(2 * first - counts)[rank]), 1 + int(counts.std() / 20.0)
+        trials = [guess - margin, guess + margin]
+        near, below, low, high, middle = np.arange(len(self)), 0, -1, self.n - 1, first
+        bisecting = False
+        while True:
+            perhaps, surely = counts > first, counts >= min(first + 2, self.n)
             if below + perhaps.sum() <= rank:
-                near, below, low = near.chosen(~surely), below + int(surely.sum()), middle
+                near, below, low = near[~surely], below + int(surely.sum()), middle
             elif below + surely.sum() >= min(rank + 2, len(self)):
-                near, high = near.chosen(perhaps), middle
-            else:
-                break
-        return near, below
+                near, high = near[perhaps], middle
+            elif bisecting:
+                return near, below
+            bisecting = not trials
+            if len(near) <= FEW or high - low < 2:
+                return near, below
+            middle = (low + high) // 2 if bisecting else min(max(trials.pop(), low + 1), high - 1)
+            counts = self.counts(values <= rising[middle], near)
 
-    def _sums(self, values: NDArray[np.float64] | NDArray[np.int32]) -> FloatArray:
+    def _sums(self, values: NDArray[np.float64] | NDArray[np.int32], draws: IntArray | None = None) -> FloatArray:
         before = np.concatenate([np.zeros(1, values.dtype), np.cumsum(values, dtype=values.dtype)])
         block, rest = int(self.length[0]), int(self.length[-1])
         of_block, of_rest = before[block:] - before[:-block], before[rest:] - before[:-rest]
-        total = np.empty(len(self))
-        for rows in _batches(len(self), len(self.length)):
-            start = self.start[rows]
+        total = np.empty(len(self) if draws is None else len(draws))
+        for rows in _batches(len(total), len(self.length)):
+            start = self.start[rows if draws is None else draws[rows]]
             total[rows] = of_block[start[:, :-1]].sum(axis=1) + of_rest[start[:, -1]]
         return total
 

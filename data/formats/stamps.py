@@ -37,7 +37,9 @@ class Stamps:
     """(n,) as written"""
 
     def at(self, index: IntArray) -> "Stamps":
-        """The stamps of these indices (m,)."""
+        """The stamps of these rising indices (m,)."""
+        if len(index) == len(self.value):
+            return self
         whole = None if self.whole is None else tuple(self.whole[i] for i in index.tolist())
         return Stamps(self.value[index], whole, self.unit, [self.words[i] for i in index.tolist()])
 

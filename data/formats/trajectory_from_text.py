@@ -86,15 +86,19 @@ def _known(
     return np.flatnonzero(~unknown), columns, remarks
 
 
+def _chosen(words: list[str], rows: IntArray) -> list[str]:
+    return words if len(rows) == len(words) else [words[i] for i in rows.tolist()]
+
+
 def _with_stamps(
     file: ParsedTrajectory, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
 ) -> tuple[ParsedTrajectory, IntArray]:
     """The file with the stamps or frame numbers of the lines `kept`, and which of these (m,) are left."""
     place = columns.time if columns.time is not None else columns.number
     assert place is not None
-    words = lines.column(place)
-    rest = None if columns.nanoseconds is None else lines.column(columns.nanoseconds)
-    stamps = stamps_of([words[i] for i in kept], value, columns.unit, None if rest is None else [rest[i] for i in kept])
+    words = _chosen(lines.column(place), kept)
+    rest = None if columns.nanoseconds is None else _chosen(lines.column(columns.nanoseconds), kept)
+    stamps = stamps_of(words, value, columns.unit, rest)
     moved: BoolArray = np.asarray((np.diff(pose, axis=0) != 0).any(axis=1))
     reason = equal_stamps(stamps, moved)
     if reason:
@@ -114,7 +118,7 @@ def _with_stamps(
     if stamps.unit == "ns" and stamps.whole is None:
         i = int(np.flatnonzero(stamps.value != np.floor(stamps.value))[0])
         raise InputError(
-            f"line {line[i]}: the time stamp {words[kept[left[i]]]} is no whole number of nanoseconds; write those"
+            f"line {line[i]}: the time stamp {stamps.words[i]} is no whole number of nanoseconds; write those"
         )
     units, is_known = possible_units(stamps)
     return replace(file, stamps=stamps, units=units, unit_known=is_known, remarks=remarks), left
