@@ -85,7 +85,7 @@ class ComparisonReport(Comparison):
         return place / "report.html"
 
     def _fill(self, folder: Path) -> None:
-        from ..figures import save
+        from ..figures.saving import save
         from ..html.comparison_page import render
 
         maps = {name: result.map for name, result in self.results.items() if result.map is not None}
