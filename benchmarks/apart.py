@@ -47,9 +47,9 @@ def apart(function: str, *arguments: Any, limit: int | None = None) -> Taken:
 
     Raises StoppedError after `limit` processor seconds, and RuntimeError where the process fails.
     """
-    arguments_told = json.dumps({"arguments": arguments, "limit": limit})
+    arguments_text = json.dumps({"arguments": arguments, "limit": limit})
     ended = subprocess.run(
-        [sys.executable, "-m", "benchmarks.apart", *function.split(":"), arguments_told],
+        [sys.executable, "-m", "benchmarks.apart", *function.split(":"), arguments_text],
         cwd=Path(__file__).parents[1],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     )
     from .consistency.nees import body_error, nees, nees_table, sigma_ratio
     from .consistency.nis import NisSummary, nis_per_degree, nis_summary
+    from .consistency.pose_sigma import PoseSigma, pose_sigma
     from .consistency.reference_nees import ReferenceNees, reference_nees
     from .consistency.state import quantity_summary, state_error, state_nees, velocity_and_bias_errors
     from .landmarks.dynamic_landmarks import dynamic_landmarks
     from .landmarks.map_difference import map_by_depth, map_difference
-    from .reference_trust import Trust, Verdict, trust
+    from .reference_trust import Criterion, Trust, Verdict, trust
     from .residuals.cost import cost
     from .residuals.held_out_tracks import HeldOutErrors, held_out_errors, held_out_ranking
     from .residuals.patterns import residual_patterns
@@ -97,6 +98,7 @@ else:
             "scaled_covariance",
             "consistency.nees": "body_error nees nees_table sigma_ratio",
             "consistency.nis": "NisSummary nis_per_degree nis_summary",
+            "consistency.pose_sigma": "PoseSigma pose_sigma",
             "consistency.reference_nees": "ReferenceNees reference_nees",
             "consistency.state": "quantity_summary state_error state_nees velocity_and_bias_errors",
             "landmarks.dynamic_landmarks": "dynamic_landmarks",
@@ -128,7 +130,7 @@ else:
             "trajectory.path": "distance_traveled",
             "trajectory.segments": "SegmentErrors segment_errors",
             "trajectory.time_offset": "TimeOffset time_offset",
-            "reference_trust": "Trust Verdict trust",
+            "reference_trust": "Criterion Trust Verdict trust",
         },
     )
 
@@ -142,6 +144,7 @@ __all__ = [
     "Association",
     "BodyRotation",
     "CovarianceState",
+    "Criterion",
     "ErrorDecomposition",
     "Exceedance",
     "HeldOutErrors",
@@ -150,6 +153,7 @@ __all__ = [
     "NisSummary",
     "PairedRanking",
     "PoseRelation",
+    "PoseSigma",
     "ReferenceNees",
     "RmseDifference",
     "SegmentErrors",
@@ -204,6 +208,7 @@ __all__ = [
     "paired_ranking",
     "pose_errors",
     "pose_pairs",
+    "pose_sigma",
     "quantity_summary",
     "rankable",
     "reference_nees",

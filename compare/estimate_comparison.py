@@ -1,7 +1,7 @@
 """Run and comparison of its estimators with reference and truth: trajectories, consistency, residuals, map, tracks."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,8 @@ class Evidence:
     """see `compare.nees_table`"""
     difference: compare.ReferenceNees | None
     """NEES of the difference from the reference"""
+    sigma: compare.PoseSigma
+    """1-sigma of the poses by its own covariances; NaN without"""
     sigma_ratio: pd.DataFrame | None
     """sigmas over those of the reference, by frame"""
     nis_per_degree: FloatArray
@@ -61,7 +63,7 @@ class Evidence:
 
     @property
     def map_by_depth(self) -> pd.DataFrame | None:
-        """See `compare.map_by_depth`; None for the reference and where no landmark is background_map."""
+        """See `compare.map_by_depth`; None for the reference and where the maps share no landmark."""
         return None if self.map is None or len(self.map) == 0 else compare.map_by_depth(self.map).reset_index()
 
 
@@ -150,6 +152,8 @@ class Run:
     """of the user, for the record"""
     held_out: HeldOutReport | None = None
     """None where no tracks were held out"""
+    added: Mapping[str, str] = field(default_factory=dict)
+    """trajectories from files, and how each was paired and aligned: their names are among the results"""
 
     @property
     def answered(self) -> list[Result]:
@@ -175,7 +179,12 @@ class Run:
     @property
     def unranked(self) -> frozenset[str]:
         """Estimators that are no competitors of the reference."""
-        return self.by_products | self.same_graph
+        return self.by_products | self.same_graph | self.added.keys()
+
+
+def reference_among(estimates: Mapping[str, Estimate]) -> str | None:
+    """Name of the reference: the first of `REFERENCES` that gave an answer."""
+    return next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
 
 
 def compare_all(
@@ -184,9 +193,14 @@ def compare_all(
     settings: Mapping[str, object],
     held: HeldOut | None = None,
     processes: int = 1,
+    added: Mapping[str, str] | None = None,
 ) -> Run:
-    """All comparisons of a run, `held` being the tracks held out of it; so many `processes` share the work."""
-    reference = next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
+    """All comparisons of a run, `held` being the tracks held out of it; so many `processes` share the work.
+
+    `added` are estimates from files, with a caption each: they are aligned, so they are ranked with no other.
+    """
+    added = added or {}
+    reference = reference_among(estimates)
     if reference is None:
         trusted = compare.Trust(compare.Verdict.UNTRUSTED, (NO_REFERENCE,))
     else:
@@ -196,15 +210,20 @@ def compare_all(
     with background_map(lambda i: _compared(problem, estimates[names[i]], origin), len(names), processes) as compared:
         parts = compared()
     results = {name: Result(estimates[name], **part) for name, part in zip(names, parts, strict=True)}
-    divergences = {n: r.divergence for n, r in results.items() if r.answered and r.divergence is not None}
-    truths = {n: r.truth_aligned for n, r in results.items() if r.answered and r.truth_aligned is not None}
+    divergences = {
+        n: r.divergence for n, r in results.items() if n not in added and r.answered and r.divergence is not None
+    }
+    truths = {
+        n: r.truth_aligned for n, r in results.items() if n not in added and r.answered and r.truth_aligned is not None
+    }
     from_reference, to_truth = common_rmse(divergences), common_rmse(truths)
     results = {
         name: replace(result, divergence_common=from_reference.get(name), ate_common=to_truth.get(name))
         for name, result in results.items()
     }
     held_out = None if held is None else _held_out_report(problem, estimates.values(), held)
-    return Run(problem, results, reference, trusted, compare.used_by_all(estimates.values()), settings, held_out)
+    common = compare.used_by_all(estimates.values())
+    return Run(problem, results, reference, trusted, common, settings, held_out, added)
 
 
 def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> dict[str, Any]:
@@ -218,6 +237,7 @@ def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) 
         error=None if truth is None else compare.body_error(estimate, truth),
         nees=None if truth is None else compare.nees_table(estimate, truth),
         difference=None if other is None else compare.reference_nees(estimate, other),
+        sigma=compare.pose_sigma(estimate),
         sigma_ratio=None if other is None else compare.sigma_ratio(estimate, other),
         nis_per_degree=compare.nis_per_degree(estimate),
         nis=compare.nis_summary(estimate),

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,24 @@ from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
+NOTABLE_INFLATION = 1.1
+"""factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
 """share of observations without positive disparity above which it is reported"""
+CRITERIA = {
+    "pixel_scale": ("normalized pixel residual RMS", ""),
+    "motion_scale": ("normalized motion residual RMS", ""),
+    "used_share": ("share of observations used", ""),
+    "weak_frames": ("share of weakly determined frames", ""),
+    "given_up_frames": ("share of frames without their observations", ""),
+    "impossible_share": ("share of observations without positive disparity", ""),
+    "untied_intervals": ("share of intervals without a common landmark", ""),
+    "batch_cost": ("cost above the batch solution, relative", ""),
+    "batch_position": ("position RMSE from the batch solution", "baselines"),
+}
+"""name and unit of each criterion, by the field of `TrustLimits` that has its limits"""
+AT_LEAST = frozenset({"used_share"})
+"""criteria whose value must not fall below their limits"""
 
 
 class Verdict(IntEnum):
@@ -29,11 +46,33 @@ class Verdict(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Criterion:
+    """Measured value of one criterion of trust, with its limits and verdict."""
+
+    code: str
+    """name of the field of `TrustLimits`"""
+    name: str
+    value: float
+    unit: str
+    """empty for ratios"""
+    doubtful: float
+    """limit beyond which the reference is doubtful"""
+    untrusted: float
+    """limit beyond which it is untrusted"""
+    at_least: bool
+    """whether the value must not fall below its limits; else it must not exceed them"""
+    verdict: Verdict
+    remark: str = ""
+    """what the value rests on beside the reference; empty where nothing needs to be said"""
+
+
+@dataclass(frozen=True, slots=True)
 class Trust:
-    """Verdict and its reasons in sentences, worst first."""
+    """Verdict, its reasons in sentences, worst first, and the criteria that were measured."""
 
     verdict: Verdict
     reasons: tuple[str, ...]
+    criteria: tuple[Criterion, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,35 +123,72 @@ def trust(
     lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
     given_up = len(lost) / problem.n_frames
     robust = "" if problem.kernel is None else ", robust"
-    findings = [
-        (_above(pixel, limit.pixel_scale), f"normalized pixel residual RMS {_figure(pixel)} (expected 1{robust})"),
-        (_above(motion, limit.motion_scale), f"normalized motion residual RMS {_figure(motion)} (expected at most 1)"),
-        (_below(share, limit.used_share), f"it used {percent(share)} of the observations, far points aside"),
+    inflated = inflation_remark(problem)
+    expected = (
+        f"expected 1{robust}"
+        if not inflated
+        else f"{inflated}; {1.0 / problem.pixel_inflation:.2g} if independent from frame to frame"
+    )
+    untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
+    intervals = problem.n_frames - 1
+    judged = [
         (
-            _above(weak, limit.weak_frames),
+            _criterion(limit, "pixel_scale", pixel, inflated),
+            f"normalized pixel residual RMS {_figure(pixel)} ({expected})",
+        ),
+        (
+            _criterion(limit, "motion_scale", motion),
+            f"normalized motion residual RMS {_figure(motion)} (expected at most 1)",
+        ),
+        (_criterion(limit, "used_share", share), f"it used {percent(share)} of the observations, far points aside"),
+        (
+            _criterion(limit, "weak_frames", weak),
             f"{percent(weak, 1)} of the frames have fewer than {limit.weak_below} observations",
         ),
         (
-            _above(given_up, limit.given_up_frames),
+            _criterion(limit, "given_up_frames", given_up),
             f"the observations of {percent(given_up, 1)} of the frames were given up",
         ),
+        (
+            _criterion(limit, "impossible_share", impossible),
+            f"{percent(impossible)} of the observations have no positive disparity, which no point in view can have"
+            if impossible > NOTABLE
+            else "",
+        ),
+        (
+            _criterion(limit, "untied_intervals", untied / max(1, intervals)),
+            f"over {untied:,} of {intervals:,} intervals no landmark ties what lies on both sides: only the velocities "
+            "give the motion there, and a jump would not show"
+            if untied
+            else "",
+        ),
     ]
-    untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
-    if impossible > NOTABLE:
-        text = f"{percent(impossible)} of the observations have no positive disparity, which no point in view can have"
-        findings.append((_above(impossible, limit.impossible_share), text))
-    if untied:
-        share = untied / (problem.n_frames - 1)
-        text = (
-            f"over {untied:,} of {problem.n_frames - 1:,} intervals no landmark ties what lies on both sides: only the "
-            "velocities give the motion there, and a jump would not show"
-        )
-        findings.append((_above(share, limit.untied_intervals), text))
+    beside = _beside_batch(problem, reference, batch, limit)
+    findings = [(criterion.verdict, text) for criterion, text in judged if text]
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
-    findings.append(_beside_batch(problem, reference, batch, limit))
+    findings.append((beside.verdict, beside.reason))
     findings.sort(key=lambda finding: -finding[0])
-    return Trust(max(verdict for verdict, _ in findings), tuple(text for _, text in findings))
+    return Trust(
+        max(verdict for verdict, _ in findings),
+        tuple(text for _, text in findings),
+        (*(criterion for criterion, _ in judged), *beside.criteria),
+    )
+
+
+def inflation_remark(problem: Problem) -> str:
+    """States the inflation of the pixel noise; empty where there is none to speak of."""
+    if problem.pixel_inflation < NOTABLE_INFLATION:
+        return ""
+    return f"the pixel sigma is inflated {problem.pixel_inflation:.2g} times for time-correlated track errors"
+
+
+def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -> Criterion:
+    doubtful, untrusted = getattr(limits, code)
+    name, unit = CRITERIA[code]
+    at_least = code in AT_LEAST
+    verdict = (_below if at_least else _above)(value, (doubtful, untrusted))
+    return Criterion(code, name, value, unit, doubtful, untrusted, at_least, verdict, remark)
 
 
 def expected_observations(problem: Problem) -> BoolArray:
@@ -131,28 +207,36 @@ def has_positive_disparity(problem: Problem) -> BoolArray:
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 
-def _beside_batch(
-    problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits
-) -> tuple[Verdict, str]:
+class _BesideBatch(NamedTuple):
+    verdict: Verdict
+    reason: str
+    criteria: tuple[Criterion, ...] = ()
+
+
+def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits) -> _BesideBatch:
     """Whether the reference is at the minimum of the cost, over the observations that both used."""
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
-        return Verdict.TRUSTED, f"not compared with a batch solution{why}"
+        return _BesideBatch(Verdict.TRUSTED, f"not compared with a batch solution{why}")
     if any(event.kind == EventKind.ONE_START for event in batch.events):
-        return (
+        return _BesideBatch(
             Verdict.DOUBTFUL,
             "a batch solution was found from one start only: nothing says that it is the lowest",
         )
     if batch is reference:
-        return Verdict.TRUSTED, "it is the batch solution itself"
+        return _BesideBatch(Verdict.TRUSTED, "it is the batch solution itself")
     both = reference.used & batch.used
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = rms_norm(apart)
     baselines = rmse / problem.sequence.camera.baseline
-    verdict = max(_above(excess, limit.batch_cost), _above(baselines, limit.batch_position))
+    criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
+    verdict = max(criterion.verdict for criterion in criteria)
     said = "a batch solution agrees" if verdict is Verdict.TRUSTED else "a batch solution disagrees"
-    return verdict, f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
+    if any(event.kind == EventKind.STARTED_AT_ISAM2 for event in batch.events):
+        said = said.replace("solution", "solution started at isam2's answer")
+    text = f"{said}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
+    return _BesideBatch(verdict, text, criteria)
 
 
 def _above(value: float, limits: tuple[float, float]) -> Verdict:

@@ -31,6 +31,7 @@ def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
         "ate_common": None if result.ate_common is None else {"n": result.ate_common.frames},
         "nees": _of_values(t, result.nees),
         "nees_reference": _of_values(t, None if evidence.difference is None else evidence.difference.nees),
+        "sigma": _of_values(t, evidence.sigma.position),
         "sigma_ratio": _of_values(t, None if evidence.sigma_ratio is None else evidence.sigma_ratio["position"]),
         "nis": _of_values(t, evidence.nis_per_degree),
         "reprojection": _of_observations(t, table),

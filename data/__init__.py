@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .problem import Excluded, LandmarkMode, LandmarkPrior, Problem
     from .problem.documented import documented
     from .problem_export import read_problem, write_problem
-    from .registry import estimator_names, find_estimator
+    from .registry import estimator_names, estimator_summaries, find_estimator
     from .sequence import Sequence, Truth
     from .time_unit import TimeUnit
     from .trajectory import Trajectory
@@ -45,7 +45,7 @@ else:
             "problem": "Excluded LandmarkMode LandmarkPrior Problem",
             "problem.documented": "documented",
             "problem_export": "read_problem write_problem",
-            "registry": "estimator_names find_estimator",
+            "registry": "estimator_names estimator_summaries find_estimator",
             "sequence": "Sequence Truth",
             "time_unit": "TimeUnit",
             "trajectory": "Trajectory",
@@ -75,6 +75,7 @@ __all__ = [
     "attach_truth",
     "documented",
     "estimator_names",
+    "estimator_summaries",
     "find_estimator",
     "read",
     "read_kitti",

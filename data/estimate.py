@@ -42,6 +42,8 @@ class EventKind(StrEnum):
     NO_COVARIANCES = "no covariances"
     DESCENT_FAILED = "descent failed"
     """Levenberg-Marquardt ended with an exception from one of its starts"""
+    STARTED_AT_ISAM2 = "started at isam2's answer only"
+    """a batch solution without the descent from dead reckoning, as wanted: it shows whether isam2 has converged"""
     ONE_START = "one start only"
     """minimum not confirmed by a second start; lowers the trust in the reference"""
     SAME_COST = "both starts end at the same cost"
@@ -161,18 +163,14 @@ class Estimate:
 
     def transformed(self, motion: FloatArray) -> "Estimate":
         """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
-        R, landmarks, state_covariance = motion[:3, :3], self.landmarks, self.state_covariance
-        if state_covariance is not None:  # the velocity's error is in world axes
-            turn = np.eye(strapdown.STATE)
-            turn[strapdown.VELOCITY, strapdown.VELOCITY] = R
-            state_covariance = turn @ state_covariance @ turn.T
+        R, landmarks, P = motion[:3, :3], self.landmarks, self.state_covariance
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(
             self,
             world_T_imu=motion @ self.world_T_imu,
             landmarks=Landmarks(landmarks.index, se3.transform(motion, landmarks.position), covariance),
             velocity=None if self.velocity is None else self.velocity @ R.T,
-            state_covariance=state_covariance,
+            state_covariance=None if P is None else strapdown.rotated_velocity(P, R, R),
             by_products={name: other.transformed(motion) for name, other in self.by_products.items()},
         )
 

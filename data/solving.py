@@ -24,11 +24,17 @@ def no_progress(name: str) -> AbstractContextManager[Progress | None]:  # noqa: 
     return nullcontext(None)
 
 
-def solve_all(problem: Problem, names: Iterable[str], watch: Watch = no_progress) -> dict[str, Estimate]:
+def solve_all(
+    problem: Problem,
+    names: Iterable[str],
+    watch: Watch = no_progress,
+    functions: Mapping[str, Callable[..., object]] | None = None,
+) -> dict[str, Estimate]:
     """Estimate of each named estimator, in the order of the names; a failure gives a failed estimate.
 
-    A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a parameter `given` (`batch`
-    starts from the answer of `isam2`) receives the earlier estimates by name.
+    `functions` are estimators that are not registered, by name. An estimate without `seconds_total` gets the time that
+    the call took. A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a parameter `given`
+    (`batch` starts from the answer of `isam2`) receives the earlier estimates by name.
     """
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
@@ -39,7 +45,10 @@ def solve_all(problem: Problem, names: Iterable[str], watch: Watch = no_progress
         start = time.perf_counter()
         try:
             with watch(name) as progress:
-                estimate = checked(_solved(find_estimator(name), problem, progress, given | answers), name, problem)
+                solver = (functions or {}).get(name) or find_estimator(name)
+                estimate = checked(_solved(solver, problem, progress, given | answers), name, problem)
+                if estimate.seconds_total == 0.0:
+                    estimate = replace(estimate, seconds_total=time.perf_counter() - start)
                 given |= {other: checked(e, other, problem) for other, e in estimate.by_products.items()}
         except Exception as error:  # a filter of another package may raise anything
             estimate = Estimate.failed(name, describe(error), problem.n_frames, len(problem.excluded))

@@ -130,9 +130,9 @@ def in_seconds(sequence: Sequence, unit: TimeUnit | None = None) -> Sequence:
     `unit` is given by the user; without it, it is detected from the stamps alone.
     """
     if unit is not None:
-        said = f"The time stamps are in {unit.noun}, as given."
+        remark = f"The time stamps are in {unit.noun}, as given."
         scaled = rescaled_time(sequence, unit.seconds)
-        return replace(scaled, remarks=(*sequence.remarks, said), time_unit_given=True)
+        return replace(scaled, remarks=(*sequence.remarks, remark), time_unit_given=True)
     found = unit_of_stamps(sequence.t)
     if found is None:
         return sequence

@@ -23,9 +23,9 @@ def _parsed(text: bytes) -> dict[str, Any]:
         line = text.count(b"\n", 0, error.start) + 1
         raise InputError(f"line {line}: this is no UTF-8 text; write the file as TOML") from None
     except tomllib.TOMLDecodeError as error:
-        said, _, where = str(error).rpartition(" (at ")
+        why, _, where = str(error).rpartition(" (at ")
         found = re.search(r"line (\d+)", where)
         line = int(found[1]) if found else text.rstrip().count(b"\n") + 1
-        raise InputError(f"line {line}: this is not TOML ({said[:1].lower()}{said[1:]}); see https://toml.io") from None
+        raise InputError(f"line {line}: this is not TOML ({why[:1].lower()}{why[1:]}); see https://toml.io") from None
     except (ValueError, RecursionError):
         raise InputError("a value in it is too long or too deeply nested to be read; make it simpler") from None

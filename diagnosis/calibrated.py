@@ -102,6 +102,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     problem = _posed(repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks)
     return replace(
         inflate_gap_covariance(_bridged(problem, diagnosis, noise)),
+        pixel_inflation=1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel,
         diagnosed=not found.cannot_tell,
         findings=findings_of(found, track_statistics(found, repaired if repairs == Repairs() else None)),
         repairs=(*override_sentences(repairs), *rescalings(found), *repaired.repairs),

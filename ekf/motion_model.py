@@ -76,8 +76,7 @@ class InertialMotion:
 
     def __init__(self, pose: FloatArray, start: InertialStart, imu: ImuIntervals) -> None:
         self.imu = imu
-        additive = [start.velocity, start.gyroscope_bias, start.accelerometer_bias]
-        self.start = BodyState(pose, np.concatenate(additive))
+        self.start = BodyState(pose, np.concatenate([start.velocity, start.bias]))
         self.covariance = start.covariance
 
     def predict(self, k: int, body: BodyState) -> Prediction:

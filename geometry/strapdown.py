@@ -160,9 +160,15 @@ def predict(
 
 def world_axes(motion: ImuMotion, before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Transition F and noise Q (15, 15) with velocity errors in world axes, for rotations (3, 3) before and after."""
-    F, Q = motion.transition.copy(), motion.noise.copy()
-    F[VELOCITY] = after @ F[VELOCITY]
-    F[:, VELOCITY] = F[:, VELOCITY] @ before.T
-    Q[VELOCITY] = after @ Q[VELOCITY]
-    Q[:, VELOCITY] = Q[:, VELOCITY] @ after.T
-    return F, Q
+    return rotated_velocity(motion.transition, after, before), rotated_velocity(motion.noise, after, after)
+
+
+def rotated_velocity(matrix: FloatArray, rows: FloatArray, columns: FloatArray) -> FloatArray:
+    """Matrices (..., 15, 15) of error states with velocity errors in other axes, by rotations (..., 3, 3) new_R_old.
+
+    `rows` rotates the errors that the matrix gives, `columns` those that it takes; of a covariance both are the same.
+    """
+    rotated = matrix.copy()
+    rotated[..., VELOCITY, :] = rows @ rotated[..., VELOCITY, :]
+    rotated[..., VELOCITY] = rotated[..., VELOCITY] @ np.swapaxes(columns, -1, -2)
+    return rotated

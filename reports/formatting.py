@@ -55,6 +55,11 @@ def interval(value: float, low: float, high: float) -> str:
     return f"{number(value)} [{number(low)}, {number(high)}]" if isfinite(low) and isfinite(high) else number(value)
 
 
+def resolved(value: float, resolution: float) -> str:
+    """A number, or `0 ± 1 × 10⁻⁶` for one below the resolution of the files it comes from."""
+    return f"0 ± {number(resolution)}" if abs(value) < resolution else number(value)
+
+
 def per_cent(share: float) -> str:
     """A share of one as per cent; a dash for NaN."""
     return f"{100.0 * share:.3g} %" if isfinite(share) else DASH

@@ -10,24 +10,21 @@ import pandas as pd
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
+from ..statistics.chi_square import mahalanobis_squared
 from .covariance import CovarianceState, covariance_state
 
 PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
 
 
-def mahalanobis_squared(error: FloatArray, P: FloatArray) -> FloatArray:
-    """Squared Mahalanobis norm e^T P^-1 e (n,) of errors (n, d) with positive definite covariances (n, d, d)."""
-    scale = np.sqrt(np.einsum("nii->ni", P))
-    C = P / (scale[:, :, None] * scale[:, None, :])
-    scaled = error / scale
-    return np.asarray(np.einsum("ni,ni->n", scaled, np.linalg.solve(C, scaled[:, :, None])[:, :, 0]))
+def body_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
+    """Error e = log(T^-1 T_other) (T, 6), [v, w] in m and rad, in the estimated body frame; NaN without a pose.
 
-
-def body_error(estimate: Estimate, truth: Truth) -> FloatArray:
-    """Error e = log(T^-1 T_true) (T, 6), [v, w] in m and rad, in the estimated body frame; NaN without a pose."""
-    error = np.full((len(estimate.world_T_imu), 6), np.nan)
-    k = np.flatnonzero(truth.known & np.isfinite(estimate.world_T_imu).all(axis=(1, 2)))
-    error[k] = se3.log(se3.inverse(estimate.world_T_imu[k]) @ truth.world_T_imu[k])
+    `other` is the truth, or another estimate.
+    """
+    T, T_other = estimate.world_T_imu, other.world_T_imu
+    error = np.full((len(T), 6), np.nan)
+    k = np.flatnonzero(np.isfinite(T).all(axis=(1, 2)) & np.isfinite(T_other).all(axis=(1, 2)))
+    error[k] = se3.log(se3.inverse(T[k]) @ T_other[k])
     return error
 
 

@@ -8,11 +8,14 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
 
+from ..statistics.chi_square import mahalanobis_squared
 from .covariance import CovarianceState, covariance_state, is_positive_definite
-from .nees import mahalanobis_squared
+from .nees import body_error
 
 NEGLIGIBLE = 1e-6
 """of the filter's own variance: below it the difference has no variance in a direction"""
+SMALLER = 0.1
+"""of the filter's own variance: by so much the reference's must exceed it in a direction of an overconfident pose"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -23,6 +26,13 @@ class ReferenceNees:
     """d^T (P - P_ref)^-1 d (T,); NaN where it is undefined"""
     comparable: BoolArray
     """frames (T,) in which both have a pose and a positive definite covariance"""
+    overconfident: BoolArray
+    """comparable frames (T,) in which P is smaller than P_ref in some direction, which uses at least the same data"""
+
+    @property
+    def is_overconfident(self) -> bool:
+        """Whether most of the comparable frames are overconfident."""
+        return bool(2 * self.overconfident.sum() > self.comparable.sum())
 
     @property
     def left_out(self) -> BoolArray:
@@ -41,13 +51,16 @@ def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
     """
     T = len(estimate.world_T_imu)
     sound = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
-    result = ReferenceNees(np.full(T, np.nan), np.asarray(sound[0] & sound[1], dtype=np.bool_))
+    both = np.asarray(sound[0] & sound[1], dtype=np.bool_)
+    result = ReferenceNees(np.full(T, np.nan), both, np.zeros(T, dtype=np.bool_))
     k = np.flatnonzero(result.comparable)
     if estimate.covariance is None or reference.covariance is None or len(k) == 0:
         return result
-    d = se3.log(se3.inverse(estimate.world_T_imu[k]) @ reference.world_T_imu[k])
+    d = body_error(estimate, reference)[k]
     P, J = estimate.covariance[k], se3.inverse_right_jacobian(d)
-    difference = difference_covariance(P, J @ reference.covariance[k] @ np.swapaxes(J, 1, 2))
+    P_ref = J @ reference.covariance[k] @ np.swapaxes(J, 1, 2)
+    difference, share = difference_covariance(P, P_ref), smallest_share(P, P_ref)
+    result.overconfident[k] = share < -SMALLER
     positive = np.isfinite(difference).all(axis=(1, 2))
     result.nees[k[positive]] = mahalanobis_squared(d[positive], difference[positive])
     return result
@@ -61,7 +74,12 @@ def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
     """
     P, P_ref = 0.5 * (P + np.swapaxes(P, 1, 2)), 0.5 * (P_ref + np.swapaxes(P_ref, 1, 2))
     difference = P - P_ref
-    inverse = np.linalg.inv(np.linalg.cholesky(P))
-    share = np.linalg.eigvalsh(inverse @ difference @ np.swapaxes(inverse, 1, 2))[:, 0]
-    difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
+    difference[~((smallest_share(P, P_ref) > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan
     return np.asarray(difference, dtype=np.float64)
+
+
+def smallest_share(P: FloatArray, P_ref: FloatArray) -> FloatArray:
+    """Smallest eigenvalue (n,) of L^-1 (P - P_ref) L^-T with P = L L^T, the filter's covariances (n, d, d)."""
+    inverse = np.linalg.inv(np.linalg.cholesky(P))
+    shares = np.linalg.eigvalsh(inverse @ (P - P_ref) @ np.swapaxes(inverse, 1, 2))
+    return np.asarray(shares[:, 0], dtype=np.float64)

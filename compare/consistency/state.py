@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 
 from fgbaseline.data import Estimate, Truth
-from fgbaseline.geometry import FloatArray, se3, strapdown
+from fgbaseline.geometry import FloatArray, strapdown
 
+from ..statistics.chi_square import mahalanobis_squared
 from ..statistics.descriptive import summarized
 from .covariance import is_positive_definite
-from .nees import mahalanobis_squared
+from .nees import body_error
 
 BLOCKS = {
     "translation": strapdown.TRANSLATION,
@@ -33,8 +34,7 @@ def state_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
     """Error (T, 15) of the state against truth or another estimate; NaN where either lacks a value."""
     T = len(estimate.world_T_imu)
     error = np.full((T, strapdown.STATE), np.nan)
-    k = np.flatnonzero(np.isfinite(estimate.world_T_imu).all(axis=(1, 2)) & np.isfinite(other.world_T_imu).all((1, 2)))
-    error[k, :6] = se3.log(se3.inverse(estimate.world_T_imu[k]) @ other.world_T_imu[k])
+    error[:, :6] = body_error(estimate, other)
     for name in QUANTITIES:
         here, there = getattr(estimate, name), getattr(other, name)
         if here is not None and there is not None:

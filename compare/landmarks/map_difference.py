@@ -8,9 +8,9 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import se3
 
 from ..consistency.covariance import is_positive_definite
-from ..consistency.nees import mahalanobis_squared
 from ..consistency.reference_nees import difference_covariance
 from ..residuals.patterns import DEPTHS, depth_classes
+from ..statistics.chi_square import mahalanobis_squared
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:

@@ -3,13 +3,11 @@
 import numpy as np
 
 from fgbaseline.data import Estimate, Problem
-from fgbaseline.data.problem.inertial import ImuIntervals, InertialStart
+from fgbaseline.data.problem.inertial import LEAST_WALK, ImuIntervals, InertialStart
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
-LEAST_WALK = 1e-4
-"""1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
-HELD_VARIANCE = 1e-9
-"""of the largest variance in a block of the start's covariance: up to it a direction of the pose is held"""
+from ..statistics.chi_square import mahalanobis_squared
+
 WALKS = (strapdown.GYROSCOPE_BIAS, strapdown.ACCELEROMETER_BIAS)
 
 
@@ -42,8 +40,7 @@ def inertial_residuals(imu: ImuIntervals, estimate: Estimate) -> tuple[FloatArra
 
 def inertial_squares(imu: ImuIntervals, estimate: Estimate) -> FloatArray:
     """Squared whitened norms (T-1,) of `inertial_residuals`, 15 degrees of freedom each."""
-    residual, covariance = inertial_residuals(imu, estimate)
-    return np.array([mahalanobis(e, P) for e, P in zip(residual, covariance, strict=True)])
+    return mahalanobis_squared(*inertial_residuals(imu, estimate))
 
 
 def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> float:
@@ -51,26 +48,8 @@ def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> 
     v, bg, ba = estimate.velocity, estimate.gyroscope_bias, estimate.accelerometer_bias
     if v is None or bg is None or ba is None:
         return float("nan")
-    off = [v[0] - start.velocity, bg[0] - start.gyroscope_bias, ba[0] - start.accelerometer_bias]
+    off = [v[0] - start.velocity, np.concatenate([bg[0], ba[0]]) - start.bias]
     pose = se3.log(se3.inverse(problem.initial_pose) @ estimate.world_T_imu[0])
-    free = free_directions(start.covariance)
-    return mahalanobis(free.T @ np.concatenate([pose, *off]), free.T @ start.covariance @ free)
-
-
-def free_directions(covariance: FloatArray) -> FloatArray:
-    """Orthonormal directions (15, r) in which a start's covariance (15, 15) is not zero, block by block."""
-    columns = []
-    for i in range(0, strapdown.STATE, 3):
-        variance, axes = np.linalg.eigh(covariance[i : i + 3, i : i + 3])
-        kept = axes[:, (variance > 0.0) & (variance > HELD_VARIANCE * variance[-1])]
-        column = np.zeros((strapdown.STATE, kept.shape[1]))
-        column[i : i + 3] = kept
-        columns.append(column)
-    return np.concatenate(columns, axis=1)
-
-
-def mahalanobis(error: FloatArray, P: FloatArray) -> float:
-    """Squared norm e^T P^-1 e of an error (d,), P scaled to correlations first, as its units differ."""
-    scale = np.sqrt(np.diag(P))
-    scaled = error / scale
-    return float(scaled @ np.linalg.solve(P / np.outer(scale, scale), scaled))
+    free = start.free_directions
+    error, P = free.T @ np.concatenate([pose, *off]), free.T @ start.covariance @ free
+    return float(mahalanobis_squared(error[None], P[None])[0])

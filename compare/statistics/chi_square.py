@@ -1,4 +1,4 @@
-"""Chi-square quantiles, bounds and p-values of normalized squared errors and their averages."""
+"""Normalized squared errors; chi-square quantiles, bounds and p-values of them and their averages."""
 
 import numpy as np
 from scipy.special import chdtrc, gammaincinv
@@ -7,6 +7,14 @@ from fgbaseline.geometry import FloatArray
 
 PROBABILITY = 0.95
 """probability of the bounds"""
+
+
+def mahalanobis_squared(error: FloatArray, P: FloatArray) -> FloatArray:
+    """Squared Mahalanobis norm e^T P^-1 e (n,) of errors (n, d) with positive definite covariances (n, d, d)."""
+    scale = np.sqrt(np.einsum("nii->ni", P))  # to correlations, as the units of components differ
+    C = P / (scale[:, :, None] * scale[:, None, :])
+    scaled = error / scale
+    return np.asarray(np.einsum("ni,ni->n", scaled, np.linalg.solve(C, scaled[:, :, None])[:, :, 0]))
 
 
 def chi_square_quantile(probability: float, degrees: FloatArray | float) -> FloatArray:

@@ -182,4 +182,4 @@ def require_stamps(matched: MatchedTrajectories) -> None:
     """Raises InputError where reference or estimate has no time stamps."""
     for path in (matched.reference, matched.estimate):
         if not path.stamped:
-            raise InputError(f"{path.source or path.name}: it has no time stamps, so nothing can be said per second")
+            raise InputError(f"{path.source or path.name}: it has no time stamps, so it has no errors per second")

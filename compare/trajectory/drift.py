@@ -101,10 +101,10 @@ def drift_rates(
     ]
     poses, truth = matched.estimate.world_T_body, reference.world_T_body
     found = {}
-    for quantity, unit, factor, what, stretch, length, said in rates:
+    for quantity, unit, factor, what, stretch, length, base in rates:
         errors = factor * relative_pose_error(poses, truth, stretch, what) / length
         mean = bootstrapped(errors, of=("mean",), confidence=confidence, repetitions=repetitions, seed=seed)["mean"]
-        found[quantity] = Rate(*mean, unit, said, len(stretch))
+        found[quantity] = Rate(*mean, unit, base, len(stretch))
     return found
 
 

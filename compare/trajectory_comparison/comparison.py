@@ -15,6 +15,7 @@ from fgbaseline.compare.trajectory.segments import SegmentErrors
 from fgbaseline.compare.trajectory.time_offset import TimeOffset
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.compare.trajectory_comparison.ranking import Ranking
+from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.geometry import FloatArray
 
@@ -70,6 +71,12 @@ class Result:
     def rmse(self) -> float:
         """RMSE of the positions over all paired poses, m."""
         return float(self.statistics["translation"]["rmse"].value)
+
+    @property
+    def resolution(self) -> dict[str, float]:
+        """Smallest difference that the files resolve, by its unit, `m` and `°`."""
+        paths = self.matched.reference.position, self.entry.trajectory.position
+        return {"m": position_resolution(*paths), "°": rotation_resolution_deg(*paths)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

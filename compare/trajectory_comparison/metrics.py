@@ -139,7 +139,7 @@ def _compared(
 ) -> Result:
     reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
-    matched, offset = _matched(reference, entry, up, settings)
+    matched, offset = matched_poses(reference, entry, up, settings)
     absolute, departure = dict(absolute_error_columns(matched)), dict(departure_columns(matched, up))
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:
@@ -230,7 +230,7 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
         return None
 
 
-def _matched(
+def matched_poses(
     reference: Entry, entry: Entry, up: FloatArray, settings: Settings
 ) -> tuple[MatchedTrajectories, TimeOffset | None]:
     """Pairs of poses, aligned, and the time offset where it is searched for."""

@@ -221,8 +221,8 @@ def _position(groups: dict[tuple[str, ...], dict[str, int]]) -> tuple[int, ...] 
 
 def _is_position(prefix: tuple[str, ...]) -> bool:
     """Whether the parts of a name before its axis are a position's: single letters behind the first name frames."""
-    said = {part for i, part in enumerate(prefix) if i == 0 or len(part) > 1}
-    return not prefix or (not NO_POSITION & said and bool(POSITION & said))
+    words = {part for i, part in enumerate(prefix) if i == 0 or len(part) > 1}
+    return not prefix or (not NO_POSITION & words and bool(POSITION & words))
 
 
 def _quaternion(groups: dict[tuple[str, ...], dict[str, int]]) -> tuple[tuple[int, ...], tuple[Order, ...]]:

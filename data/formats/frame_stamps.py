@@ -85,11 +85,11 @@ def _require_rising(key: str, t: FloatArray, frame: IntArray) -> None:
     if len(falls) == 0:
         return
     before, k = (int(i) for i in frame[falls[0] : falls[0] + 2])
-    said = f"frame {k} ({float(t[k])!r} s) is not after frame {before} ({float(t[before])!r} s)"
+    fault = f"frame {k} ({float(t[k])!r} s) is not after frame {before} ({float(t[before])!r} s)"
     advice = "sort the frames"
     if len(falls) == 1:
         advice = _stray(t, before, k) or advice
-    raise InputError(f"{key}: stamps must rise, but {said}; {advice}")
+    raise InputError(f"{key}: stamps must rise, but {fault}; {advice}")
 
 
 def _stray(t: FloatArray, before: int, k: int) -> str:

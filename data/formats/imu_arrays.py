@@ -12,6 +12,7 @@
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def read_imu_arrays(archive: NpzArchive) -> RawSamples:
     if not (t.ndim == 1 or (t.ndim == 2 and t.shape[0] == 1)):
         raise InputError(f"{STAMPS}: expected shape (1, M), got {t.shape}; write one row of stamps")
     t = t.reshape(-1)
-    rate, force = (_vectors(archive, key, len(t)) for key in (RATE, FORCE))
+    rate, force = (_vectors(archive, key, len(t), f" for the {len(t)} stamps of {STAMPS}") for key in (RATE, FORCE))
     remarks: list[str] = []
     noise, gravity = ASSUMED_NOISE, STANDARD_GRAVITY
     if NOISE in archive.keys:
@@ -59,28 +60,19 @@ def assumed_noise(why: str) -> str:
     )
 
 
-def _vectors(archive: NpzArchive, key: str, M: int) -> FloatArray:
+def _vectors(archive: NpzArchive, key: str, n: int, why: str = "") -> FloatArray:
+    """Vectors (n, 3) of an array (3, n)."""
     array = archive.array(key)
-    if array.shape != (3, M):
-        raise InputError(f"{key}: expected shape (3, {M}) for the {M} stamps of {STAMPS}, got {array.shape}")
+    if array.shape != (3, n):
+        raise InputError(f"{key}: expected shape (3, {n}){why}, got {array.shape}")
     return np.ascontiguousarray(array.T)
 
 
 def read_state_truth(archive: NpzArchive, truth: Truth) -> Truth:
     """The truth with the velocity and the biases of the npz, where it has them."""
-    velocity, gyroscope_bias, accelerometer_bias = (
-        _true_vectors(archive, f"true_{name}", len(truth.world_T_imu)) for name in STATE_TRUTH
-    )
-    return replace(truth, velocity=velocity, gyroscope_bias=gyroscope_bias, accelerometer_bias=accelerometer_bias)
-
-
-def _true_vectors(archive: NpzArchive, key: str, T: int) -> FloatArray | None:
-    if key not in archive.keys:
-        return None
-    array = archive.array(key)
-    if array.shape != (3, T):
-        raise InputError(f"{key}: expected shape (3, {T}), got {array.shape}")
-    return np.ascontiguousarray(array.T)
+    keys, T = {name: f"true_{name}" for name in STATE_TRUTH}, len(truth.world_T_imu)
+    state: dict[str, Any] = {name: _vectors(archive, key, T) for name, key in keys.items() if key in archive.keys}
+    return replace(truth, **state)
 
 
 def imu_arrays(imu: ImuSamples) -> dict[str, FloatArray]:

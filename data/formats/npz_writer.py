@@ -16,15 +16,15 @@ from .named_file import FilePath
 from .npz_member import write_member
 
 
-def write_npz(sequence: Sequence, path: FilePath) -> None:
+def write_npz(sequence: Sequence, path: FilePath, *, force: bool = True) -> None:
     """Writes a recording with its truth, all or nothing; `read` gives every array back bit by bit.
 
     The dense feature block is made and compressed a few landmarks at a time. Raises InputError when the file cannot be
-    written, or a pixel coordinate is exactly -1, which in the file means 'not observed'.
+    written, exists and `force` is false, or a pixel coordinate is exactly -1, which in the file means 'not observed'.
     """
     if (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
-    with atomic_write(path) as file, zipfile.ZipFile(file, "w") as archive:
+    with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
         for key, array in _arrays(sequence).items():
             write_member(archive, key, array.shape, [array])
         if sequence.n_landmarks:

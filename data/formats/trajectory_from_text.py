@@ -111,8 +111,8 @@ def _with_stamps(
     remarks = file.remarks
     if repeated.any():
         count = int(repeated.sum())
-        said = f"{count:,} of {len(repeated):,} lines {'repeats' if count == 1 else 'repeat'} the time stamp before"
-        remarks = (*remarks, f"{said}; the first pose is kept")
+        repeats = f"{count:,} of {len(repeated):,} lines {'repeats' if count == 1 else 'repeat'} the time stamp before"
+        remarks = (*remarks, f"{repeats}; the first pose is kept")
     if columns.time is None and stamps.whole is not None and max(map(abs, stamps.whole)) < 10**7:
         return replace(file, frame=np.array(stamps.whole, dtype=np.int64), remarks=remarks), left
     if stamps.unit == "ns" and stamps.whole is None:

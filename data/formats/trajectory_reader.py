@@ -86,8 +86,8 @@ def parsed_file(opened: OpenedTrajectory) -> ParsedTrajectory:
         read, lines = parsed(opened), opened.lines
         if opened.named or len(read.orders) == 1 or (lines.separator is None and lines.width in (8, 9, 20, 44)):
             return read
-        said = " ".join(read.orders[0])
-        return replace(read, remarks=(*read.remarks, f"no header names the order of its quaternions; {said} is usual"))
+        order = " ".join(read.orders[0])
+        return replace(read, remarks=(*read.remarks, f"no header names the order of its quaternions; {order} is usual"))
 
 
 def _of_npz(file: TrajectoryArchive) -> ParsedTrajectory:

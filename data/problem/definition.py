@@ -112,6 +112,8 @@ class Problem:
     """px^2, in place of `pixel_variance` where landmarks are mapped along given poses (the source paper has V = I
     there)"""
     landmark_mode: LandmarkMode = LandmarkMode.UPDATED
+    pixel_inflation: float = 1.0
+    """factor in the pixel sigma for time-correlated track errors: residuals are then expected at its inverse"""
     diagnosed: bool = False
     """True if noise and repairs are estimated from the recording"""
     findings: tuple[Finding, ...] = ()

@@ -10,6 +10,11 @@ from ..imu import ImuNoise, ImuSamples
 from ..observations import IntArray
 from .imu_gaps import interval_densities
 
+LEAST_WALK = 1e-4
+"""1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
+HELD_VARIANCE = 1e-9
+"""of the largest variance in a block of the start's covariance: what is no more than this is rounding"""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InertialStart:
@@ -26,6 +31,23 @@ class InertialStart:
     have no variance, since they define the world"""
     source: str = "given"
     """how it was found, one sentence"""
+
+    @property
+    def bias(self) -> FloatArray:
+        """(6,) rad/s and m/s^2, gyroscope first."""
+        return np.concatenate([self.gyroscope_bias, self.accelerometer_bias])
+
+    @property
+    def free_directions(self) -> FloatArray:
+        """Orthonormal directions (15, r) of the error in which the covariance is not zero, block by block."""
+        columns = []
+        for i in range(0, strapdown.STATE, 3):
+            variance, axes = np.linalg.eigh(self.covariance[i : i + 3, i : i + 3])
+            kept = axes[:, (variance > 0.0) & (variance > HELD_VARIANCE * variance[-1])]
+            column = np.zeros((strapdown.STATE, kept.shape[1]))
+            column[i : i + 3] = kept
+            columns.append(column)
+        return np.concatenate(columns, axis=1)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -123,6 +123,7 @@ def _problem(numbers: _Numbers, words: dict[str, Any]) -> Problem:
         landmark_prior=prior,
         kernel=None if threshold is None else HuberKernel(threshold),
         mapping_pixel_variance=numbers.optional("mapping_pixel_variance"),
+        pixel_inflation=positive("pixel_inflation", numbers.real("pixel_inflation"), "a factor"),
         landmark_mode=words["reading"],
         diagnosed=words["diagnosed"],
         remarks=words["remarks"],

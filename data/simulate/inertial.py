@@ -21,6 +21,8 @@ from .settings import Simulation
 DEGREE = 5
 RAMP = 4.0
 """s from standing still to the full speed of a path"""
+TINY = 1e-9
+"""density that stands for a simulated noise of zero, since no estimator can do without noise"""
 
 
 class MotionSpline:
@@ -88,7 +90,6 @@ def recorded_samples(path: Path, t: FloatArray, settings: Simulation) -> Inertia
         at,
         angular + imu.gyroscope_density * noise[:, :3],
         linear + imu.accelerometer_density * noise[:, 3:],
-        # a simulation without noise still states one, since no estimator can do without
         ImuNoise(
             imu.gyroscope_density or TINY, imu.gyroscope_walk, imu.accelerometer_density or TINY, imu.accelerometer_walk
         ),
@@ -96,10 +97,6 @@ def recorded_samples(path: Path, t: FloatArray, settings: Simulation) -> Inertia
     )
     at_frames = np.stack([np.interp(t, at, column) for column in biases.T], axis=1)
     return InertialRecording(samples, spline.velocity(t), at_frames[:, :3], at_frames[:, 3:])
-
-
-TINY = 1e-9
-"""density that stands for a simulated noise of zero"""
 
 
 def _biases(n: int, settings: Simulation) -> FloatArray:

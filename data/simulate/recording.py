@@ -190,12 +190,12 @@ def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
 
 def _described(settings: Simulation) -> str:
     """The settings that are not at their defaults, and the seed."""
-    said: list[str] = [settings.path]
+    parts: list[str] = [settings.path]
     for field in fields(settings):
         value = getattr(settings, field.name)
         if field.name not in ("path", "along", "rig") and (value != field.default or field.name == "seed"):
-            said.append(f"{field.name} {value}")
-    return ", ".join(said)
+            parts.append(f"{field.name} {value}")
+    return ", ".join(parts)
 
 
 def _remarks(settings: Simulation, wrong: BoolArray) -> tuple[str, ...]:

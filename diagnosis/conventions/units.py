@@ -230,14 +230,14 @@ def evidence(units: Units) -> str:
 
 
 def _doubt(sequence: Sequence, scale_ratios: tuple[ScaleRatio, ScaleRatio], candidates: list[Units]) -> str:
-    said = []
+    fits = []
     for units in candidates[:3]:
         wrong = [f"{LABELS[name]} in {_named(name, f)}" for name in NAMES if (f := getattr(units, name)) != 1.0]
-        said.append(" with ".join(wrong) or "all units as they should be")
+        fits.append(" with ".join(wrong) or "all units as they should be")
     return (
         f"the units are in doubt: {evidence(Units(scale_ratios=scale_ratios))}, the median interval between frames is "
         f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.camera.baseline:.6g}, which fits "
-        f"{' as well as '.join(said)}; settle it with --time-unit s, ms, us or ns, or with a table [units] in --repairs"
+        f"{' as well as '.join(fits)}; settle it with --time-unit s, ms, us or ns, or with a table [units] in --repairs"
     )
 
 

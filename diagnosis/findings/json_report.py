@@ -8,6 +8,7 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift
+from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
@@ -29,7 +30,7 @@ def to_json(
     """
     tracks = tracks or track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks) if findings is None else findings
-    report = _sequence(diagnosis) | {
+    report = header(diagnosis.sequence) | {
         "cannot_tell": diagnosis.cannot_tell or None,
         "findings": [asdict(finding) for finding in findings],
         "not_identifiable": list(not_identifiable(diagnosis)),
@@ -44,8 +45,8 @@ def to_json(
     return clean | {"notes": notes}
 
 
-def _sequence(diagnosis: Diagnosis) -> dict[str, Any]:
-    sequence = diagnosis.sequence
+def header(sequence: Sequence) -> dict[str, Any]:
+    """Schema, version, and size of the recording: the first keys of `diagnosis.json`."""
     return {
         "schema": SCHEMA,
         "version": version("fgbaseline"),

@@ -108,7 +108,7 @@ def _linear_axes(diagnosis: Diagnosis) -> Finding | None:
 
 
 def _axes(which: str, axes: Axes, unit: str) -> Finding:
-    """Sign changes alone are said as such."""
+    """Finding of changed axes, which names sign changes where these are all."""
     matrix = axes_matrix(axes.name)
     reversed_ = ["xyz"[i] for i in range(3) if matrix[i, i] < 0]
     letter = "w" if which == "angular" else "v"

@@ -1,14 +1,13 @@
 """A diagnosis of raw inertial data as JSON, and its figures in sentences."""
 
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from fgbaseline.data.finding import Finding
 
-from ..findings.json_report import SCHEMA
+from ..findings.json_report import header
 from ..findings.phrases import vector
 from .findings import inertial_findings
 from .result import InertialDiagnosis
@@ -17,18 +16,9 @@ from .result import InertialDiagnosis
 def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | None = None) -> dict[str, Any]:
     """The contents of `diagnosis.json`: numbers, texts, lists and dicts, None where the cameras determine nothing."""
     findings = inertial_findings(found) if findings is None else findings
-    sequence, imu = found.sequence, found.sequence.imu
+    imu = found.sequence.imu
     assert imu is not None
-    return {
-        "schema": SCHEMA,
-        "version": version("fgbaseline"),
-        "sequence": {
-            "name": sequence.name,
-            "frames": sequence.n_frames,
-            "duration_s": float(sequence.t[-1] - sequence.t[0]),
-            "observations": len(sequence.observations),
-            "tracks": len(np.unique(sequence.observations.landmark)),
-        },
+    return header(found.sequence) | {
         "imu": {
             "samples": len(imu),
             "period_s": imu.period,

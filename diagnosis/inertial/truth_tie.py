@@ -65,6 +65,5 @@ def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, 
 
 def _yaw(path: FloatArray, truth: FloatArray) -> FloatArray:
     """(3, 3) the rotation about z that takes rotations of the truth (n, 3, 3) nearest to those of the path."""
-    M = (truth @ np.swapaxes(path, 1, 2)).sum(axis=0)
-    angle = np.arctan2(M[0, 1] - M[1, 0], M[0, 0] + M[1, 1])
-    return so3.exp_so3(np.array([0.0, 0.0, angle]))
+    z = np.array([0.0, 0.0, 1.0])
+    return so3.exp_so3(so3.twist_angle(z, (path @ np.swapaxes(truth, 1, 2)).sum(axis=0)) * z)

@@ -9,6 +9,8 @@ from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
+from ..formatting import number
+from ..phrases.evidence import reference_sigma_sentence
 from ..results.check import NEW, Checked, Line, Shortage
 from ..results.json_tree import INFINITE
 from ..results.reader import (
@@ -46,6 +48,7 @@ def evaluate(
     return Checked(
         lines=tuple(lines),
         references=tuple(sentence for sentence in sentences if sentence),
+        sigmas=tuple(sentence for name, run in measured.runs.items() if (sentence := _sigma(name, run, measured))),
         shortages=_shortages(lines, several=len(measured.runs) > 1),
         undecided=needed is not Needed.NONE and any(is_undertrusted(run, needed) for run in measured.runs.values()),
         measured=measured,
@@ -99,7 +102,7 @@ def _lines(
     value, missing = value_of(values, limit.metric)
     old, unknown = baseline_value(baseline, name, run, estimator, limit.metric)
     shortage = _shortage(limits.content, limit, values)
-    doubt = shortage.reason if shortage else _doubt(limit.metric, run, limits.content.reference)
+    doubt = shortage.reason if shortage else _doubt(limit.metric, run, limits.content.reference) or _below(limit, run)
 
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
         short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
@@ -141,6 +144,19 @@ def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
     return f"the reference is {run.reference.trust}"
 
 
+def _below(limit: Limit, run: MeasuredRun) -> str:
+    """Why a limit asks for more than the reference resolves; empty where it does not, or is not to be judged so."""
+    if not limit.within_reference_sigma or limit.at_most is None:
+        return ""
+    sigma = None if run.reference.sigma is None else run.reference.sigma.of(limit.metric)
+    if sigma is None:
+        return "the 1-sigma of the reference is unknown (within_reference_sigma)"
+    unit = "°" if "rotation" in limit.metric else " m"
+    if limit.at_most >= sigma:
+        return ""
+    return f"the limit is below the 1-sigma of the reference, {number(sigma)}{unit} (within_reference_sigma)"
+
+
 def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shortage | None:
     """The shortage of a metric's sample; None where it is large enough, or the metric has no sample."""
     sample = sample_of(values, limit.metric)
@@ -176,6 +192,15 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
         raise limits.wrong(place, f"a baseline has no timings such as {limit.metric}; use at_most")
     if not given:
         raise limits.wrong(place, "this limit needs a baseline; name one with --baseline FILE")
+
+
+def _sigma(name: str, run: MeasuredRun, measured: Measured) -> str:
+    """The sentence on the 1-sigma of a run's reference; empty where it is unknown."""
+    reference = run.reference
+    if reference.sigma is None or reference.name is None:
+        return ""
+    where = f"{name}: " if len(measured.runs) > 1 else ""
+    return where + reference_sigma_sentence(reference.name, reference.sigma.model_dump())
 
 
 def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:

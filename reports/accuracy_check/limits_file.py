@@ -70,6 +70,8 @@ class Limit(_Part):
     smallest_sample: Count | None = None
     """None for that of the file"""
     smallest_coverage: Share | None = None
+    within_reference_sigma: bool = False
+    """whether a bound on the divergence below the reference's own 1-sigma leaves the limit undecided"""
 
     @property
     def patterns(self) -> tuple[str, ...]:
@@ -89,6 +91,8 @@ class Limit(_Part):
             raise ValueError(f"{self.metric} has no bound; add at_most, at_least or baseline")
         if self.bounds is not None and self.bounds.at_least > self.bounds.at_most:
             raise ValueError(f"at_least = {self.at_least:g} is above at_most = {self.at_most:g}; nothing lies between")
+        if self.within_reference_sigma and (self.at_most is None or not self.metric.startswith("divergence")):
+            raise ValueError("within_reference_sigma applies to at_most of divergence.*; leave it out here")
         return self
 
 

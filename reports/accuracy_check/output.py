@@ -29,7 +29,7 @@ def print_check(checked: Checked) -> None:
     """Prints too small samples and untrusted references, the table, the remarks, and the verdict."""
     console = Console()
     console = Console(width=None if console.is_terminal else max(console.width, UNWRAPPED), highlight=False)
-    for sentence in [*checked.shortages, *checked.references]:
+    for sentence in [*checked.shortages, *checked.references, *checked.sigmas]:
         console.print(sentence, markup=False, soft_wrap=True)
     print_table(check_table(checked), styles=STYLES)
     for sentence in [*remarks(checked), verdict(checked)]:
@@ -43,7 +43,7 @@ def markdown(checked: Checked) -> str:
         [
             f"### Accuracy: {md(verdict(checked))}",
             "",
-            *(f"> {md(sentence)}\n" for sentence in [*checked.shortages, *checked.references]),
+            *(f"> {md(sentence)}\n" for sentence in [*checked.shortages, *checked.references, *checked.sigmas]),
             markdown_table(check_table(checked, SIGNS)),
             *(f"- {md(sentence)}" for sentence in remarks(checked)),
             f"Limits: {md(checked.limits)}{baseline}",
@@ -64,6 +64,7 @@ def as_json(checked: Checked) -> str:
         "baseline": checked.baseline,
         "shortages": list(checked.shortages),
         "references": list(checked.references),
+        "reference_sigmas": list(checked.sigmas),
         "lines": [_line(line) for line in checked.lines],
     }
     return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
@@ -103,7 +104,7 @@ def junit(checked: Checked) -> bytes:
         suite = ElementTree.SubElement(suites, "testsuite", {"name": _text(run or "trajectories"), **_counts(lines)})
         for line in lines:
             _case(suite, line, checked)
-        if sentences := [*checked.shortages, *checked.references]:
+        if sentences := [*checked.shortages, *checked.references, *checked.sigmas]:
             ElementTree.SubElement(suite, "system-out").text = _text("\n".join(sentences))
     if checked.undecided:
         _reference_suite(suites, checked)

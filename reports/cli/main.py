@@ -10,11 +10,11 @@ from typing import NoReturn
 import click
 
 from .evaluation_commands import bench, check, compare, figures, reproduce
-from .recording_commands import diagnose, export, run, simulate
+from .recording_commands import diagnose, estimators, export, run, simulate
 
 COMMANDS = {
     command.name: command
-    for command in (run, compare, diagnose, export, figures, check, bench, reproduce, simulate)
+    for command in (run, compare, estimators, diagnose, export, figures, check, bench, reproduce, simulate)
     if command.name is not None
 }
 """in the order of `--help`"""

@@ -84,13 +84,13 @@ features = click.option(
 )
 imu = click.option(
     "--imu",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="CSV",
     help="Raw inertial samples in EuRoC's form, in place of the velocities of SEQUENCE.",
 )
 imu_calibration = click.option(
     "--imu-calibration",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="YAML",
     help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
 )

@@ -36,9 +36,9 @@ def read_entries(
 ) -> Entries:
     """Reads all inputs. Raises InputError with the file and its fault."""
     run, problem, held = _background(reference, settings)
-    own = [_parsed(given) for given in (estimates if run is not None else [reference, *estimates])]
+    own = [parsed(given) for given in (estimates if run is not None else [reference, *estimates])]
     sources = own if run is None else [run.files.trajectory(run.reference), *own]
-    first, *others = _in_one_body(resolve(sources, _times(settings, problem), settings), settings, problem, run)
+    first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
     beside = []
     if run is not None:
         first = replace(first, landmarks=run.files.landmarks(run.reference), trust=run.trust)
@@ -64,16 +64,17 @@ def _background(reference: "Given", settings: Settings) -> "tuple[ReferenceRun |
     return run, *load_problem(settings, run)
 
 
-def _parsed(given: "Given") -> Source:
+def parsed(given: "Given") -> Source:
+    """Trajectory of an opened input. Raises InputError."""
     assert not isinstance(given, Path)
     return given if isinstance(given, Trajectory) else parsed_file(given)
 
 
-def _in_one_body(
+def in_one_body(
     every: list[Resolved], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None"
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
-    times, imu_T_cam = _times(settings, problem), _extrinsic(settings, problem)
+    times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
         Entry(each.trajectory(times), covariance=each.covariance, up=each.up, remarks=each.remarks) for each in every
     ]
@@ -103,7 +104,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def _times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
+def frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         return [read_times(file, settings.unit) for file in settings.times]
@@ -145,11 +146,12 @@ def _named_apart(entries: list[Entry]) -> list[Entry]:
         names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
         taken.add(names[i])
     return [
-        replace(e, trajectory=replace(e.trajectory, name=_file_name(n))) for e, n in zip(entries, names, strict=True)
+        replace(e, trajectory=replace(e.trajectory, name=valid_file_name(n)))
+        for e, n in zip(entries, names, strict=True)
     ]
 
 
-def _file_name(name: str) -> str:
+def valid_file_name(name: str) -> str:
     """The name; raises InputError where a file cannot have it."""
     if "/" in name or "\\" in name or name.startswith(".") or not name:
         raise InputError(f"{name!r} cannot be a file name; give the trajectory another: NAME=FILE")

@@ -42,13 +42,13 @@ def compare(
     times = options.pop("times", None) or ()
     options["times"] = tuple(map(Path, [times] if isinstance(times, str | Path) else times))
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
-    opened = [_opened(given, settings, may_be_run=i == 0) for i, given in enumerate((reference, *estimates))]
+    inputs = [opened(given, settings, may_be_run=i == 0) for i, given in enumerate((reference, *estimates))]
     from .report import report_of
 
-    return report_of(opened, [str(file) for file in landmarks], settings)
+    return report_of(inputs, [str(file) for file in landmarks], settings)
 
 
-def _opened(given: "Input", settings: Settings, *, may_be_run: bool) -> "Given":
+def opened(given: "Input", settings: Settings, *, may_be_run: bool = False) -> "Given":
     """An input that is open: the folder of a run, a trajectory file, or a trajectory in memory as it is."""
     if not isinstance(given, str | Path):
         return given

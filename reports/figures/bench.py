@@ -20,7 +20,7 @@ from .style import colors as colors_of
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results
-    from fgbaseline.reports.results.metrics import Metric
+    from fgbaseline.reports.results.metric import Metric
 
 MARKERS = "osD^vP*Xh<>p"
 MOST_CASES = 12

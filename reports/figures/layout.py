@@ -40,7 +40,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def lay_out(figure: Figure) -> None:
-    """Places panels, titles and the labels of axes for good, at round positions.
+    """Places panels, titles and the labels of axes at fixed, round positions.
 
     Every drawing would otherwise ask all tick labels of all panels again where a title or a label has room.
     """

@@ -1,6 +1,6 @@
 """Figures of a reproduction: the report's 1 to 9 as it has them, the sweep over features and noise, and the causes.
 
-The report's figures show x and y of the world, the path red, its ends marked, arrows, and green landmarks.
+The source paper's figures show x and y of the world, the path red, its ends marked, arrows, and green landmarks.
 """
 
 from collections.abc import Sequence as Several
@@ -53,7 +53,7 @@ ROOM = 0.95
 
 
 def draw(studies: Several["Study"]) -> dict[str, Figure]:
-    """The report's figures by their numbers, those of other recordings by name, then `sweep` and `causes_NAME`."""
+    """The source paper's figures by number, those of other recordings by name, then `sweep` and `causes_NAME`."""
     figures: dict[str, Figure] = {}
     with in_style():
         for study in studies:

@@ -10,6 +10,7 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..figures.style import colors
 from ..phrases.comparison import verdict
+from ..phrases.evidence import FIRST
 from ..results.comparison import Summary
 from ..tables import Row
 from ..tables.comparison import Results, comparison_table
@@ -45,6 +46,7 @@ def render(comparison: Comparison, results: Results, summary: Summary, figures: 
         .render(
             summary=summary,
             verdict=verdict(comparison),
+            first=FIRST,
             table=replace(
                 table,
                 name="figure",

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.reports.figures.saving import EncodedFigure, encoded
 
 from ..formatting import counted, number
-from ..results.metrics import TERMS
+from ..results.metric import TERMS
 
 NO_SCRIPT = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """content security policy of a page without a script"""
@@ -44,7 +44,7 @@ CAPTIONS: Mapping[str, str] = {
     "dotted diagonal is expected where the noise is as assumed; above it residuals are larger, below it smaller.",
     "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "
     "in the camera frames do not.",
-    "time_per_frame": "An estimator below the dotted line runs in real time.",
+    "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 
 

@@ -87,8 +87,8 @@ def charts(run: Run) -> list[dict[str, Any]]:
 
 def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
     away, group = f"from {run.reference}", "Divergence and errors"
-    yield _chart(group, "divergence", f"Divergence {away}", "m", _column(run, "divergence", "position"))
-    yield _chart(group, "rotation", f"Rotation {away}", "°", _column(run, "divergence", "rotation_deg"))
+    yield _chart(group, "divergence", f"Divergence {away}, unaligned", "m", _column(run, "divergence", "position"))
+    yield _chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
     yield _chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
     yield _chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
     without = "difference from ground truth; all start at the true pose"
@@ -141,7 +141,7 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
     spent = {r.name: 1e3 * r.estimate.seconds for r in run.answered if len(r.estimate.seconds) == T}
     spent = {name: ms for name, ms in spent.items() if ms.any()}
     interval = 1e3 * float(np.median(run.problem.sequence.dt))
-    hint = "below the thin line an estimator keeps up with the camera"
+    hint = "below the thin line an estimator runs in real time"
     yield _chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), log=True, middle=interval, hint=hint)
 
 
@@ -272,7 +272,7 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
 
 
 def _most_excluded(problem: Problem) -> int | None:
-    """The frame around which, for a second, the largest share of matches was found wrong; None where none was."""
+    """Middle of the second with the largest share of wrong matches, as a frame; None where no match is wrong."""
     frame, T = problem.sequence.observations.frame, problem.n_frames
     wrong = np.bincount(frame[np.isin(problem.excluded, (*WRONG_MATCH, Excluded.COPIED))], minlength=T)
     every = np.bincount(frame[problem.excluded != Excluded.FEATURE_NOT_CHOSEN], minlength=T)

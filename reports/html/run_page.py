@@ -15,13 +15,12 @@ from fgbaseline.compare.estimate_comparison import Run
 
 from ..figures import EncodedFigure
 from ..figures.style import TRUTH, colors, on_dark
+from ..phrases.evidence import FIRST
 from ..phrases.run import verdict
 from ..tables import run as tables
 from .environment import asset, environment, picture
 from .plot_data import TRUTH_LINE, embedded_json, page_data
 
-FIRST_SENTENCES = 3
-"""of the verdict that stand above the table"""
 EVIDENCE_FIGURES = ("held_out", "three_sigma_", "reprojection_classes", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
 CHART_FIGURES = ("reprojection_over_time", "reprojection_distribution")
@@ -63,7 +62,8 @@ def render(run: Run, summary: Mapping[str, Any], figures: Mapping[str, Figure | 
             sequence=summary.get("sequence", {}),
             problem=summary.get("problem", {}),
             verdict=verdict(run),
-            first=FIRST_SENTENCES,
+            first=FIRST,
+            criteria=tables.trust_table(run.trust.criteria),
             trust_in_reference=run.trust.verdict.name.lower(),
             table=tables.main_table(run, estimators),
             evidence=tables.evidence_table(run, estimators),

@@ -10,7 +10,7 @@ from fgbaseline.data.plural import plural
 
 from ..formatting import interval, listed, number
 from ..results.bench import ANSWERED, METRICS, Results, consistency, judge, overall, rankings, records
-from ..results.metrics import Metric
+from ..results.metric import Metric
 from .evidence import MEANING
 
 MOST_CASES = 10

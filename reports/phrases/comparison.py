@@ -1,21 +1,22 @@
 """Sentences on a comparison: the caption of its tables, and its verdict, the trust in the reference first."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, distance_traveled, is_insufficient
-from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
-from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+from fgbaseline.compare.trajectory_comparison.samples import samples
 
-from ..formatting import MINUS, counted, interval, listed, number, per_cent
+from ..formatting import counted, listed, number, per_cent
 from .evidence import (
     DEGREES_OF_FREEDOM,
     held_out_sentences,
+    overconfidence_bound,
     reference_sentence,
     sample_requirement,
-    threshold,
 )
+from .position_errors import error_decompositions, file_resolution, maximum_errors, path_lengths, position_rmse
 
 
 def caption(comparison: Comparison) -> str:
@@ -33,20 +34,21 @@ def caption(comparison: Comparison) -> str:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """All sentences, in the order in which later ones rest on earlier ones."""
+    """All sentences, those of most consequence first."""
     parts: tuple[Callable[[Comparison], list[str]], ...] = (
         _too_little_data,
         _reference,
+        _reported_covariances,
+        position_rmse,
+        maximum_errors,
+        file_resolution,
         _file_remarks,
-        _position_rmse,
-        _maximum_errors,
-        _decompositions,
-        _path_lengths,
+        error_decompositions,
+        path_lengths,
         _time_offsets,
         _unpaired_poses,
         _undetermined_alignments,
         _rough_intervals,
-        _reported_covariances,
         _outside_recording,
         _reprojection,
         _maps,
@@ -89,134 +91,19 @@ def _file_remarks(comparison: Comparison) -> list[str]:
     return sentences
 
 
-def _position_rmse(comparison: Comparison) -> list[str]:
-    """Position RMSEs in order, over the common poses; where these are not all poses, also over all of each."""
-    name = comparison.reference.name
-    others = [result for result in comparison.ranked if not result.entry.by_product]
-    by_products = [
-        f"{result.name}, a by-product of {name} with pose k from data up to frame k: {_rmse(result)}."
-        for result in comparison.ranked
-        if result.entry.by_product
-    ]
-    if not others:
-        return by_products
-    if comparison.ranking.same:
-        path = float(others[0].departure["travelled"][-1])
-        share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
-        first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
-        each = listed([f"{first}{share}", *rest])
-        return [f"Position RMSE against {name}: {each}.", *_order(comparison), *by_products]
-    each = listed(
-        f"{r.name} {_rmse(r)} over {counted(len(r.matched), 'pose')} "
-        f"({per_cent(coverage(comparison, r))} of {name}'s time)"
-        for r in others
-    )
-    return [*_over_common(comparison), f"Position RMSE over all poses of each estimate: {each}.", *by_products]
-
-
-def _over_common(comparison: Comparison) -> list[str]:
-    """Ranking of estimates that do not have the same moments, and the estimates that are not ranked."""
-    ranking, name = comparison.ranking, comparison.reference.name
-    apart = [r.name for r in comparison.ranked if not r.entry.by_product and ranking.rank(r.name) is None]
-    if len(ranking.rivals) < 2:
-        return [f"Not ranked, too few poses in common: {listed([*ranking.rivals, *apart])}."]
-    each = listed(f"{n} {number(ranking.rmse(n))} m" for n in ranking.rivals)
-    having = "the others have" if apart else "all have"
-    text = f"Position RMSE against {name} over the {counted(ranking.moments, 'pose')} that {having}: {each}."
-    missing = [f"Not ranked, too few poses in common with {name}: {listed(apart)}."] if apart else []
-    return [text, *_order(comparison), *missing]
-
-
-def _order(comparison: Comparison) -> list[str]:
-    return significance_sentences(comparison.ranking.rivals[0], comparison.behind) if comparison.behind else []
-
-
-def significance_sentences(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
-    """Paired differences from the estimate with the smallest RMSE, `first`: the significant ones, and the others."""
-    groups: dict[bool, list[str]] = {True: [], False: []}
-    for name, d in behind.items():
-        groups[d.settled].append(f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
-    sentences = []
-    if groups[True]:
-        sentences.append(f"Larger position RMSE than {first}, by paired bootstrap: {listed(groups[True])}.")
-    if groups[False]:
-        sentences.append(f"No significant difference from {first}, by paired bootstrap: {listed(groups[False])}.")
-    return sentences
-
-
-def _signed(meters: float) -> str:
-    return number(meters) if not meters < 0 else f"{MINUS}{number(-meters)}"
-
-
-def _rmse(result: Result) -> str:
-    """Position RMSE with its interval: `0.52 m [0.41, 0.66]`."""
-    value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
-    return f"{value} m{mark}{bounds}"
-
-
-def _maximum_errors(comparison: Comparison) -> list[str]:
-    """Largest position error of each estimate, and when it first exceeds the threshold."""
-    sentences = []
-    for result in comparison.ranked:
-        most = float(np.nanmax(result.departure["position"]))
-        sentence = f"{result.name}: maximum position error {number(most)} m; {threshold(result.bound)}."
-        if result.passing is not None:
-            t = result.passing.t - float(result.matched.reference.t[0])
-            when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
-            sentence += f" The threshold is first exceeded {when}, {number(result.passing.travelled)} m along the path."
-        sentences.append(sentence)
-    return sentences
-
-
-def _decompositions(comparison: Comparison) -> list[str]:
-    """Shares of heading and scale in the squared position error."""
-    sentences = []
-    for result in comparison.ranked:
-        if np.isfinite(result.shares.noise):
-            heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
-            sentences.append(
-                f"Squared position error of {result.name}: {heading} from heading, {scale} from scale (least-squares "
-                f"scale {1.0 + 0.01 * result.shares.scale_percent:.4f}) and {rest} from the rest."
-            )
-    return sentences
-
-
-def _share(result: Result, name: str) -> str:
-    value, low, high = result.share_intervals.by_name[name]
-    if not np.isfinite(low):
-        return per_cent(max(value, 0.0))
-    return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
-
-
-def _path_lengths(comparison: Comparison) -> list[str]:
-    """Length of each path over the paired poses, before alignment, against the reference's."""
-    sentences = []
-    for result in comparison.results.values():
-        matched = result.matched
-        own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
-        path = float(distance_traveled(matched.reference.position)[-1])
-        if path > 0.0 and number(own) != number(path):
-            sentences.append(
-                f"The path of {result.name} over the paired poses is {number(own)} m long, "
-                f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'} than the "
-                "reference's."
-            )
-    return sentences
-
-
 def _time_offsets(comparison: Comparison) -> list[str]:
-    sentences = []
+    each = []
     for result in comparison.results.values():
         found = result.offset
         if found is None:
             continue
         where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
-        text = (
-            f"The stamps of {result.name} fit best {'as they are' if found.seconds == 0 else where} "
-            f"(shifts of {1e3 * found.low:+.3g} to {1e3 * found.high:+.3g} ms fit nearly as well)"
+        determined = "" if found.determined else "; the path does not determine it"
+        each.append(
+            f"{result.name} {'as they are' if found.seconds == 0 else where} (shifts of {1e3 * found.low:+.3g} to "
+            f"{1e3 * found.high:+.3g} ms fit nearly as well{determined})"
         )
-        sentences.append(text + ("." if found.determined else "; the path does not determine it."))
-    return sentences
+    return [f"The stamps fit best: {listed(each)}."] if each else []
 
 
 def _unpaired_poses(comparison: Comparison) -> list[str]:
@@ -249,8 +136,9 @@ def _rough_intervals(comparison: Comparison) -> list[str]:
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
-    """Consistency of the covariances in the files of estimates."""
-    sentences = []
+    """Consistency of the covariances in the files of estimates, the overconfident ones first."""
+    sentences, measured, bad = [], dict[str, float](), []
+    remarks = dict[str, str]()
     for result in comparison.results.values():
         reported = result.reported_covariance
         if reported is None:
@@ -259,17 +147,29 @@ def _reported_covariances(comparison: Comparison) -> list[str]:
             continue
         known = reported.nees[~np.isnan(reported.nees)]
         if len(known):
-            mean = float(np.mean(known))
-            sentences.append(
-                f"Normalized error RMS of {result.name} (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): "
-                f"{number(float(np.sqrt(mean / DEGREES_OF_FREEDOM)))} (NEES {number(mean)} over "
-                f"{counted(len(known), 'pose')}{'; ' if reported.remark else ''}{reported.remark})."
+            measured[result.name] = float(np.mean(known))
+            remarks[result.name] = (
+                f"over {counted(len(known), 'pose')}{'; ' if reported.remark else ''}{reported.remark}"
             )
         if reported.not_positive_definite:
+            n = number(reported.not_positive_definite)
+            bad.append(f"{n} of the {counted(len(reported.nees), 'covariance')} of {result.name}")
+    for word, those in (
+        ("Overconfident", [name for name, mean in measured.items() if mean > overconfidence_bound()]),
+        ("Not overconfident", [name for name, mean in measured.items() if mean <= overconfidence_bound()]),
+    ):
+        each = listed(
+            f"{name} {number(float(np.sqrt(measured[name] / DEGREES_OF_FREEDOM)))} (NEES {number(measured[name])} "
+            f"{remarks[name]})"
+            for name in those
+        )
+        if those:
             sentences.append(
-                f"{number(reported.not_positive_definite)} of the {counted(len(reported.nees), 'covariance')} of "
-                f"{result.name} are not positive definite; NEES leaves them out."
+                f"{word}, by the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): "
+                f"{each}."
             )
+    if bad:
+        sentences.append(f"Not positive definite, and left out by NEES: {listed(bad)}.")
     return sentences
 
 

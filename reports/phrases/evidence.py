@@ -1,6 +1,7 @@
 """Sentences that a run and a comparison share: trust in the reference, sample size, held-out tracks, thresholds."""
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import TYPE_CHECKING
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
@@ -15,12 +16,22 @@ if TYPE_CHECKING:
 
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
+FIRST = 6
+"""sentences of a verdict that stand above the table"""
 MEANING: Mapping[str, str] = {
     "doubtful": "a small divergence from it counts, a large one may be its own error",
     "untrusted": "divergence from it does not measure accuracy",
 }
 """of a reference that is not trusted"""
 ROUGH = "The interval is rough: fewer than 10 independent blocks fit the path."
+
+
+@cache
+def overconfidence_bound() -> float:
+    """Upper bound of the NEES of a single pose, 95 %: a larger mean or median is that of an overconfident estimate."""
+    from fgbaseline.compare import chi_square_bounds
+
+    return float(chi_square_bounds(DEGREES_OF_FREEDOM)[1])
 
 
 def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
@@ -42,6 +53,34 @@ def threshold(bound: float) -> str:
         f"threshold {number(bound)} m"
         if bound >= FAR
         else f"threshold {per_cent(FAR_SHARE)} of the path, {number(bound)} m"
+    )
+
+
+def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:
+    """Largest `quantity` of all estimators and the exceedances, in a sentence for each threshold.
+
+    `most` has threshold and maximum by name, m; `onset` says when the threshold is first exceeded, where it is.
+    """
+    names: dict[str, list[str]] = {}
+    for name, (bound, _) in most.items():
+        names.setdefault(threshold(bound), []).append(name)
+    sentences = []
+    for text, those in names.items():
+        each = listed(f"{name} {most[name][1]} m" for name in those)
+        beyond = "; ".join(f"by {name} {onset[name]}" for name in those if name in onset)
+        exceeded = f" The threshold is first exceeded {beyond}." if beyond else ""
+        sentences.append(f"Maximum {quantity}: {each}; {text}.{exceeded}")
+    return sentences
+
+
+def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> str:
+    """1-sigma of the reference by `PoseSigma` of the results: its possible distance from the truth."""
+    along, final, turn, final_turn = (
+        number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
+    )
+    return (
+        f"1-sigma of {name} itself: {along} m (RMS along the path), {final} m at the end; rotation {turn}° and "
+        f"{final_turn}° (under the problem's noise model, first pose fixed, unaligned)."
     )
 
 

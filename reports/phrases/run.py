@@ -25,7 +25,16 @@ from fgbaseline.data import Status
 
 from ..formatting import counted, listed, number, per_cent
 from ..results.evidence import frame_ranges
-from .evidence import DEGREES_OF_FREEDOM, held_out_sentences, reference_sentence, sample_requirement, threshold
+from ..results.statistics import PoseSigma
+from .evidence import (
+    DEGREES_OF_FREEDOM,
+    held_out_sentences,
+    reference_sentence,
+    reference_sigma_sentence,
+    sample_requirement,
+    threshold_sentences,
+)
+from .overconfidence import overconfidence_sentences
 from .run_accuracy import ate_sentences, divergence_sentences
 
 LONGEST_LIST = 80
@@ -33,15 +42,18 @@ LONGEST_LIST = 80
 
 
 def verdict(run: Run) -> list[str]:
-    """All sentences, in the order in which later ones rest on earlier ones."""
+    """All sentences, those of most consequence first."""
     parts: tuple[Callable[[Run], list[str]], ...] = (
         _too_little_truth,
         _reference,
-        _coverage,
+        overconfidence_sentences,
+        _reference_sigma,
+        _failures,
         ate_sentences,
         divergence_sentences,
+        _coverage,
         _maximum_divergence,
-        _failures,
+        _missing_poses,
         _consistency,
         _invalid_covariances,
         _held_out,
@@ -70,6 +82,16 @@ def _reference(run: Run) -> list[str]:
     return [reference_sentence(run.reference, run.trust, is_compared=bool(run.compared))]
 
 
+def _reference_sigma(run: Run) -> list[str]:
+    """Possible distance of the reference itself from the truth, by its own covariances."""
+    if run.reference is None:
+        return []
+    sigma = run.results[run.reference].evidence.sigma
+    if not np.isfinite(sigma.position_rmse):
+        return [f"{run.reference} has no covariances: its own distance from the truth is unknown."]
+    return [reference_sigma_sentence(run.reference, {name: getattr(sigma, name) for name in PoseSigma.model_fields})]
+
+
 def _coverage(run: Run) -> list[str]:
     tables = {r.name: r.divergence for r in run.answered if r.divergence is not None}
     frames = {name: known(table) for name, table in tables.items()}
@@ -91,27 +113,35 @@ def _coverage(run: Run) -> list[str]:
 
 
 def _maximum_divergence(run: Run) -> list[str]:
-    """Largest divergence of each estimator, or when it first exceeds the threshold."""
-    sentences = []
+    """Largest divergence of each estimator, and when it first exceeds the threshold."""
+    rivals = [
+        r
+        for r in run.compared
+        if r.divergence is not None and r.name not in run.by_products and known(r.divergence).any()
+    ]
+    found = {r.name: divergence_onset(run, r) for r in rivals}
+    sentences = threshold_sentences(
+        "divergence",
+        {
+            r.name: (divergence_threshold(r), number(divergence_summary(r.divergence)["max"]))
+            for r in rivals
+            if r.divergence is not None
+        },
+        {
+            name: f"at {onset.seconds:.1f} s (frame {onset.frame}), and in "
+            f"{'all frames' if onset.beyond == 1.0 else f'{per_cent(onset.beyond)} of the frames'} from then on"
+            for name, onset in found.items()
+            if onset is not None
+        },
+    )
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
-    for result in run.compared:
-        if result.divergence is None or result.name in run.by_products or not known(result.divergence).any():
-            continue
-        limit, exceeded = divergence_threshold(result), divergence_onset(run, result)
-        most = number(divergence_summary(result.divergence)["max"])
-        sentence = f"{result.name}: maximum divergence {most} m; {threshold(limit)}."
-        if exceeded is not None:
-            then = "all frames" if exceeded.beyond == 1.0 else f"{per_cent(exceeded.beyond)} of the frames"
-            sentence += (
-                f" The threshold is first exceeded at {exceeded.seconds:.1f} s (frame {exceeded.frame}), and in {then} "
-                "from then on."
-            )
-            if exceeded.wrong is not None and overall is not None:
-                sentence += (
-                    f" Within {AROUND:g} s of that the mask excluded {per_cent(exceeded.wrong)} of the observations as "
-                    f"wrong matches ({per_cent(overall)} in the whole recording)."
-                )
-        sentences.append(sentence)
+    wrong = {n: onset.wrong for n, onset in found.items() if onset is not None and onset.wrong is not None}
+    if wrong and overall is not None:
+        each = listed(f"{per_cent(share)} for {name}" for name, share in wrong.items())
+        sentences.append(
+            f"Share of the observations that the mask excluded as wrong matches within {AROUND:g} s of that: {each} "
+            f"({per_cent(overall)} in the whole recording)."
+        )
     return sentences
 
 
@@ -123,11 +153,19 @@ def _failures(run: Run) -> list[str]:
             if result.estimate.status is status:
                 reasons.setdefault(result.estimate.reason or "no reason was given", []).append(result.name)
         sentences += [f"{listed(names)} {status.value}: {reason.rstrip('.')}." for reason, names in reasons.items()]
-    for result in run.answered:
-        missing = int(np.isnan(result.estimate.world_T_imu[:, 0, 0]).sum())
-        if missing:
-            sentences.append(f"{result.name} has no pose in {missing} of {counted(run.problem.n_frames, 'frame')}.")
     return sentences
+
+
+def _missing_poses(run: Run) -> list[str]:
+    names: dict[int, list[str]] = {}
+    for result in run.answered:
+        names.setdefault(int(np.isnan(result.estimate.world_T_imu[:, 0, 0]).sum()), []).append(result.name)
+    return [
+        f"{listed(those)} {'has' if len(those) == 1 else 'have'} no pose in {missing} of "
+        f"{counted(run.problem.n_frames, 'frame')}."
+        for missing, those in names.items()
+        if missing
+    ]
 
 
 def _consistency(run: Run) -> list[str]:
@@ -144,19 +182,15 @@ def _consistency(run: Run) -> list[str]:
 
 
 def _invalid_covariances(run: Run) -> list[str]:
-    sentences = []
+    each = []
     for result in run.answered:
         bad = np.flatnonzero(result.evidence.covariance == CovarianceState.NOT_POSITIVE_DEFINITE)
         if len(bad):
             where = frame_ranges(bad)
             if len(where) > LONGEST_LIST:
                 where = f"first {bad[0]}, last {bad[-1]}"
-            sentences.append(
-                f"{result.name} has {counted(len(bad), 'pose covariance that is', 'pose covariances that are')} not "
-                f"positive definite ({'frame' if len(bad) == 1 else 'frames'} {where}); NEES leaves "
-                f"{'it' if len(bad) == 1 else 'them'} out."
-            )
-    return sentences
+            each.append(f"{number(len(bad))} of {result.name} ({'frame' if len(bad) == 1 else 'frames'} {where})")
+    return [f"Pose covariances that are not positive definite, which NEES leaves out: {listed(each)}."] if each else []
 
 
 def _held_out(run: Run) -> list[str]:

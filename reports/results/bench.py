@@ -14,8 +14,9 @@ from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
 from ..bench.job import Planned
+from .metric import Metric
 from .metrics import METRICS as EVERY
-from .metrics import PERCENT, Metric
+from .metrics import PERCENT
 
 OF_THE_RUN = ("run", "case", "sequence", "seed", "reference", "trust", "frames", "features", "observations")
 COSTS = ("run", "case", "estimator", "frames", "observations", "seconds", "memory_mb")

@@ -79,6 +79,8 @@ class Checked:
     """in the order of the limits file, then of run and estimator"""
     references: tuple[str, ...]
     """sentences on references that are not trusted, one for each run"""
+    sigmas: tuple[str, ...]
+    """sentences on the 1-sigma of the references themselves"""
     shortages: tuple[str, ...]
     """sentences on samples that are smaller than the limits ask for, printed first"""
     undecided: bool

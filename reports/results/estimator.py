@@ -28,8 +28,9 @@ from .evidence import (
     summarize_evidence,
 )
 from .json_tree import INFINITE, nulls
-from .metrics import MEASURED, TERMS, Metric, measured
-from .statistics import Divergence, Number, Part, Reprojection, Spread
+from .metric import TERMS, Metric
+from .metrics import MEASURED, measured
+from .statistics import Divergence, Number, Part, PoseSigma, Reprojection, Spread
 
 
 class Component(Part):
@@ -80,7 +81,7 @@ class EstimatorSummary(Part):
 
     status: Literal["ok", "recovered", "failed"]
     reason: Annotated[str, Field(description="why the status is not ok, in a sentence")]
-    seconds: Annotated[float, Field(description="computation time of the estimate, s")]
+    seconds: Annotated[Number, Field(description="computation time of the estimate, s; null of a trajectory file")]
     reprojection: Annotated[Reprojection, Field(description="over all observations of its landmarks")]
     reprojection_used: Annotated[Reprojection, Field(description="over the observations it used")]
     reprojection_common: Annotated[Reprojection, Field(description="over the observations that every estimator used")]
@@ -101,6 +102,7 @@ class EstimatorSummary(Part):
     nees: NeesInDetail | None
     covariance: CovarianceCount | None
     nees_reference: ReferenceNees | None
+    sigma: PoseSigma | None
     sigma_ratio: SigmaRatio | None
     nis: Nis | None
     whitened: Whitened

@@ -14,7 +14,7 @@ from fgbaseline.compare import CovarianceState, share_inside_bounds
 from fgbaseline.compare.estimate_comparison import Evidence, Result, Run
 from fgbaseline.geometry import FloatArray
 
-from .statistics import Nees, Number, Part
+from .statistics import Nees, Number, Part, PoseSigma
 
 
 class NeesInDetail(Nees):
@@ -44,6 +44,7 @@ class ReferenceNees(Part):
     inside_95: Annotated[Number, Field(description="share of the frames inside the 95 % bounds of a single one")]
     frames: int
     left_out: Annotated[int, Field(description="frames in which P - P_ref is not positive definite")]
+    overconfident: Annotated[int, Field(description="frames in which P is smaller than P_ref in some direction")]
 
 
 class SigmaRatio(Part):
@@ -124,6 +125,7 @@ def summarize_evidence(run: Run, result: Result) -> dict[str, Any]:
         "nees": None if evidence.nees is None else _nees(evidence.nees),
         "covariance": None if result.estimate.covariance is None else _covariance(evidence),
         "nees_reference": None if evidence.difference is None else _difference(evidence.difference),
+        "sigma": summarize_sigma(evidence.sigma),
         "sigma_ratio": None if evidence.sigma_ratio is None else _medians(evidence.sigma_ratio),
         "nis": asdict(evidence.nis) if evidence.nis.frames else None,
         "whitened": evidence.whitened,
@@ -150,6 +152,7 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
         "nees_reference": alone
         if is_alone
         else no_covariance or "P - P_ref is positive definite in no frame, or one of the two has no covariance",
+        "sigma": no_covariance or "no pose has a positive definite covariance",
         "sigma_ratio": alone if is_alone else no_covariance or "no frame has two positive definite covariances",
         "nis": "it records no innovations",
         "whitened": no_tracks,
@@ -167,7 +170,17 @@ def _nees(table: pd.DataFrame) -> dict[str, float | int]:
 
 
 def _difference(difference: compare.ReferenceNees) -> dict[str, float | int]:
-    return {**_statistics(difference.nees), "left_out": int(difference.left_out.sum())}
+    return {
+        **_statistics(difference.nees),
+        "left_out": int(difference.left_out.sum()),
+        "overconfident": int(difference.overconfident.sum()),
+    }
+
+
+def summarize_sigma(sigma: compare.PoseSigma) -> dict[str, float] | None:
+    """Values of the model `PoseSigma`; None without a valid covariance."""
+    values = {name: float(getattr(sigma, name)) for name in PoseSigma.model_fields}
+    return values if math.isfinite(sigma.position_rmse) else None
 
 
 def _statistics(nees: FloatArray) -> dict[str, float | int]:

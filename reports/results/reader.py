@@ -37,6 +37,22 @@ class _Record(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
+class SigmaRecord(_Record):
+    """1-sigma of the reference itself, m and degrees."""
+
+    position_rmse: float | None = None
+    position_final: float | None = None
+    rotation_rmse_deg: float | None = None
+    rotation_final_deg: float | None = None
+
+    def of(self, metric: str) -> float | None:
+        """The sigma in the unit of a metric of `divergence`: that of the last pose for a final one."""
+        quantity, when = ("rotation", "_deg") if "rotation" in metric else ("position", "")
+        part = "final" if ".final" in metric or "_final" in metric else "rmse"
+        found: float | None = getattr(self, f"{quantity}_{part}{when}")
+        return found
+
+
 class ReferenceRecord(_Record):
     """The reference that divergence is measured from, and the trust in it."""
 
@@ -44,6 +60,8 @@ class ReferenceRecord(_Record):
     trust: Literal["trusted", "doubtful", "untrusted"] | None = None
     """None where it is unknown: a trajectory that the user gave"""
     reasons: tuple[str, ...] = ()
+    sigma: SigmaRecord | None = None
+    """None where it has no covariances, and in the summaries of older versions"""
 
 
 class SequenceRecord(_Record):

@@ -17,8 +17,9 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
 from .estimator import EstimatorSummary, summarize_estimator
+from .evidence import summarize_sigma
 from .json_tree import finite
-from .statistics import Number, Part
+from .statistics import Number, Part, PoseSigma
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
@@ -60,9 +61,26 @@ class ProblemSummary(Part):
     diagnosed: bool
     excluded: Annotated[dict[str, int], Field(description="reason -> masked observations")]
     pixel_sigma: float
+    pixel_inflation: Annotated[
+        float, Field(description="factor in pixel_sigma for time-correlated track errors; 1 where there is none")
+    ]
     remarks: list[str]
     findings: Annotated[list[FindingSummary], Field(description="faults that the diagnosis detected")]
     repairs: Annotated[list[str], Field(description="repairs, user-specified ones included")]
+
+
+class CriterionSummary(Part):
+    """Criterion of the trust in the reference."""
+
+    code: str
+    name: str
+    value: Number
+    unit: Annotated[str, Field(description="empty for ratios")]
+    doubtful: Annotated[float, Field(description="limit beyond which the reference is doubtful")]
+    untrusted: Annotated[float, Field(description="limit beyond which it is untrusted")]
+    at_least: Annotated[bool, Field(description="whether the value must not fall below its limits, else not exceed")]
+    verdict: Literal["trusted", "doubtful", "untrusted"]
+    remark: str
 
 
 class ReferenceSummary(Part):
@@ -71,6 +89,10 @@ class ReferenceSummary(Part):
     name: str | None
     trust: Literal["trusted", "doubtful", "untrusted"]
     reasons: Annotated[list[str], Field(description="reasons for the trust, worst first")]
+    sigma: Annotated[
+        PoseSigma | None, Field(description="possible distance of the reference itself from the truth; null without")
+    ]
+    criteria: Annotated[list[CriterionSummary], Field(description="measured values of the trust, limits and verdicts")]
 
 
 class HeldOutSummary(Part):
@@ -95,6 +117,10 @@ class Summary(Part):
     reference: ReferenceSummary
     held_out: Annotated[HeldOutSummary | None, Field(description="null where no tracks were held out")]
     estimators: dict[str, EstimatorSummary]
+    added: Annotated[
+        dict[str, str],
+        Field(default_factory=dict, description="trajectories from files among the estimators: pairing and alignment"),
+    ]
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
     machine: dict[str, str | int]
@@ -125,6 +151,7 @@ def summarize(run: Run) -> Summary:
                     "diagnosed": problem.diagnosed,
                     "excluded": _excluded_counts(problem),
                     "pixel_sigma": math.sqrt(problem.pixel_variance),
+                    "pixel_inflation": problem.pixel_inflation,
                     "remarks": list(problem.remarks),
                     "findings": [asdict(finding) for finding in problem.findings],
                     "repairs": list(problem.repairs),
@@ -133,9 +160,17 @@ def summarize(run: Run) -> Summary:
                     "name": run.reference,
                     "trust": run.trust.verdict.name.lower(),
                     "reasons": list(run.trust.reasons),
+                    "sigma": None
+                    if run.reference is None
+                    else summarize_sigma(run.results[run.reference].evidence.sigma),
+                    "criteria": [
+                        {**asdict(criterion), "verdict": criterion.verdict.name.lower()}
+                        for criterion in run.trust.criteria
+                    ],
                 },
                 "held_out": _held_out(run),
                 "estimators": {name: summarize_estimator(run, result) for name, result in run.results.items()},
+                "added": dict(run.added),
                 "settings": dict(run.settings),
                 "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
                 "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count() or 0},

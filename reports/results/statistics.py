@@ -41,6 +41,15 @@ class Reprojection(Spread):
     n: Annotated[int, Field(description="observations that the figures are over")]
 
 
+class PoseSigma(Part):
+    """1-sigma of the poses by the estimator's own covariances: the problem's noise, first pose fixed, unaligned."""
+
+    position_rmse: Annotated[Number, Field(description="RMS along the path, m")]
+    position_final: Annotated[Number, Field(description="of the last pose that has a covariance, m")]
+    rotation_rmse_deg: Annotated[Number, Field(description="RMS along the path, degrees")]
+    rotation_final_deg: Annotated[Number, Field(description="of the last pose that has a covariance, degrees")]
+
+
 class Nees(Part):
     """Normalized estimation error squared of the poses, error log(T^-1 T_true) in the body frame."""
 

@@ -19,7 +19,6 @@ from .problem import (
     import_estimators,
     preliminary_remarks,
     read_sequence,
-    solve,
 )
 
 FAILED = 1
@@ -29,7 +28,7 @@ UNWRAPPED = 120
 
 def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Path | None = None) -> int:
     """Runs the estimators, writes the folder, prints the main results; returns 1 where an estimator failed, else 0."""
-    check_estimators(settings.estimators)
+    check_estimators(settings.estimators, settings.functions)
     sequence = read_sequence(settings)
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=MARK)
@@ -38,6 +37,12 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
 
         require_rerun(rerun_file)
 
+    if settings.add or settings.add_body or settings.add_time_unit or settings.add_offset:
+        from .solution import read_added
+
+        added = read_added(settings)
+    else:
+        added = None
     kept, held = hold_out_tracks(sequence, settings)
 
     from ..progress import reporter
@@ -58,12 +63,18 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
         from ..tables import print_table
         from ..tables.run import terminal_table
         from .folder import as_dict, write_run
+        from .solution import solve
 
         import_estimators(settings.estimators)
         (problem,) = built()
     for sentence in preliminary_remarks(problem):
         click.echo(sentence)
-    solved = solve(problem, settings, progress.estimator, held, cores())
+    if 0 < settings.batch_up_to < int(problem.mask.sum()) and "isam2" in settings.estimators:
+        many = plural(int(problem.mask.sum()), "observation")
+        progress.print_line(
+            f"batch is left out: {many}, by default up to {settings.batch_up_to:,}; --estimators adds it"
+        )
+    solved = solve(problem, settings, progress.estimator, held, cores(), added)
     for name, result in solved.results.items():
         if not result.answered:
             progress.print_line(f"{name} failed: {result.estimate.reason}")
@@ -75,7 +86,7 @@ def run(settings: RunSettings, out: Path | None, *, force: bool, rerun_file: Pat
 
             write_rerun(solved, rerun_file)
     print_table(terminal_table(as_dict(summary)["estimators"], summary.reference.name), width=UNWRAPPED)
-    for sentence in verdict(solved):
+    for sentence in [*verdict(solved), *(f"{name}: {text}." for name, text in solved.added.items())]:
         click.echo(sentence)
     click.echo(f"\nThe report is in {place / 'report.html'}")
     return 0 if len(solved.answered) == len(solved.results) else FAILED

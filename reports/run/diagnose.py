@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from fgbaseline.data import Sequence
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
-from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.formats.atomic_write import atomic_write, require_new
 from fgbaseline.data.plural import plural
 from fgbaseline.diagnosis import (
     Diagnosis,
+    TrackStatistics,
     diagnose,
     diagnose_inertial,
     findings_of,
@@ -50,103 +51,111 @@ def print_diagnosis(
         require_free(out, force=force, mark=MARK)
     if repairs is not None:
         _require_writable(repairs, force=force)
-    if sequence.imu is not None:
-        return _print_inertial(sequence, out, as_json=as_json, repairs=repairs, force=force)
-    diagnosis = diagnose(sequence)
-    tracks = track_statistics(diagnosis)
-    findings = findings_of(diagnosis, tracks)
-    text = _text(to_json(diagnosis, tracks, findings))
+        if sequence.imu is not None:
+            raise InputError("write-repairs: a recording with raw inertial samples has no repairs that can be set")
+    report = _diagnosed(sequence) if sequence.imu is None else _diagnosed_inertial(sequence)
+    text = json.dumps(report.contents, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     if out is not None:
-        from fgbaseline.reports import figures
-
         with atomic_folder(out, force=force, mark=MARK) as folder:
-            (folder / "figures").mkdir()
-            figures.save(figures.draw_diagnosis(diagnosis, tracks), folder / "figures")
+            if report.evidence is not None:
+                from fgbaseline.reports import figures
+
+                (folder / "figures").mkdir()
+                figures.save(figures.draw_diagnosis(*report.evidence), folder / "figures")
             (folder / MARK).write_text(text, encoding="utf-8")
-    if repairs is not None:
-        with atomic_write(repairs) as file:
-            file.write(repairs_text(diagnosis).encode())
+    if repairs is not None and report.evidence is not None:
+        with atomic_write(repairs, force=force) as file:
+            file.write(repairs_text(report.evidence[0]).encode())
     if as_json:
         click.echo(text, nl=False)
     else:
-        _print(diagnosis, findings)
+        _print(report)
         if out is not None:
             click.echo(f"\nThe diagnosis is in {out}")
         if repairs is not None:
             click.echo(f"\nThe repairs are in {repairs}; edit them for `fgbaseline run --repairs`")
-    if diagnosis.cannot_tell:
+    if report.cannot_tell:
         return UNDECIDED
-    return FINDINGS if findings else CLEAN
+    return FINDINGS if report.findings else CLEAN
 
 
-def _print_inertial(sequence: Sequence, out: Path | None, *, as_json: bool, repairs: Path | None, force: bool) -> int:
-    """The same of a recording with raw inertial samples, which has no repairs to write."""
-    if repairs is not None:
-        raise InputError("write-repairs: a recording with raw inertial samples has no repairs that can be set")
+class _Report(NamedTuple):
+    """Diagnosis in the form that is printed and written."""
+
+    recording: str
+    """name and size, one or more lines"""
+    measured: str
+    """what the motion is measured by"""
+    contents: dict[str, Any]
+    """of diagnosis.json"""
+    findings: tuple[Finding, ...]
+    cannot_tell: str
+    """reason of an incomplete diagnosis, without its full stop; empty otherwise"""
+    sentences: tuple[str, ...]
+    """results that are no faults"""
+    evidence: tuple[Diagnosis, TrackStatistics] | None = None
+    """what figures and repairs are made from; raw inertial samples have neither"""
+
+
+def _diagnosed(sequence: Sequence) -> _Report:
+    diagnosis = diagnose(sequence)
+    tracks = track_statistics(diagnosis)
+    findings = findings_of(diagnosis, tracks)
+    unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
+    sentences = ["\nNot identifiable in this recording:", *(f"- {sentence}" for sentence in unknown)] if unknown else []
+    if diagnosis.fit is not None:
+        sentences.append(f"\n{_noise(diagnosis)}")
+    return _Report(
+        _size(diagnosis.sequence),
+        "velocities",
+        to_json(diagnosis, tracks, findings),
+        findings,
+        diagnosis.cannot_tell,
+        tuple(sentences),
+        (diagnosis, tracks),
+    )
+
+
+def _diagnosed_inertial(sequence: Sequence) -> _Report:
     found = diagnose_inertial(sequence)
     findings = inertial_findings(found)
-    text = _text(inertial_to_json(found, findings))
-    if out is not None:
-        with atomic_folder(out, force=force, mark=MARK) as folder:
-            (folder / MARK).write_text(text, encoding="utf-8")
-    if as_json:
-        click.echo(text, nl=False)
-    else:
-        o = found.sequence.observations
-        click.echo(
-            f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(o), 'observation')} of "
-            f"{plural(len(np.unique(o.landmark)), 'track')}, {plural(len(sequence.imu or ()), 'inertial sample')}"
-        )
-        for remark in sequence.remarks:
-            click.echo(remark)
-        if found.cannot_tell:
-            click.echo(f"Nothing can be found out about its motion: {found.cannot_tell}.")
-        if findings:
-            _print_findings(findings)
-        elif not found.cannot_tell:
-            click.echo("Nothing wrong was found.")
-        for sentence in inertial_sentences(found):
-            click.echo(sentence)
-        if out is not None:
-            click.echo(f"\nThe evidence is in {out}")
-    if found.cannot_tell:
-        return UNDECIDED
-    return FINDINGS if findings else CLEAN
+    samples = plural(len(sequence.imu or ()), "inertial sample")
+    return _Report(
+        "\n".join([f"{_size(found.sequence)}, {samples}", *sequence.remarks]),
+        "inertial samples",
+        inertial_to_json(found, findings),
+        findings,
+        found.cannot_tell,
+        inertial_sentences(found),
+    )
+
+
+def _size(sequence: Sequence) -> str:
+    o = sequence.observations
+    return (
+        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(o), 'observation')} of "
+        f"{plural(len(np.unique(o.landmark)), 'track')}"
+    )
 
 
 def _require_writable(file: Path, *, force: bool) -> None:
-    if file.exists() and not force:
-        raise InputError(f"{file}: the file exists; choose another, or replace it with --force")
+    require_new(file, force=force)
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: this is not a file; give the name of one")
     if not file.parent.is_dir():
         raise InputError(f"{file}: there is no folder {file.parent}; create it, or choose another folder")
 
 
-def _text(report: dict[str, Any]) -> str:
-    """Text of diagnosis.json, byte for byte the same for the same diagnosis."""
-    return json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _print(diagnosis: Diagnosis, findings: tuple[Finding, ...]) -> None:
-    sequence = diagnosis.sequence
-    click.echo(
-        f"{sequence.name}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} "
-        f"of {plural(len(np.unique(sequence.observations.landmark)), 'track')}"
-    )
-    if diagnosis.cannot_tell:
-        click.echo(f"The velocities cannot be diagnosed: {diagnosis.cannot_tell}.")
-    if findings:
-        _print_findings(findings)
-    elif not diagnosis.cannot_tell:
+def _print(report: _Report) -> None:
+    click.echo(report.recording)
+    if report.cannot_tell:
+        click.echo(f"The {report.measured} cannot be diagnosed: {report.cannot_tell}.")
+    if report.findings:
+        _print_findings(report.findings)
+    elif not report.cannot_tell:
         click.echo("No fault detected.")
-    unknown = () if diagnosis.cannot_tell else not_identifiable(diagnosis)
-    if unknown:
-        click.echo("\nNot identifiable in this recording:")
-        for sentence in unknown:
-            click.echo(f"- {sentence}")
-    if diagnosis.fit is not None:
-        click.echo(f"\n{_noise(diagnosis)}")
+    for sentence in report.sentences:
+        click.echo(sentence)
 
 
 def _noise(diagnosis: Diagnosis) -> str:

@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -119,10 +120,13 @@ def _consistency(result: Result) -> pd.DataFrame:
 
 
 def _write_tables(run: Run, folder: Path) -> None:
-    """Writes reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv.
+    """Writes trust.csv, reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv.
 
     The first column has the estimator; empty tables are not written.
     """
+    if run.trust.criteria:
+        criteria = pd.DataFrame([asdict(c) | {"verdict": c.verdict.name.lower()} for c in run.trust.criteria])
+        criteria.to_csv(folder / "trust.csv", index=False, float_format="%.6g")
     of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
         "reprojection_classes": lambda r: r.evidence.patterns,
         "moved_points": lambda r: r.evidence.moved[r.evidence.moved["moved"]].drop(columns="moved"),

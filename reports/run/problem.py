@@ -1,9 +1,11 @@
-"""Settings of a run, the problem they make of a recording, and its solution by all estimators."""
+"""Settings of a run, and the problem they make of a recording."""
 
+import inspect
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from fgbaseline.data import (
     HeldOut,
@@ -11,6 +13,7 @@ from fgbaseline.data import (
     Problem,
     Sequence,
     TimeUnit,
+    Trajectory,
     documented,
     estimator_names,
     find_estimator,
@@ -19,14 +22,9 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.solving import Watch, no_progress, solve_all
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
-
-if TYPE_CHECKING:
-    from fgbaseline.compare.estimate_comparison import Run
-
 
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
@@ -42,6 +40,8 @@ class RunSettings:
     """None for the simulated drive"""
     preset: Literal["calibrated", "documented"] = "calibrated"
     estimators: tuple[str, ...] = ("dead-reckoning", "ekf", "isam2", "isam2-online")
+    batch_up_to: int = 0
+    """number of observations up to which `batch`, started at the answer of `isam2` only, is added to them"""
     features: int | Literal["all"] | None = None
     """None for the preset's default"""
     landmarks: LandmarkMode = LandmarkMode.UPDATED
@@ -60,6 +60,16 @@ class RunSettings:
     """YAML of their noise"""
     repairs: Path | None = None
     """TOML file of user-specified repairs"""
+    functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
+    """estimators among the names that are not installed, such as those of the user's files"""
+    add: tuple[str | Trajectory, ...] = ()
+    """trajectories beside the estimators: `[NAME=]FILE`"""
+    add_body: BodyFrame | None = None
+    """body whose poses they have; None for the IMU"""
+    add_time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """of ambiguous time stamps"""
+    add_offset: float = 0.0
+    """added to their stamps, s"""
 
     def record(self) -> dict[str, str | int | float | bool | None]:
         """The settings as `summary.json` has them."""
@@ -81,12 +91,26 @@ class RunSettings:
                 for name, path in (("imu", self.imu), ("imu_calibration", self.imu_calibration))
                 if path is not None
             },
+            "functions": ",".join(f"{name}={_source(function)}" for name, function in self.functions.items()) or None,
+            "add": ",".join(t.name if isinstance(t, Trajectory) else t for t in self.add) or None,
+            "add_body": self.add_body,
+            "add_time_unit": self.add_time_unit,
+            "add_offset": self.add_offset,
         }
 
 
-def check_estimators(names: tuple[str, ...]) -> None:
-    """Raises InputError for no name, an unknown one, or one given twice."""
-    installed = estimator_names()
+def _source(function: Callable[..., object]) -> str:
+    """File and name of a function, as far as they are known."""
+    name = str(getattr(function, "__qualname__", type(function).__name__))
+    try:
+        return f"{inspect.getsourcefile(function)}:{name}"
+    except TypeError:  # one written in C, or an object that can be called
+        return name
+
+
+def check_estimators(names: tuple[str, ...], functions: Mapping[str, Callable[..., object]] | None = None) -> None:
+    """Raises InputError for no name, an unknown one, or one given twice; `functions` are not installed, by name."""
+    installed = [*estimator_names(), *(functions or {})]
     if not names:
         raise InputError(f"estimators: name at least one of {', '.join(installed)}")
     for name in names:
@@ -177,17 +201,3 @@ def _require_units(sequence: Sequence) -> None:
             f"{sequence.source}: {'. '.join(wrong)} ({evidence(units)}). Without repairs this is a different motion; "
             "convert the file, or repair it with --preset calibrated and without --as-recorded"
         )
-
-
-def solve(
-    problem: Problem,
-    settings: RunSettings,
-    watch: Watch = no_progress,
-    held: HeldOut | None = None,
-    processes: int = 1,
-) -> "Run":
-    """Solves the problem with each estimator in turn, and compares the estimates with `processes`."""
-    from fgbaseline.compare.estimate_comparison import compare_all
-
-    answers = solve_all(problem, settings.estimators, watch)
-    return compare_all(problem, answers, settings.record(), held, processes)

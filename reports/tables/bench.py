@@ -10,7 +10,8 @@ from fgbaseline.compare.limits import Better
 
 from ..formatting import counted, interval, number
 from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
-from ..results.metrics import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value, shown_in
+from ..results.metric import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value
+from ..results.metrics import shown_in
 from .table import Cell, Column, Row, Table, compared
 
 Key: TypeAlias = tuple[str, str]

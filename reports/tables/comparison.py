@@ -9,8 +9,10 @@ import numpy as np
 from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
-from ..results.metrics import COMPARISON, SEGMENTS, Metric, Value, over_deltas, shown_in, value_at
-from .table import Column, Row, Table, compared
+from ..formatting import resolved
+from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
+from ..results.metrics import over_deltas, shown_in
+from .table import Cell, Column, Row, Table, compared
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,11 +32,22 @@ def comparison_table(comparison: Comparison, results: Results, caption: str, *, 
     cells = []
     for m in metrics:
         better = m.better if m.same_data or comparison.ranking.same else Better.NEITHER
-        cells.append(compared(better, {name: m.value(results[name]) for name in names}, rivals))
+        values = {name: m.value(results[name]) for name in names}
+        cells.append(compared(better, values, rivals) | _unresolved(comparison, m, values))
     rows = tuple(
         Row(name, tuple(of[name] for of in cells), reference=mark_reference and name == reference) for name in names
     )
     return Table(tuple(map(Column.of, metrics)), rows, caption=caption).transposed()
+
+
+def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Value]) -> dict[str, Cell]:
+    """Cells of the distances and angles that are below the resolution of the files: 0, and never the best."""
+    found = {}
+    for name, result in comparison.results.items():
+        step = 0.0 if metric.group == MAP else result.resolution.get(metric.unit, 0.0)
+        if abs(values[name].value) < step:
+            found[name] = Cell(resolved(values[name].value, step))
+    return found
 
 
 def main_table(comparison: Comparison, results: Results) -> "pd.DataFrame":

@@ -3,23 +3,30 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from fgbaseline.compare import Criterion
 from fgbaseline.compare.estimate_comparison import Run, same_frames
 from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
 from ..results.json_tree import INFINITE, at, leaves
-from ..results.metrics import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric, shown_in
+from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
+from ..results.metrics import shown_in
 from ..results.run import Summary
 from .table import Cell, Column, Row, Table, best
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")
+OVERCONFIDENT = "overconfident"
+"""in place of a reference NEES, for which P - P_ref has to be positive definite"""
+NOT_POSITIVE_DEFINITE = (
+    "in most frames P - P_ref is not positive definite: the claimed covariance is below the reference's"
+)
 MAX_DYNAMIC = 100
 MAX_EVENTS = 200
 """of an estimator that are listed one by one"""
@@ -47,8 +54,8 @@ def main_table(run: Run, estimators: Estimators) -> Table:
         return table
     near = "; the reference, its by-products and other minima of its graph are not ranked by divergence"
     caption = (
-        f"Best of a column in bold{near if run.reference is not None else ''}; figures that read the same are best "
-        "together. Reprojection errors are over all observations of the landmarks that an estimator has; common "
+        f"Best of a column in bold{near if run.reference is not None else ''}; equal printed values are all "
+        "bold. Reprojection errors are over all observations of the landmarks that an estimator has; common "
         "observations are those that every estimator used."
     )
     return replace(table, caption=caption)
@@ -81,7 +88,10 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
     shown = [
         m
         for m, of_all in values.items()
-        if any(isfinite(value) and (value != 0.0 or not m.nonzero_only) for value in of_all.values())
+        if any(
+            _stands_for(run, name, estimators[name], m) or (isfinite(value) and (value != 0.0 or not m.nonzero_only))
+            for name, value in of_all.items()
+        )
         and not (m.group == DIVERGENCE and len(answered) < 2)
         and not (even and m.uneven_only)
     ]
@@ -96,7 +106,11 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
         why = _left_out(estimators[name], m) if isfinite(value) else _why_absent(estimators[name], m)
         if why == INFINITE:
             return Cell(INFINITY)
+        if _stands_for(run, name, estimators[name], m):
+            value, why = nan, NOT_POSITIVE_DEFINITE
         mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
+        if why == NOT_POSITIVE_DEFINITE:
+            return Cell(OVERCONFIDENT, note=mark)
         if not isfinite(value):
             return Cell(DASH, note=mark)
         return Cell(m.text(value), first is not None and m.text(value) == m.text(first), mark)
@@ -111,8 +125,36 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
         )
         for name, result in run.results.items()
     )
-    columns = tuple(Column.of(m, f"divergence from {run.reference}" if m.group == DIVERGENCE else "") for m in shown)
+    away = f"divergence from {run.reference}, unaligned"
+    columns = tuple(Column.of(m, away if m.group == DIVERGENCE else "") for m in shown)
     return Table(columns, rows, notes=tuple((mark, text) for text, mark in notes.items()))
+
+
+def trust_table(criteria: Iterable[Criterion]) -> Table:
+    """Criteria of the trust in the reference: measured value, limits and verdict."""
+    columns = (
+        Column("measured"),
+        Column("trusted"),
+        Column("doubtful"),
+        Column("verdict", words=True),
+        Column("remark", words=True),
+    )
+    return Table(columns, tuple(map(_criterion, criteria)), name="criterion")
+
+
+def _criterion(c: Criterion) -> Row:
+    sign = "≥" if c.at_least else "≤"
+    texts = (number(c.value), f"{sign} {number(c.doubtful)}", f"{sign} {number(c.untrusted)}")
+    cells = tuple(map(Cell, (*texts, c.verdict.name.lower(), c.remark)))
+    return Row(f"{c.name}, {c.unit}" if c.unit else c.name, cells)
+
+
+def _stands_for(run: Run, name: str, estimator: Mapping[str, Any], metric: Metric) -> bool:
+    """Whether OVERCONFIDENT stands for the median reference NEES: P is smaller than P_ref in most frames of both."""
+    if metric.path != ("nees_reference", "median") or name in run.unranked:
+        return False
+    counts: Mapping[str, int] = at(estimator, "nees_reference") or {}
+    return 2 * counts.get("overconfident", 0) > counts.get("frames", 0) + counts.get("left_out", 0)
 
 
 def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
@@ -166,7 +208,7 @@ def _residuals(run: Run) -> Table:
 def _map(run: Run) -> Table:
     """Distances of landmarks from the reference's, by depth."""
     tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
-    figures = {"landmarks": "n", "distance, m": "distance", "as seen, m": "seen", "sigmas": "sigmas"}
+    figures = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
     return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, figures)
 
 

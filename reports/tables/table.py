@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 from fgbaseline.compare.limits import Better
 
 from ..formatting import interval, md, tex
-from ..results.metrics import Metric, Value
+from ..results.metric import Metric, Value
 
 UNWRAPPED = 160
 """columns of a table where no terminal says how many there are"""
@@ -113,7 +113,7 @@ class Table:
 
 
 def compared(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
-    """The cells of a column by name; the best among the rivals are marked, figures that read the same together."""
+    """The cells of a column by name; the best among the rivals are marked, all of equal printed value."""
     first = best(better, {name: value.value for name, value in values.items() if name in rivals})
     text = None if first is None else interval(first, nan, nan)
     return {

@@ -7,7 +7,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry.measurement import measured_rows
 
 from ..graph.factors import FactorBuilder
-from ..graph.frame_states import FrameStates, start_bias
+from ..graph.frame_states import FrameStates
 from ..graph.keys import landmark_key
 
 
@@ -20,7 +20,8 @@ def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.Non
     factors, graph = FactorBuilder(problem), gtsam.NonlinearFactorGraph()
     if states is None:
         states = FrameStates.unknown(problem)
-        states.bias[:] = start_bias(problem)
+        if problem.start is not None:
+            states.bias[:] = problem.start.bias
     graph.push_back(factors.start_prior())
     for k in range(problem.n_frames - 1):
         graph.push_back(factors.motion(k, states))

@@ -71,7 +71,7 @@ class FrameStates:
             self.covariance[0] = problem.initial_covariance
             return
         self.covariance[0], self.velocity[0] = problem.start.covariance, problem.start.velocity
-        self.bias[0] = start_bias(problem)
+        self.bias[0] = problem.start.bias
 
     def take(self, k: int, values: gtsam.Values) -> None:
         """Set the state of frame k from GTSAM's values, the covariance aside."""
@@ -136,10 +136,3 @@ class FrameStates:
             accelerometer_bias=self.bias[:, 3:],
             state_covariance=self.covariance,
         )
-
-
-def start_bias(problem: Problem) -> FloatArray:
-    """Biases (6,) of frame 0 as given, gyroscope first; zero without raw inertial data."""
-    if problem.start is None:
-        return np.zeros(6)
-    return np.concatenate([problem.start.gyroscope_bias, problem.start.accelerometer_bias])

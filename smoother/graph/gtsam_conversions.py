@@ -17,8 +17,6 @@ ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 """Index that takes [v, w] (ours) to [w, v] (GTSAM), and back."""
 STATE_ORDER = np.r_[ROTATION_FIRST, 6:9, 12:15, 9:12]
 """Index that takes our error state, and noise, to GTSAM's, which has the accelerometer's bias first, and back."""
-HELD_VARIANCE = 1e-9
-"""as a share of the largest in a block of a start's covariance: what is no more than this is rounding"""
 
 
 def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
@@ -28,8 +26,10 @@ def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
     depend on how the world is turned. With raw inertial data z stays up, and the frame is that of the first pose but
     for the smallest rotation that takes the pose's up to z.
     """
-    first = np.eye(4) if problem.imu is None else _level(problem)
-    world_T_solver = problem.initial_pose if problem.imu is None else problem.initial_pose @ se3.inverse(first)
+    first = np.eye(4)
+    if problem.imu is not None:
+        first[:3, :3] = so3.rotation_to_z(problem.initial_pose[2, :3])
+    world_T_solver = problem.initial_pose @ se3.inverse(first)
     prior, start = problem.landmark_prior, problem.start
     if np.array_equal(world_T_solver, np.eye(4)):
         return problem, world_T_solver
@@ -38,21 +38,9 @@ def in_solver_frame(problem: Problem) -> tuple[Problem, FloatArray]:
     if prior is not None:
         prior = replace(prior, mean=se3.transform(solver_T_world, prior.mean), covariance=R @ prior.covariance @ R.T)
     if start is not None:
-        turn = np.eye(strapdown.STATE)
-        turn[strapdown.VELOCITY, strapdown.VELOCITY] = R
-        start = replace(start, velocity=R @ start.velocity, covariance=turn @ start.covariance @ turn.T)
+        covariance = strapdown.rotated_velocity(start.covariance, R, R)
+        start = replace(start, velocity=R @ start.velocity, covariance=covariance)
     return replace(problem, initial_pose=first, landmark_prior=prior, start=start), world_T_solver
-
-
-def _level(problem: Problem) -> FloatArray:
-    """Pose (4, 4) at the origin with the tilt of the first pose, by the smallest rotation (about x if upside down)."""
-    up = problem.initial_pose[2, :3]
-    axis = np.array([up[1], -up[0], 0.0])
-    sine = float(np.linalg.norm(axis))
-    axis = axis / sine if sine > 0.0 else np.array([1.0, 0.0, 0.0])
-    level = np.eye(4)
-    level[:3, :3] = so3.exp_so3(np.arctan2(sine, up[2]) * axis)
-    return level
 
 
 def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> FloatArray:
@@ -65,22 +53,12 @@ def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> Floa
     if problem.start is not None:
         matrix = 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
     if first == 0 and problem.start is not None:
-        free = np.eye(len(STATE_ORDER))
-        free[:6, :6] -= held_directions(problem.start.covariance)
+        directions, free = problem.start.free_directions[:6], np.eye(len(STATE_ORDER))
+        free[:6, :6] = directions @ directions.T
         matrix[:1] = free @ matrix[:1] @ free
     elif first == 0 and not problem.initial_covariance.any():
         matrix[:1] = 0.0
     return matrix
-
-
-def held_directions(covariance: FloatArray) -> FloatArray:
-    """Projection (6, 6) onto the directions of the pose that have no variance in a start's covariance (15, 15)."""
-    held = np.zeros((6, 6))
-    for block in (slice(0, 3), slice(3, 6)):
-        variance, axes = np.linalg.eigh(covariance[block, block])
-        without = axes[:, variance <= HELD_VARIANCE * max(float(variance[-1]), 0.0)]
-        held[block, block] = without @ without.T
-    return held
 
 
 def reorder_tangent(covariance: Any) -> FloatArray:

@@ -9,7 +9,7 @@ turn: 0.02 m/s^2 at 0.5 rad/s and 100 Hz.
 import gtsam
 import numpy as np
 
-from fgbaseline.data.problem.inertial import ImuIntervals, InertialStart
+from fgbaseline.data.problem.inertial import LEAST_WALK, ImuIntervals, InertialStart
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from .frame_states import FrameStates
@@ -18,8 +18,6 @@ from .keys import state_keys
 
 INTEGRATION_VARIANCE = 1e-20
 """m^2/s, in place of zero, of GTSAM's own noise of the position: the integration is exact"""
-LEAST_WALK = 1e-4
-"""1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
 HELD_SIGMA = 1e-6
 """m/s, rad/s and m/s^2: what stands for zero in the covariance of a velocity or bias that is known"""
 HELD_POSE = 10.0
@@ -69,8 +67,8 @@ class InertialFactors:
 
     def start_prior(self) -> gtsam.CustomFactor:
         """Prior of the state of frame 0, correlations included."""
-        bias = np.concatenate([self.start.gyroscope_bias, self.start.accelerometer_bias])
-        return self.state_prior(0, self._initial_pose, self.start.velocity, bias, self.start.covariance)
+        start = self.start
+        return self.state_prior(0, self._initial_pose, start.velocity, start.bias, start.covariance)
 
     def held_pose(self, k: int, states: FrameStates) -> gtsam.CustomFactor:
         """Prior of the state of frame k with its pose held."""

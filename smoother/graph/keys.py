@@ -29,8 +29,8 @@ _VELOCITIES, _BIASES = ord(VELOCITY) << _LETTER_AT, ord(BIAS) << _LETTER_AT
 AUXILIARY_POSE = ord("z") << _LETTER_AT
 """the key of a pose that hangs on the newest one alone and is eliminated after it.
 
-It tells nothing, but makes a root of two poses, where the covariance of the newest one is at hand. Without it GTSAM
-would find that pose at the end of a clique with all that a frame sees, and invert the whole of it for each frame.
+It carries no information, but makes a root of two poses, where the covariance of the newest one is at hand. Without it
+GTSAM would find that pose at the end of a clique with all that a frame sees, and invert the whole of it for each frame.
 With raw inertial data it hangs on all variables of the newest frame.
 """
 _FRAME_LETTERS = frozenset([*map(ord, (POSE, VELOCITY, BIAS)), AUXILIARY_POSE >> _LETTER_AT])

@@ -70,17 +70,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         seconds_total=float(seconds.sum()),
         events=events,
     )
-    final = Estimate(
-        name="isam2",
-        world_T_imu=states.world_T_imu,
-        landmarks=landmarks,
-        used=used,
-        status=status,
-        reason=reason,
-        seconds=seconds,
-        seconds_total=time.perf_counter() - start,
-        events=events,
-    )
+    final = replace(online, name="isam2", landmarks=landmarks, seconds_total=time.perf_counter() - start)
     return _with_by_product(states.answer(final), smoother.builder.online.answer(online))
 
 

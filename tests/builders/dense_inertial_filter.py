@@ -11,7 +11,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.ekf import Linearization
 from fgbaseline.geometry import FloatArray
 
-from .dense_filter import DenseFilter, hat3, u_hat
+from .dense_filter import DenseFilter, hat3
 from .dense_joint_filter import DenseJointFilter, adjoint
 
 BODY = 15
@@ -25,7 +25,8 @@ class DenseInertialFilter(DenseJointFilter):
         start = self.problem.start
         assert start is not None
         self.P = start.covariance.copy()
-        self.bias = np.concatenate([start.velocity, start.gyroscope_bias, start.accelerometer_bias])
+        self.bias = np.concatenate([start.velocity, start.bias])
+        self.of_bias = slice(6, BODY)
         self.N_predicted = self.unobservable()
 
     def predict(self, k: int) -> None:
@@ -65,18 +66,6 @@ class DenseInertialFilter(DenseJointFilter):
         whole[:BODY, :BODY], noise[:BODY, :BODY] = F, Q
         self.P = whole @ self.P @ whole.T + noise
         self.N_predicted = self.unobservable()
-
-    def move(self, delta: FloatArray) -> None:
-        """The state by delta; with it P, where the filter is invariant."""
-        before, pose = self.unobservable(), self.pose
-        self.pose = pose @ expm(u_hat(delta[:6]))
-        self.bias = self.bias + delta[6:BODY]
-        for landmark in self.landmarks.values():
-            landmark.xi = landmark.xi + delta[landmark.start : landmark.start + 3]
-        if self.linearization is Linearization.INVARIANT:
-            B = np.eye(len(self.P))
-            B[:, :6] += (self.unobservable() - before) @ adjoint(pose)
-            self.P = B @ self.P @ B.T
 
     def unobservable(self) -> FloatArray:
         """(size, 6): what a small motion of the whole world does to the state; biases stay."""

@@ -102,6 +102,7 @@ class DenseJointFilter:
         self.bias = np.zeros(3)
         if self.gyro_bias is not None:
             self.P = block_diag(self.P, self.gyro_bias.deviation**2 * np.eye(3))
+        self.of_bias = slice(6, len(self.P))
         self.as_predicted = self.pose
         self.o_T_I = np.linalg.inv(self.problem.sequence.imu_T_cam)
 
@@ -199,8 +200,8 @@ class DenseJointFilter:
         before = self.unobservable()
         pose = self.pose
         self.pose = pose @ expm(u_hat(delta[:6]))
-        if self.gyro_bias is not None:
-            self.bias = self.bias + delta[6:9]
+        if len(step := delta[self.of_bias]):
+            self.bias = self.bias + step
         for landmark in self.landmarks.values():
             landmark.xi = landmark.xi + delta[landmark.start : landmark.start + 3]
         if self.linearization is Linearization.INVARIANT:

@@ -30,7 +30,7 @@ def runs(claimed: float = 1.0) -> list[tuple[Estimate, Truth]]:
     return [random_walk(seed, claimed) for seed in range(RUNS)]
 
 
-def test_consistent_runs_stay_in_the_bounds_and_dishonest_ones_do_not() -> None:
+def test_consistent_runs_stay_in_the_bounds_and_overconfident_ones_do_not() -> None:
     honest, sure, timid = (compare.anees(runs(claimed)) for claimed in (1.0, 0.8, 1.25))
     inside = (honest["anees"] >= honest["low"]) & (honest["anees"] <= honest["high"])
     assert inside.mean() > 0.8  # 0.95 on average, but the frames of a run are correlated
@@ -71,7 +71,7 @@ def test_position_and_rotation_are_judged_apart() -> None:
     np.testing.assert_allclose(honest["pose"], honest["position"] + honest["rotation"])
 
 
-def test_what_is_no_covariance_is_said_to_be_none() -> None:
+def test_a_covariance_is_held_absent_or_not_positive_definite() -> None:
     estimate, _ = random_walk(0)
     assert estimate.covariance is not None
     P = estimate.covariance.copy()
@@ -89,7 +89,7 @@ def test_what_is_no_covariance_is_said_to_be_none() -> None:
     assert (compare.covariance_state(replace(estimate, covariance=None)) == S.ABSENT).all()
 
 
-def test_no_alignment_hides_a_constant_turn() -> None:
+def test_nees_shows_a_rigid_motion_that_an_alignment_would_remove() -> None:
     """Truth and estimate differ by one rigid motion: after alignment the error is zero, and NEES must show it."""
     estimate, _ = random_walk(0)
     turned = se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, 0.3]) @ estimate.world_T_imu

@@ -172,7 +172,7 @@ def test_the_range_of_an_offset_ends_where_the_error_is_a_twentieth_larger() -> 
         assert np.sqrt(np.mean(rmse**2)) == pytest.approx(1.05 * found.rmse, rel=1e-4)
 
 
-def test_an_offset_that_the_path_does_not_tell_is_said_to_be_open() -> None:
+def test_a_time_offset_that_the_path_does_not_determine_is_reported_as_undetermined() -> None:
     t = np.arange(0.0, 30.0, 0.1)
     steady = Trajectory(t, se3.compose(np.tile(se3.exp([1.0, 0, 0, 0, 0, 0]), (len(t) - 1, 1, 1))))
     assert not compare.time_offset(steady, steady.later(0.3), 2.0).determined
@@ -276,7 +276,7 @@ def test_one_pose_is_compared_with_what_is_interpolated_for_it() -> None:
         compare.associate(one, one, how="interpolated")
 
 
-def test_the_caption_says_how_poses_were_paired() -> None:
+def test_the_caption_states_how_poses_were_paired() -> None:
     pair = compare.associate(
         path([0.0, 1.0, 2.0], "truth"), path([0.25, 1.25], "ours"), how="interpolated", offset=0.25, tolerance=0.5
     )

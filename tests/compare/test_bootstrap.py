@@ -35,7 +35,7 @@ def test_the_values_are_those_of_evo_and_numpy(errors: list[float]) -> None:
     assert table.loc[["min", "max", "sse", "n"], ["low", "high"]].isna().all(axis=None)
 
 
-def test_autocovariance_is_what_the_definition_says() -> None:
+def test_autocovariance_is_its_definition() -> None:
     x = autoregressive(60, 0.5, 0) + 7.0
     centred = x - x.mean()
     expected = [np.sum(centred[lag:] * centred[: len(x) - lag]) / len(x) for lag in range(len(x))]
@@ -51,14 +51,14 @@ def test_the_block_is_as_long_as_theory_has_it(phi: float) -> None:
     assert found == pytest.approx(theory, rel=0.12)
 
 
-def test_blocks_at_the_ends_of_what_can_be() -> None:
+def test_block_lengths_of_white_constant_short_and_trending_series() -> None:
     assert block_length(np.random.default_rng(0).normal(size=1000)).length <= 5
     assert block_length(np.ones(100)) == (1, True)
     assert block_length(np.arange(5.0)) == (1, True)
     assert block_length(np.arange(300.0)) == (52, False)  # 3 sqrt(n): a trend has no end of correlation
 
 
-def test_intervals_hold_the_true_value_as_often_as_they_say() -> None:
+def test_intervals_have_their_nominal_coverage() -> None:
     """An AR(1) of 0.8 and 1000 values: blocks come close to 95 %, single values are wrong most of the time."""
     hits = {None: 0, 1: 0}
     trials = 100
@@ -100,7 +100,7 @@ def test_the_same_seed_gives_the_same_interval() -> None:
     assert (inside["value"] <= inside["high"]).all()
 
 
-def test_a_series_too_short_for_its_correlation_says_so() -> None:
+def test_a_series_too_short_for_its_correlation_is_reported() -> None:
     assert not compare.error_statistics(np.arange(60.0)).attrs["reliable"]
     assert not compare.error_statistics(autoregressive(5000, 0.1, 0).cumsum()).attrs["reliable"]
     assert compare.error_statistics(autoregressive(2000, 0.3, 0)).attrs["reliable"]
@@ -135,7 +135,7 @@ def test_sums_and_quantiles_are_those_of_the_series_written_out(values: list[flo
     np.testing.assert_allclose(draws.quantiles(x, (0.1, 0.5, 0.95)), np.quantile(series, (0.1, 0.5, 0.95), axis=1).T)
 
 
-def test_what_both_share_does_not_blur_which_is_better() -> None:
+def test_common_errors_do_not_widen_the_interval_of_a_paired_difference() -> None:
     """The intervals of the two overlap, and yet one is the better one everywhere."""
     common = np.abs(autoregressive(1000, 0.8, 0))
     better, worse = common, common + 0.05
@@ -150,7 +150,7 @@ def test_what_both_share_does_not_blur_which_is_better() -> None:
     assert (back.value, back.low, back.high) == pytest.approx((-found.value, -found.high, -found.low), rel=1e-12)
 
 
-def test_equals_are_called_different_no_more_often_than_promised() -> None:
+def test_the_false_positive_rate_is_at_most_the_significance_level() -> None:
     random = np.random.default_rng(0)
     settled = 0
     for seed in range(100):
@@ -160,7 +160,7 @@ def test_equals_are_called_different_no_more_often_than_promised() -> None:
     assert settled <= 15
 
 
-def test_pairs_without_a_difference_settle_nothing() -> None:
+def test_pairs_without_a_difference_decide_nothing() -> None:
     x = np.arange(20.0)
     assert not compare.rmse_difference(x, x).settled
     nothing = compare.rmse_difference([np.nan], [1.0])

@@ -98,7 +98,7 @@ def test_words_sign_and_significance_agree(series: list[FloatArray], holes: list
     assert first_sentence.startswith("Smallest divergence from isam2") == alone
 
 
-def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None:
+def test_a_difference_below_the_printed_digits_is_not_claimed() -> None:
     d = compare.rmse_difference(np.full(100, 0.003984), np.full(100, 0.003976))
     assert d.settled
     assert not is_claimed(d, 0.003984, 0.003976)
@@ -107,7 +107,7 @@ def test_a_difference_that_does_not_show_in_the_figures_is_not_claimed() -> None
     assert said[1:] == ["The ATE of ekf and isam2 is the same to the printed digits: not ranked."]
 
 
-def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> None:
+def test_the_minimum_of_the_same_graph_is_not_ranked_against_the_reference() -> None:
     errors = {"isam2": np.full(FRAMES, 2.0), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 1.0)}
     run = run_with(errors, {"isam2": np.zeros(FRAMES), "ekf": np.full(FRAMES, 3.0), "batch": np.full(FRAMES, 0.01)})
     assert not [s for s in ate_sentences(run) if "larger ATE" in s or "significant" in s]
@@ -116,13 +116,13 @@ def test_the_minimum_of_the_same_graph_is_no_competitor_of_the_reference() -> No
     assert "batch, another minimum of the graph of isam2: divergence 0.0100 m (RMSE)." in sentences
 
 
-def test_figures_that_read_the_same_are_best_together_and_the_same_graph_is_not_nearest() -> None:
+def test_values_with_the_same_digits_are_best_together_and_the_same_graph_is_not_nearest() -> None:
     problem = plain_problem(scene())
     drifts = {"isam2": 1.0, "ekf": 3.0, "joint-ekf": 3.0 + 1e-6, "batch": 1.01}
     run = run_of(problem, *(answer(problem, name, (0.0, drift, 0.0)) for name, drift in drifts.items()))
     document = as_dict(run)["estimators"]
     table = main_table(run, document)
-    at = [i for i, column in enumerate(table.columns) if column.heading == "RMSE, m"][1]
+    at = [column.heading for column in table.columns].index("RMSE, m")
     assert {row.name: row.cells[at].best for row in table.rows if row.name != "isam2"} == {
         "ekf": True,
         "joint-ekf": True,
@@ -161,7 +161,7 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
     assert [name for name in whole if f"{name} " in larger] == (separated if runs > 1 else [])
 
 
-def test_one_run_ranks_nobody_and_missing_answers_are_named() -> None:
+def test_one_run_ranks_no_estimator_and_missing_estimates_are_named() -> None:
     assert "one run does not rank them" in winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
     said = winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
     assert "smallest ATE a " in said

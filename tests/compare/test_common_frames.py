@@ -17,7 +17,7 @@ from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.comparison import significance_sentences
+from fgbaseline.reports.phrases.position_errors import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.bench import METRICS
 from fgbaseline.reports.tables import latex, markdown
@@ -73,7 +73,7 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
         assert not farther or (d.value > 0.0 and d.low > 0.0)
 
 
-def test_no_interval_settles_an_order_that_is_not_that_of_the_figures() -> None:
+def test_no_interval_decides_an_order_other_than_that_of_the_point_estimates() -> None:
     assert not figures.RmseDifference(0.1, -0.3, -0.2, 5, True).settled
     assert not figures.RmseDifference(-0.1, 0.2, 0.3, 5, True).settled
     assert figures.RmseDifference(0.1, 0.05, 0.2, 5, True).settled
@@ -184,7 +184,7 @@ def test_runs_are_ranked_so_that_none_of_equally_many_answers_is_behind_by_less_
         assert (alike["behind"].dropna() >= 0.0).all()
 
 
-def test_a_bench_says_of_the_best_that_others_with_fewer_answers_are_below_it() -> None:
+def test_a_bench_reports_estimators_with_fewer_answers_and_a_lower_error_than_the_best() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2]})
     said = winner(
         "town",

@@ -1,4 +1,4 @@
-"""NEES is 6 on average for errors drawn from the very covariance, and NaN where nothing can be said."""
+"""NEES is 6 on average for errors drawn from the very covariance, and NaN where it is undefined."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def test_errors_of_another_size_change_it_by_the_square(scale: float) -> None:
     np.testing.assert_allclose(compare.nees(*drawn(scale)), scale**2 * compare.nees(*drawn()), rtol=1e-6)
 
 
-def test_it_is_nan_without_truth_pose_or_a_covariance_that_is_one() -> None:
+def test_nees_is_nan_without_truth_pose_or_definite_covariance() -> None:
     estimate, truth = drawn()
     assert estimate.covariance is not None
     poses, P, true = estimate.world_T_imu.copy(), estimate.covariance.copy(), truth.world_T_imu.copy()
@@ -58,7 +58,7 @@ def test_an_estimate_without_covariance_has_none() -> None:
     assert np.isnan(compare.nees(replace(estimate, covariance=None), truth)).all()
 
 
-def test_a_world_moved_as_a_whole_changes_nothing() -> None:
+def test_a_rigid_motion_of_the_world_changes_no_metric() -> None:
     estimate, truth = drawn()
     motion: FloatArray = se3.exp([5.0, -3.0, 2.0, 0.4, 1.0, -2.0])
     moved = compare.nees(

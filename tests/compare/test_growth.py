@@ -49,11 +49,11 @@ def test_a_drift_of_heading_is_a_rotation_per_second() -> None:
     assert rates.loc["end rotation", "value"] == pytest.approx(0.5 * DT / 1.0, rel=1e-3)
 
 
-def test_without_stamps_nothing_is_said_per_second() -> None:
+def test_without_stamps_there_are_no_metrics_per_second() -> None:
     pair = matched(winding(scale=1.01))
     frames = replace(pair, reference=replace(pair.reference, stamped=False))
     assert "translation per second" not in compare.drift(frames).index
-    with pytest.raises(InputError, match="it has no time stamps, so nothing can be said per second"):
+    with pytest.raises(InputError, match="it has no time stamps, so it has no errors per second"):
         compare.drift(frames, seconds=1.0)
     with pytest.raises(InputError, match="it has no time stamps"):
         compare.relative_errors(frames, 1.0, "s")
@@ -162,7 +162,7 @@ def test_shares_are_shares(seed: int, kind: compare.Align) -> None:
     ("wrong", "share"),
     [({"scale": 1.02}, "scale"), ({"heading_rate": 2e-4}, "heading"), ({"noise": 0.5}, "noise")],
 )
-def test_shares_are_sure_where_there_is_one_kind_of_error(wrong: dict[str, float], share: str) -> None:
+def test_the_only_kind_of_error_has_a_share_near_one(wrong: dict[str, float], share: str) -> None:
     table = compare.decomposition_intervals(matched(winding(**wrong)), repetitions=100)
     assert table.loc[share, "low"] > 0.95
     assert table.loc[share, "value"] == getattr(compare.error_decomposition(matched(winding(**wrong))), share)
@@ -224,7 +224,7 @@ def test_drift_is_measured_over_a_tenth_of_the_path_or_its_longest_step() -> Non
             compare.drift(matched(ahead(x), ahead(x)), metres=metres)
 
 
-def test_drift_over_a_stretch_that_is_missed_by_half_is_still_told() -> None:
+def test_drift_is_measured_over_pairs_up_to_half_as_long_again() -> None:
     x = np.array([0.0, 3.0, 6.0])
     assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "n"] == 2
     assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "value"] == pytest.approx(
@@ -234,7 +234,7 @@ def test_drift_over_a_stretch_that_is_missed_by_half_is_still_told() -> None:
         compare.drift(matched(ahead(x), ahead(x)), metres=1.9)
 
 
-def test_growth_is_worked_out_by_hand() -> None:
+def test_growth_of_a_known_case() -> None:
     table = compare.divergence_along_path(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
     assert table.index.name == "frame"
     assert table.columns.tolist()[-2:] == ["t", "percent_of_path"]
@@ -258,7 +258,7 @@ def test_growth_is_worked_out_by_hand() -> None:
             compare.divergence_growth(table, parts_wanted)
 
 
-def test_poses_that_are_unknown_take_no_part_in_the_growth() -> None:
+def test_unknown_poses_are_excluded_from_the_drift() -> None:
     table = compare.divergence_along_path(matched(ahead([0.0, 1.1, 2.2, 3.3, 4.4]), ahead(np.arange(5.0))))
     table.loc[3, "position"] = np.nan
     assert compare.divergence_growth(table, 2)["rmse"].tolist() == pytest.approx([0.005**0.5, 0.1**0.5])
@@ -271,7 +271,7 @@ def test_a_bound_that_is_reached_is_not_passed() -> None:
     assert compare.first_exceedance(table, 0.0) == compare.Exceedance(1, DT, 1.0, 0.5)
 
 
-def test_the_table_of_shares_says_how_it_was_drawn() -> None:
+def test_the_table_of_shares_states_block_length_and_reliability() -> None:
     """A difference of the same size everywhere has blocks of one pose."""
     for n, block, reliable in ((10, 1, True), (9, 1, False), (5001, 2, True)):
         reference = ahead(np.arange(float(n)))

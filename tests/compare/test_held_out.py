@@ -55,14 +55,14 @@ def test_worse_paths_rank_lower_and_the_true_one_first() -> None:
     assert 0.9 < table.loc["true", "median"] < 1.5
 
 
-def test_paths_that_differ_as_a_whole_cannot_be_told_apart() -> None:
+def test_held_out_ranking_is_invariant_to_a_rigid_motion_of_the_world() -> None:
     """Drift over longer times than a track lasts, and any motion of the world, are out of sight."""
     moved = se3.exp([100.0, 20.0, 5.0, 0.1, 0.2, 1.0]) @ true_path()
     table = compare.held_out_ranking(ranking(true=true_path(), moved=moved))
     np.testing.assert_allclose(table.loc["true"], table.loc["moved"], rtol=1e-4, atol=1e-4)
 
 
-def test_one_mask_for_all_and_a_track_that_no_path_explains_is_out() -> None:
+def test_all_paths_have_one_mask_and_a_track_inconsistent_with_all_of_them_is_excluded() -> None:
     sequence, out = held()
     o = out.observations
     long_pieces = np.flatnonzero(np.bincount(out.piece[out.piece >= 0]) >= 12)
@@ -131,7 +131,7 @@ def test_other_pixels_of_the_held_out_tracks_cannot_change_which_are_held_out() 
     ("sights", "spoiled", "touched"),
     [(4, 1, [1, 2, 3]), (4, 2, [0, 1, 2]), (5, 2, [2, 3, 4]), (5, 3, [0, 1, 2, 3]), (2, 0, [0, 1])],
 )
-def test_a_spoiled_sight_errs_itself_and_the_half_that_is_predicted_from_it(
+def test_a_corrupted_observation_raises_its_own_error_and_that_of_the_half_predicted_from_it(
     sights: int, spoiled: int, touched: list[int]
 ) -> None:
     """The middle sight of an odd number belongs to the first half."""
@@ -161,7 +161,7 @@ def test_the_errors_come_with_where_they_are() -> None:
     np.testing.assert_array_equal(errors.table["start"], sequence.t[first] - sequence.t[0])
 
 
-def test_the_ranking_is_worked_out_by_hand() -> None:
+def test_the_ranking_of_a_known_case() -> None:
     values = pd.DataFrame({"a": [1.0, 2.0, 3.0, 4.0], "b": [2.0, 2.0, 2.0, 2.0]})
 
     def ranked(start: list[float]) -> pd.DataFrame:
@@ -183,7 +183,7 @@ def test_the_ranking_is_worked_out_by_hand() -> None:
     assert empty.index.name == "estimator"
 
 
-def test_where_no_piece_can_be_predicted_the_gate_is_its_smallest() -> None:
+def test_without_predictable_segments_the_gate_is_the_smallest() -> None:
     backwards = true_path() @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     backwards[1::2] = backwards[1::2] @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.pi])
     errors = ranking(backwards=backwards)

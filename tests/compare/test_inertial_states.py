@@ -141,7 +141,7 @@ def test_summaries_have_norms_axes_and_the_share_within_three_sigma() -> None:
         assert np.mean(inside) == pytest.approx(0.9973, abs=0.004)
 
 
-def test_what_is_not_known_is_missing_and_not_zero() -> None:
+def test_unknown_values_are_missing_and_not_zero() -> None:
     estimate, truth = drawn(5)
     poses_only = Truth(truth.world_T_imu)
     table = compare.velocity_and_bias_errors(estimate, poses_only)

@@ -26,7 +26,7 @@ ERRORS = st.lists(st.sampled_from([0.0, 1.0, 2.5, 40.0, np.inf, np.nan]), max_si
 
 
 @given(ERRORS)
-def test_infinite_stays_infinite_and_nan_is_counted(errors: list[float]) -> None:
+def test_infinite_values_stay_infinite_and_nan_is_counted(errors: list[float]) -> None:
     summary = compare.summarized(errors)
     known = [e for e in errors if not np.isnan(e)]
     assert summary["missing"] == len(errors) - len(known)
@@ -59,7 +59,7 @@ def test_quantiles_between_finite_errors_do_not_see_the_infinite_ones() -> None:
     assert quantile(np.array([1.0, 3.0, np.inf]), 0.5) == 3.0
 
 
-def test_an_infinite_error_settles_nothing_and_is_not_left_out() -> None:
+def test_an_infinite_error_decides_no_ranking_and_is_not_omitted() -> None:
     found = compare.rmse_difference([1.0, np.inf, 1.0], [2.0, 2.0, 2.0])
     assert found.value == np.inf
     assert not found.settled
@@ -130,5 +130,5 @@ def test_summary_page_and_metrics_say_infinite_and_count_the_missing() -> None:
     assert render(run, document, {})
 
 
-def test_an_infinite_number_reads_so() -> None:
+def test_an_infinite_number_is_printed_as_infinite() -> None:
     assert (number(np.inf), number(-np.inf), number(np.nan)) == ("∞", "−∞", "–")

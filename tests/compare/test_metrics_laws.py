@@ -153,7 +153,9 @@ def test_a_moved_copy_is_brought_back_onto_the_reference_orientations_included(
     ],
 )
 @pytest.mark.parametrize("far", [0.0, 1e6])
-def test_what_a_path_leaves_open_is_said(name: str, kind: Align, free: tuple[str, ...], far: float) -> None:
+def test_degrees_of_freedom_that_a_path_leaves_open_are_reported(
+    name: str, kind: Align, free: tuple[str, ...], far: float
+) -> None:
     reference = path(name, 4)
     reference[:, :3, 3] += far
     done = compare.align(motion(9, about_up=True) @ reference, reference, kind)
@@ -196,7 +198,7 @@ def test_the_first_n_pairs_alone_decide(seed: int, n: int) -> None:
         np.testing.assert_allclose(whole.matrix, first.matrix, atol=1e-9)
 
 
-def test_alignment_says_what_it_cannot_do() -> None:
+def test_a_degenerate_alignment_is_refused_with_its_reason() -> None:
     pair = matched(path("winding", 0), path("winding", 1))
     with pytest.raises(InputError, match=r"'se4' is none; choose one of none, first-pose, yaw, se3, sim3"):
         pair.aligned("se4")
@@ -223,7 +225,7 @@ def test_no_metric_changes_its_arguments() -> None:
     assert "Sim(3)-aligned over all 15 poses (scale" in aligned.caption
 
 
-def test_where_neither_positions_nor_orientations_say_anything_nothing_is_turned() -> None:
+def test_an_undetermined_rotation_is_not_aligned() -> None:
     """Standing still, with orientations that are half turns about all three axes: their sum is zero."""
     half_turns = np.stack([np.diag([1.0, a, b, 1.0]) for a, b in ((1, 1), (-1, -1), (1, -1), (-1, 1))])
     half_turns[2:, 0, 0] = -1.0
@@ -257,7 +259,7 @@ def test_up_is_a_direction_of_any_length(length: float) -> None:
     )
 
 
-def test_the_scale_of_one_camera_is_found_and_said() -> None:
+def test_the_scale_of_one_camera_is_estimated_and_reported() -> None:
     reference = path("winding", 6)
     half = motion(7) @ reference
     half[:, :3, 3] *= 0.5
@@ -279,7 +281,7 @@ def test_the_scale_of_one_camera_is_found_and_said() -> None:
         ("sim3", 4, 4, "Sim(3)-aligned over the first 4 poses (scale 1)"),
     ],
 )
-def test_the_caption_says_what_was_done(kind: str, first: int | None, n: int, caption: str) -> None:
+def test_the_caption_states_the_alignment(kind: str, first: int | None, n: int, caption: str) -> None:
     done = compare.align(path("winding", 0), path("winding", 0), kind, first=first)
     assert done.caption == caption
     assert (done.n, done.of) == (n, 15)

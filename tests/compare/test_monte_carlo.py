@@ -15,12 +15,12 @@ def test_the_interval_of_a_mean_is_students(n: int) -> None:
     assert compare.mean_interval(np.append(values, np.nan)) == pytest.approx((values.mean(), low, high, n))
 
 
-def test_one_value_says_nothing_of_its_mean() -> None:
+def test_one_value_gives_no_interval_of_its_mean() -> None:
     assert compare.mean_interval(np.array([0.3])) == pytest.approx((0.3, np.nan, np.nan, 1), nan_ok=True)
     assert compare.mean_interval(np.array([np.nan])).n == 0
 
 
-def test_a_small_difference_that_is_always_there_is_told_and_one_that_varies_is_not() -> None:
+def test_a_small_constant_difference_is_significant_and_a_varying_one_is_not() -> None:
     random = np.random.default_rng(1)
     hard = random.uniform(0.1, 10.0, 20)  # some drives are harder than others, for all estimators
     errors = pd.DataFrame({"worse": 1.02 * hard, "best": hard, "like": hard * random.uniform(0.9, 1.15, 20)})
@@ -32,7 +32,7 @@ def test_a_small_difference_that_is_always_there_is_told_and_one_that_varies_is_
     assert table.loc["worse", "low"] < table.loc["best", "mean"]
 
 
-def test_who_failed_ranks_behind_whom_it_did_not_and_who_never_answered_nowhere() -> None:
+def test_estimators_with_fewer_answers_rank_last_and_those_without_any_are_unranked() -> None:
     errors = pd.DataFrame({"bold": [0.1, np.nan, 0.1], "sound": [0.2, 0.9, 0.2], "gone": [np.nan] * 3})
     table = compare.monte_carlo_ranking(errors)
     assert list(table.index) == ["sound", "bold"]
@@ -40,7 +40,7 @@ def test_who_failed_ranks_behind_whom_it_did_not_and_who_never_answered_nowhere(
     assert table.loc["bold", "behind"] == pytest.approx(-0.1)
 
 
-def test_errors_as_claimed_are_inside_the_bounds_and_smaller_claims_are_not() -> None:
+def test_consistent_covariances_are_inside_the_bounds_and_overconfident_ones_are_not() -> None:
     random = np.random.default_rng(3)
     honest = [random.chisquare(6, size=400) for _ in range(25)]
     table = compare.average_nees(honest)
@@ -81,7 +81,7 @@ def test_the_table_over_runs_has_a_row_for_each_frame() -> None:
         assert table[column].tolist() == pytest.approx(expected, nan_ok=True)
 
 
-def test_the_ranking_is_worked_out_by_hand() -> None:
+def test_the_ranking_of_a_known_case() -> None:
     table = compare.monte_carlo_ranking(
         pd.DataFrame({"b": [3.0, 5.0], "a": [1.0, 3.0], "twin": [1.0, 3.0], "gone": [np.nan] * 2})
     )

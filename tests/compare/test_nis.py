@@ -16,7 +16,7 @@ def recorded(nis: FloatArray, degrees: IntArray) -> Estimate:
     return Estimate("filter", poses, np.zeros(0, dtype=np.bool_), innovations=Innovations(nis, degrees))
 
 
-def test_each_frame_is_held_against_its_own_degrees_of_freedom() -> None:
+def test_the_nis_of_each_frame_is_tested_with_its_own_degrees_of_freedom() -> None:
     estimate = recorded(np.array([2.0, 6.0, 0.0, np.nan, 5.0]), np.array([1, 3, 6, 3, 0]))
     np.testing.assert_array_equal(compare.nis_per_degree(estimate), [2.0, 2.0, 0.0, np.nan, np.nan])
 
@@ -34,7 +34,7 @@ def test_the_summary_is_that_of_chi_square() -> None:
     assert summary.inside_95 == pytest.approx(0.95, abs=0.01)
 
 
-def test_frames_without_innovations_take_no_part() -> None:
+def test_frames_without_innovations_are_excluded() -> None:
     nis, degrees = np.array([4.0, np.nan, 7.0, 1.0]), np.array([3, 3, 6, 0])
     some, known = (
         compare.nis_summary(recorded(nis, degrees)),
@@ -46,7 +46,7 @@ def test_frames_without_innovations_take_no_part() -> None:
 
 
 @pytest.mark.parametrize("innovations", [None, Innovations.none(4)])
-def test_a_filter_that_recorded_none_has_none(innovations: Innovations | None) -> None:
+def test_a_filter_without_recorded_innovations_has_no_nis(innovations: Innovations | None) -> None:
     estimate = Estimate("filter", np.tile(np.eye(4), (4, 1, 1)), np.zeros(0, dtype=np.bool_), innovations=innovations)
     summary = compare.nis_summary(estimate)
     assert np.isnan(compare.nis_per_degree(estimate)).all()

@@ -61,7 +61,7 @@ def straight(steps: FloatArray) -> FloatArray:
     return poses
 
 
-def test_unlike_in_evo_rounding_does_not_decide_where_steps_add_up_to_a_delta() -> None:
+def test_unlike_in_evo_rounding_does_not_decide_where_steps_sum_to_a_delta() -> None:
     poses = straight(np.full(100, 0.1))
     evos = filter_pairs_by_path(list(poses), 1.0)
     assert [end - start for start, end in evos] != [10] * 10  # ten times 0.1 is a little less than 1
@@ -127,7 +127,7 @@ def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
         compare.absolute_pose_error(estimate, reference, "distance_percent")
 
 
-def test_a_table_of_motions_says_where_each_begins_and_what_it_spans() -> None:
+def test_a_table_of_motions_has_first_frame_and_span_of_each() -> None:
     t = np.array([0.0, 0.5, 1.5, 2.0, 4.0, 4.5])
     true, drifting = straight(np.array([1.0, 2.0, 1.0, 4.0, 1.0])), straight(np.array([1.5, 2.0, 1.0, 3.0, 1.0]))
     matched = compare.associate(Trajectory(t, true, "truth"), Trajectory(t, drifting, "estimate"))
@@ -179,7 +179,7 @@ def test_the_table_of_motions_is_named() -> None:
     ]  # fmt: skip
 
 
-def test_every_difference_of_a_pose_is_what_it_says() -> None:
+def test_every_difference_of_a_pose_is_its_definition() -> None:
     """2 m and a quarter turn: worked out by hand."""
     wrong = se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2])[None]
     wrong[0, :3, 3] = [0.0, 2.0, 0.0]

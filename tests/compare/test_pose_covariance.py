@@ -45,7 +45,7 @@ def nees(folder: Path, truth: FloatArray, poses: FloatArray, covariance: FloatAr
 
 @settings(max_examples=15)
 @given(TWISTS, st.sampled_from(["se3", "first-pose"]), st.integers(0, 99))
-def test_nees_knows_no_rigid_motion_of_the_world_that_the_alignment_undoes(
+def test_nees_is_invariant_to_a_rigid_motion_that_the_alignment_undoes(
     tmp_path_factory: pytest.TempPathFactory, twist: FloatArray, kind: str, seed: int
 ) -> None:
     folder = tmp_path_factory.mktemp("world")
@@ -57,7 +57,7 @@ def test_nees_knows_no_rigid_motion_of_the_world_that_the_alignment_undoes(
 
 @settings(max_examples=15)
 @given(TWISTS, st.sampled_from(["none", "se3"]), st.integers(0, 99))
-def test_nees_knows_no_body_that_both_are_written_in(
+def test_nees_is_invariant_to_a_common_body_frame(
     tmp_path_factory: pytest.TempPathFactory, twist: FloatArray, kind: str, seed: int
 ) -> None:
     folder = tmp_path_factory.mktemp("body")

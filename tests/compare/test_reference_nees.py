@@ -87,7 +87,7 @@ def test_their_nees_is_six_and_adding_the_covariances_would_hide_it() -> None:
     assert independent.mean() < 3.0
 
 
-def test_frames_where_the_difference_is_no_covariance_are_counted_and_left_out() -> None:
+def test_frames_where_the_difference_covariance_is_indefinite_are_counted_and_left_out() -> None:
     walk = LinearWalk()
     P, P_ref = block(walk.covariance(6), 5), block(walk.covariance(walk.T), 5)
     poses = np.tile(np.eye(4), (4, 1, 1))

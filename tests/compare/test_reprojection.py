@@ -92,7 +92,7 @@ def test_points_behind_the_camera_are_projected_by_the_formula_and_counted() -> 
     assert (compare.reprojection_by(table, "frame")["behind_camera"] == 1).all()
 
 
-def test_used_is_what_the_estimator_says() -> None:
+def test_used_observations_are_those_of_the_estimator() -> None:
     used = np.random.default_rng(1).random(len(EXACT.observations)) < 0.5
     table = compare.reprojection(EXACT, replace(true_answer(EXACT), used=used))
     np.testing.assert_array_equal(table["used"], used)
@@ -190,7 +190,7 @@ def test_an_infinite_residual_has_an_infinite_spread_and_raises_no_warning() -> 
     assert found["uR"] == {"bias": 2.0, "spread": 1.0}
 
 
-def test_who_failed_on_the_way_does_not_take_observations_from_the_others() -> None:
+def test_a_failed_estimator_does_not_narrow_the_common_observations() -> None:
     answer = true_answer(EXACT)
     half = np.arange(len(EXACT.observations)) % 2 == 0
     failed = replace(answer, used=half, status=Status.FAILED, reason="it failed")

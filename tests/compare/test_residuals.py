@@ -64,7 +64,7 @@ def test_a_point_that_moves_is_found_with_its_speed_and_no_other_is() -> None:
     assert len(table) == SCENE.n_points
 
 
-def test_points_that_stand_are_not_called_moving() -> None:
+def test_static_points_are_not_classified_as_dynamic() -> None:
     problem = plain_problem(recording())
     estimate = true_answer(problem)
     table = compare.dynamic_landmarks(problem, estimate, compare.reprojection(problem.sequence, estimate))
@@ -109,7 +109,7 @@ def test_tracks_have_three_degrees_of_freedom_less_than_rows_unless_landmarks_ha
     assert (with_prior["degrees"] == 3 * SCENE.frames).all()
 
 
-def test_what_an_estimator_did_not_use_is_not_held_against_it() -> None:
+def test_unused_observations_do_not_count_in_the_whitened_residuals() -> None:
     problem = plain_problem(recording())
     estimate = true_answer(problem)
     pixel = recording().observations.pixel.copy()
@@ -171,7 +171,7 @@ def test_maps_are_matched_by_landmark_and_measured_in_metres_and_sigmas() -> Non
     np.testing.assert_allclose(by_depth.loc[by_depth["n"] > 0, "distance"], 0.5)
 
 
-def test_a_world_that_is_turned_as_a_whole_looks_the_same_from_the_camera() -> None:
+def test_a_rotated_world_has_the_same_projections() -> None:
     problem = plain_problem(recording())
     reference = true_answer(problem)
     T = se3.exp([3.0, 0.0, 0.0, 0.0, 0.0, 0.2])
@@ -218,7 +218,7 @@ def plain_table(**columns: object) -> pd.DataFrame:
     return compare.reprojection(problem.sequence, true_answer(problem)).assign(**columns)
 
 
-def test_patterns_of_known_residuals_are_worked_out_by_hand() -> None:
+def test_residual_patterns_of_a_known_case() -> None:
     depth = np.resize([0.0, 5.0, 79.9, 80.0, -1.0, np.nan], len(recording().observations))
     table = plain_table(uL=3.0, vL=4.0, uR=6.0, vR=8.0, error=7.0, depth=depth)
     found = compare.residual_patterns(recording(), table)
@@ -269,7 +269,7 @@ def test_whitened_rows_are_in_sigmas_and_the_mean_of_both_heights_has_less_noise
     assert summary["tracks"] == SCENE.n_points
 
 
-def test_a_track_is_held_against_chi_square_unless_it_was_seen_once() -> None:
+def test_a_track_is_tested_by_chi_square_unless_it_has_one_observation() -> None:
     table = plain_table(uL=0.5, vL=0.0, uR=0.0, vR=0.0)
     kept = table[(table["landmark"] > 0) | (table["frame"] == 0)]  # landmark 0 is seen once
     found = compare.track_chi_square(plain_problem(recording()), kept)
@@ -282,7 +282,7 @@ def test_a_track_is_held_against_chi_square_unless_it_was_seen_once() -> None:
 
 
 @pytest.mark.parametrize("reached", [16, 9])
-def test_maps_are_compared_at_the_sight_nearest_to_the_camera(reached: int) -> None:
+def test_maps_are_compared_at_the_observation_nearest_to_the_camera(reached: int) -> None:
     """Driving towards all points, that is the last one for which there are both poses."""
     problem = plain_problem(recording())
     reference = true_answer(problem)
@@ -295,7 +295,7 @@ def test_maps_are_compared_at_the_sight_nearest_to_the_camera(reached: int) -> N
     assert table.columns.tolist() == ["landmark", "distance", "seen", "depth", "sigmas", "left_out"]
 
 
-def test_landmarks_that_one_of_the_two_lacks_are_in_no_comparison() -> None:
+def test_landmarks_without_a_counterpart_are_excluded_from_the_map_difference() -> None:
     problem = plain_problem(recording())
     reference = true_answer(problem)
     position = reference.landmarks.position.copy()
@@ -307,7 +307,7 @@ def test_landmarks_that_one_of_the_two_lacks_are_in_no_comparison() -> None:
         assert found == [j for j in range(SCENE.n_points) if j not in (0, 4)]
 
 
-def test_four_sights_can_tell_of_a_motion_and_three_cannot() -> None:
+def test_four_observations_can_show_a_moving_landmark_and_three_cannot() -> None:
     problem = plain_problem(recording())
     estimate = true_answer(problem)
     table = compare.reprojection(problem.sequence, estimate)

@@ -113,7 +113,7 @@ def test_without_stamps_a_segment_has_no_speed() -> None:
     assert compare.segment_errors(compare.associate(*unstamped)).table["speed"].isna().all()
 
 
-def test_a_short_path_has_lengths_fitted_to_it_and_says_so() -> None:
+def test_a_short_path_has_fitted_segment_lengths_and_reports_them() -> None:
     t, truth, result = drive(61)
     found = compare.segment_errors(matched(t, truth, result))
     assert not found.official

@@ -254,7 +254,7 @@ def test_frames_without_a_pose_are_nan_and_cost_nothing_else() -> None:
     assert np.isnan(summary["rotation_final_deg"])
 
 
-def test_frames_without_truth_take_no_part_in_the_alignment() -> None:
+def test_frames_without_truth_are_excluded_from_the_alignment() -> None:
     truth = wandering(30, 1)
     estimate = disturbed(truth, 2)
     partly = truth.copy()
@@ -288,7 +288,7 @@ def test_divergence_of_an_estimate_from_itself_is_nothing() -> None:
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=50))
-def test_the_summary_of_errors_is_what_numpy_says(errors: list[float]) -> None:
+def test_the_summary_of_errors_is_that_of_numpy(errors: list[float]) -> None:
     summary = compare.summarized([*errors, np.nan])
     assert summary["rmse"] == pytest.approx(np.sqrt(np.mean(np.square(errors))))
     assert summary["mean"] == pytest.approx(np.mean(errors))
@@ -303,7 +303,7 @@ def test_the_summary_of_no_errors_is_nan_throughout() -> None:
     assert all(np.isnan(value) for value in summary.values())
 
 
-def test_the_summary_of_a_divergence_is_worked_out_by_hand() -> None:
+def test_the_divergence_summary_of_a_known_case() -> None:
     reference = turning_left(3)
     estimate = reference.copy()
     estimate[1] = estimate[1] @ se3.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.deg2rad(3.0)])

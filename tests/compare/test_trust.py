@@ -84,14 +84,14 @@ def test_an_infinite_residual_has_an_infinite_scale_and_a_missing_one_none() -> 
 
 
 @pytest.mark.parametrize("kernel", [None, data.HuberKernel()])
-def test_pixel_noise_told_four_times_too_small_is_not_trusted(kernel: data.HuberKernel | None) -> None:
+def test_a_pixel_sigma_four_times_too_small_is_not_trusted(kernel: data.HuberKernel | None) -> None:
     problem = replace(assumed_noise(pixel=0.5 / 4), kernel=kernel)
     verdict = compare.trust(problem, smoother.isam2(problem))
     assert verdict.verdict is Verdict.UNTRUSTED
     assert "pixel residual RMS" in verdict.reasons[0]
 
 
-def test_velocities_that_contradict_the_pixels_are_not_trusted() -> None:
+def test_velocities_inconsistent_with_the_pixels_are_not_trusted() -> None:
     sequence = clean().sequence
     flipped = replace(sequence, angular_velocity=-sequence.angular_velocity)
     problem = replace(
@@ -116,7 +116,7 @@ def test_few_observations_are_not_trusted() -> None:
     assert any("fewer than 6" in reason for reason in verdict.reasons[:2])
 
 
-def test_what_failed_or_used_nothing_is_not_trusted() -> None:
+def test_a_failed_reference_or_one_without_observations_is_not_trusted() -> None:
     problem = clean()
     failed = Estimate.failed("isam2", "the system is indeterminate", problem.n_frames, len(problem.excluded))
     assert compare.trust(problem, failed) == compare.Trust(
@@ -125,7 +125,7 @@ def test_what_failed_or_used_nothing_is_not_trusted() -> None:
     assert compare.trust(problem, ekf.dead_reckoning(problem)).verdict is Verdict.UNTRUSTED
 
 
-def test_frames_given_up_are_doubtful_and_many_untrusted() -> None:
+def test_dropped_frames_lower_the_trust_to_doubtful_and_many_to_untrusted() -> None:
     def without(n: int) -> compare.Trust:
         events = tuple(Event(k, "frame without observations", "") for k in range(n))
         return compare.trust(clean(), replace(reference(), status=Status.RECOVERED, events=events))
@@ -191,7 +191,7 @@ def solved_as_a_batch() -> Estimate:
     return smoother.batch(clean(), given={"isam2": reference()})
 
 
-def test_a_batch_solution_that_agrees_is_said_to() -> None:
+def test_an_agreeing_batch_solution_is_reported() -> None:
     verdict = compare.trust(clean(), reference(), solved_as_a_batch())
     assert verdict.verdict is Verdict.TRUSTED, verdict.reasons
     assert any("a batch solution agrees" in reason for reason in verdict.reasons)
@@ -245,7 +245,7 @@ def test_the_cost_is_that_of_the_four_rows_and_of_the_graph(kernel: data.HuberKe
 @pytest.mark.parametrize(
     ("value", "high", "low"), [(2.0, 0, 1), (2.1, 1, 1), (4.0, 1, 0), (4.1, 2, 0), (1.9, 0, 2), (np.nan, 2, 2)]
 )
-def test_a_figure_at_its_limit_keeps_it_and_none_does_not(value: float, high: int, low: int) -> None:
+def test_a_metric_at_its_limit_holds_and_a_missing_one_does_not(value: float, high: int, low: int) -> None:
     assert _above(value, (2.0, 4.0)) == high
     assert _below(value, (4.0, 2.0)) == low
 
@@ -263,7 +263,7 @@ def test_six_observations_are_enough_for_a_frame_and_five_are_not() -> None:
         assert f"{weak} of the frames have fewer than 6 observations" in reasons
 
 
-def test_intervals_that_nothing_ties_are_told() -> None:
+def test_intervals_without_common_landmarks_are_reported() -> None:
     problem = plain_problem(Scene().sequence())
     answer = true_answer(problem)
     frame = problem.sequence.observations.frame
@@ -282,7 +282,7 @@ def test_intervals_that_nothing_ties_are_told() -> None:
     assert verdicts == [Verdict.TRUSTED, Verdict.DOUBTFUL, Verdict.UNTRUSTED]  # 2, 3 and 7 of 9 intervals
 
 
-def test_what_was_found_is_said_in_figures() -> None:
+def test_the_reasons_of_trust_state_their_figures() -> None:
     problem = clean()
     pixel, motion = pixel_scale(problem, reference()), motion_scale(problem, reference())
     share = reference().used.sum() / expected_observations(problem).sum()
@@ -303,7 +303,7 @@ def test_what_was_found_is_said_in_figures() -> None:
     assert beside.verdict is Verdict.TRUSTED
 
 
-def test_an_estimate_that_used_nothing_says_so() -> None:
+def test_an_estimate_without_used_observations_is_reported() -> None:
     nothing = replace(reference(), used=np.zeros_like(reference().used))
     assert compare.trust(clean(), nothing) == compare.Trust(Verdict.UNTRUSTED, ("it used no observation",))
 
@@ -316,3 +316,16 @@ def test_a_disparity_of_one_pixel_is_not_above_it() -> None:
     problem = plain_problem(with_pixels(sequence, pixel))
     nothing = replace(problem, excluded=np.full_like(problem.excluded, data.Excluded.DISPARITY))
     assert expected_observations(nothing)[:4].tolist() == [False, True, True, False]
+
+
+def test_the_worst_criterion_decides_the_verdict_and_each_has_its_value_beside_its_limits() -> None:
+    answer = compare.trust(clean(), reference())
+    assert {c.code for c in answer.criteria} <= set(TrustLimits.__dataclass_fields__)
+    assert answer.verdict >= max(c.verdict for c in answer.criteria)
+    for c in answer.criteria:
+        beyond = (c.value < c.doubtful) if c.at_least else (c.value > c.doubtful)
+        assert beyond == (c.verdict is not Verdict.TRUSTED), c
+    tight = compare.trust(clean(), reference(), limits=TrustLimits(pixel_scale=(0.0, 0.1)))
+    pixel = next(c for c in tight.criteria if c.code == "pixel_scale")
+    assert tight.verdict is pixel.verdict is Verdict.UNTRUSTED
+    assert pixel.value == pytest.approx(pixel_scale(clean(), reference()))

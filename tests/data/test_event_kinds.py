@@ -30,7 +30,7 @@ def test_the_text_of_a_kind_stands_in_the_enum_alone() -> None:
     assert len(places) == len(TEXTS)
 
 
-def test_no_event_of_ours_has_a_kind_of_free_text() -> None:
+def test_every_event_of_the_package_has_a_kind_of_the_enum() -> None:
     made = [
         (where, node)
         for where, node in sources()
@@ -56,7 +56,7 @@ def with_events(*kinds: str) -> tuple[data.Problem, Estimate]:
 
 
 @pytest.mark.parametrize("kind", ["heading reset", "ONE_START", "zero-velocity update"])
-def test_a_kind_of_an_estimator_s_own_weighs_on_nothing(kind: str) -> None:
+def test_an_event_kind_of_a_user_estimator_does_not_affect_the_trust(kind: str) -> None:
     problem, silent = with_events()
     _, estimate = with_events(*([kind] * 20))
     assert compare.trust(problem, estimate) == compare.trust(problem, silent)

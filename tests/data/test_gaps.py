@@ -37,7 +37,7 @@ def test_noise_alone_is_no_wandering() -> None:
     assert (random_walk_density(problem, gaps(problem.sequence.dt)) < 3e-3).all()
 
 
-def test_a_recording_without_gaps_is_left_alone() -> None:
+def test_a_recording_without_gaps_is_unchanged() -> None:
     problem = wandering_problem(1.0, frames=50)
     assert inflate_gap_covariance(problem) is problem
 

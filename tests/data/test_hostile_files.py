@@ -70,7 +70,7 @@ def test_the_good_files_are_read(name: str) -> None:
 @pytest.mark.parametrize("name", READERS)
 @settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
 @given(chance=st.data())
-def test_a_mutated_file_is_read_or_refused_in_a_sentence(name: str, chance: st.DataObject) -> None:
+def test_a_mutated_file_is_read_or_refused_in_one_sentence(name: str, chance: st.DataObject) -> None:
     content = bytearray(chance.draw(st.sampled_from(seeds(name))))
     for _ in range(chance.draw(st.integers(1, 4))):
         start, length = chance.draw(st.integers(0, len(content))), chance.draw(st.integers(0, 16))
@@ -103,7 +103,7 @@ def test_a_pickle_in_an_npz_is_never_opened(tmp_path: Path, key: str) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+def test_a_decompression_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     """Four hundred megabytes of zeros in four hundred kilobytes, under a header that promises them."""
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (3, 2**24)})
@@ -137,7 +137,7 @@ def test_json_that_is_nested_too_deeply_is_refused(tmp_path: Path, name: str) ->
         read(tmp_path / file)
 
 
-def test_words_that_are_no_words_are_refused(tmp_path: Path) -> None:
+def test_values_of_the_wrong_type_in_an_exported_problem_are_refused(tmp_path: Path) -> None:
     for key in ("preset", "sequence", "remarks", "reading", "schema"):
         words = json.loads(problem_words())
         for value in (None, 3, [], {}, [[]], "x", 1e308, True):

@@ -17,6 +17,8 @@ from fgbaseline.data import Observations, Sequence, Truth
 from fgbaseline.data.formats import read, write_npz
 from fgbaseline.geometry import InputError, StereoCamera, se3
 
+from ..builders.refusals import refused
+
 
 def assert_same(expected: Sequence, actual: Sequence) -> None:
     """Every array is the same bit by bit (signs of zeros and NaN included)."""
@@ -63,7 +65,7 @@ def random_sequence(seed: int, n_frames: int, n_landmarks: int, truth: str) -> S
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32), st.integers(2, 9), st.integers(0, 7), st.sampled_from(["none", "poses", "landmarks"]))
-def test_what_is_written_comes_back_bit_by_bit(tmp_path_factory, seed, n_frames, n_landmarks, truth):
+def test_written_files_are_read_back_bit_by_bit(tmp_path_factory, seed, n_frames, n_landmarks, truth):
     sequence = random_sequence(seed, n_frames, n_landmarks, truth)
     path = tmp_path_factory.mktemp("npz") / "random.npz"
     write_npz(sequence, path)
@@ -318,10 +320,8 @@ def test_bad_content_is_one_sentence_with_file_field_and_value(tmp_path, course_
     spoil, sentence = BAD[case]
     spoil(course_arrays)
     path = save(tmp_path / "dé mo.npz", course_arrays)
-    with pytest.raises(InputError, match=sentence) as raised:
+    with refused(sentence, path):
         read(path)
-    assert str(raised.value).startswith(f"{path}: ")
-    assert "\n" not in str(raised.value)
 
 
 def npy_bytes(shape: str, data: bytes, descr: str = "'<f8'") -> bytes:

@@ -35,7 +35,7 @@ def test_the_observations_of_frames_are_those_whose_frame_lies_between(
     )
 
 
-def test_what_is_not_sorted_is_refused() -> None:
+def test_unsorted_observations_are_refused() -> None:
     with pytest.raises(FgbaselineError, match="sorted by frame"):
         Observations(np.array([1, 0]), np.array([0, 0]), np.zeros((2, 4)))
 

@@ -41,7 +41,7 @@ def test_a_fork_works_while_this_process_does_something_else() -> None:
 
 
 @FORKS
-def test_what_a_fork_had_taken_when_it_died_is_done_here() -> None:
+def test_the_job_of_a_killed_fork_is_done_by_the_parent() -> None:
     here = os.getpid()
 
     def die(number: int) -> int:
@@ -54,7 +54,7 @@ def test_what_a_fork_had_taken_when_it_died_is_done_here() -> None:
 
 
 @FORKS
-def test_what_a_fork_fails_at_is_told_here_and_only_here(capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_exception_in_a_fork_is_raised_once_in_the_parent(capfd: pytest.CaptureFixture[str]) -> None:
     def fail(number: int) -> int:
         raise ValueError(f"no {number}")
 

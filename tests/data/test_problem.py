@@ -137,7 +137,7 @@ def test_intervals_take_the_sample_after_before_or_the_mean() -> None:
     np.testing.assert_allclose(mean, 0.5 * (after + before), rtol=1e-12)
 
 
-def test_each_interval_is_right_for_a_recording_made_so() -> None:
+def test_the_interval_setting_recovers_a_recording_of_that_interval() -> None:
     for said, shift in (("after", Shift.AFTER), ("before", Shift.BEFORE)):
         s = simulate(Simulation(duration=5.0, sigma_linear=0.0, sigma_angular=0.0, velocity_of_interval=said))
         assert s.truth is not None
@@ -155,7 +155,7 @@ def test_flags_over_the_problem_spread_over_the_recording() -> None:
     assert problem.mask.sum() == n
 
 
-def test_no_truth_enters_a_problem() -> None:
+def test_a_problem_does_not_use_ground_truth() -> None:
     s = drive()
     for preset in (data.documented, diagnosis.calibrated):
         with_truth, without = preset(s), preset(replace(s, truth=None))

@@ -21,7 +21,8 @@ from ..builders.synthetic import drive, matched
 def problems() -> dict[str, Problem]:
     """One with a mask and a kernel, one with priors and a fixed number of features."""
     sequence = drive(wrong=0.05)
-    return {"calibrated": matched(sequence), "documented": data.documented(sequence, 40)}
+    calibrated = replace(matched(sequence), pixel_inflation=2.5)
+    return {"calibrated": calibrated, "documented": data.documented(sequence, 40)}
 
 
 def assert_equal(expected: Any, actual: Any, where: str) -> None:
@@ -48,7 +49,7 @@ def test_it_comes_back_to_the_bit_without_its_truth(problems: dict[str, Problem]
 
 
 @pytest.mark.parametrize("preset", ["calibrated", "documented"])
-def test_an_estimator_answers_the_same_to_it(problems: dict[str, Problem], preset: str, tmp_path: Path) -> None:
+def test_an_exported_problem_gives_the_same_estimate(problems: dict[str, Problem], preset: str, tmp_path: Path) -> None:
     write_problem(problems[preset], tmp_path)
     expected, actual = ekf.ekf(problems[preset]), ekf.ekf(read_problem(tmp_path))
     assert actual.world_T_imu.tobytes() == expected.world_T_imu.tobytes()
@@ -60,7 +61,7 @@ def columns(table: np.ndarray, *names: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("preset", ["calibrated", "documented"])
-def test_the_tables_say_the_same_as_the_arrays(problems: dict[str, Problem], preset: str, tmp_path: Path) -> None:
+def test_the_tables_hold_the_values_of_the_arrays(problems: dict[str, Problem], preset: str, tmp_path: Path) -> None:
     problem = problems[preset]
     write_problem(problem, tmp_path)
     o, sequence = problem.sequence.observations, problem.sequence
@@ -125,10 +126,11 @@ def put(index: Any, value: float) -> Any:
         ({"imu_T_cam": put((0, 0), 3.0)}, "imu_T_cam: its 3x3 block .* is no rotation"),
         ({"pixel_variance": np.array(-1.0)}, "pixel_variance: expected a positive number"),
         ({"pixel_variance": np.ones(2)}, "pixel_variance: expected shape"),
+        ({"pixel_inflation": np.array(0.0)}, "pixel_inflation: expected a positive number"),
         ({"huber_threshold": np.array(-1.0)}, "huber_threshold: expected a positive number"),
     ],
 )
-def test_a_spoilt_array_is_told_with_file_and_key(
+def test_a_corrupted_array_is_refused_with_file_and_key(
     problems: dict[str, Problem], tmp_path: Path, changes: dict[str, Any], sentence: str
 ) -> None:
     write_problem(problems["calibrated"], tmp_path)
@@ -137,7 +139,9 @@ def test_a_spoilt_array_is_told_with_file_and_key(
         read_problem(tmp_path)
 
 
-def test_words_that_are_not_ours_are_told(problems: dict[str, Problem], tmp_path: Path) -> None:
+def test_an_unknown_schema_or_value_of_an_exported_problem_is_refused(
+    problems: dict[str, Problem], tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=r"problem\.json: there is no such file"):
         read_problem(tmp_path)
     write_problem(problems["calibrated"], tmp_path)

@@ -58,7 +58,7 @@ WRONG: dict[str, Callable[[], Sequence]] = {
 
 
 @pytest.mark.parametrize("sentence", WRONG)
-def test_what_cannot_be_estimated_from_is_refused_by_its_field(sentence: str) -> None:
+def test_an_unusable_sequence_is_refused_by_field(sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         WRONG[sentence]()
 

@@ -24,6 +24,8 @@ from fgbaseline.data.simulate import (
 )
 from fgbaseline.geometry import FloatArray, InputError, disparity, se3
 
+from ..builders.refusals import refused
+
 PATHS = ["town", "loop", "highway", "handheld"]
 CLEAN = {"sigma_linear": 0.0, "sigma_angular": 0.0, "sigma_pixel": 0.0, "wrong_share": 0.0}
 
@@ -91,7 +93,7 @@ def test_residuals_at_the_truth_have_the_declared_deviation(path: str) -> None:
     assert np.abs(np.corrcoef(r.T) - np.eye(4)).max() < 4.0 / np.sqrt(len(r))
 
 
-def test_rows_share_noise_where_they_are_told_to() -> None:
+def test_rows_share_noise_as_set() -> None:
     s, labels = simulate_with_labels(Simulation(row_correlation=0.8))
     correlation = np.corrcoef(residuals(s, labels).T)
     assert correlation[1, 3] == pytest.approx(0.8, abs=0.02)
@@ -113,7 +115,7 @@ def test_every_tracked_point_is_before_both_cameras_and_in_both_images(path: str
     assert disparity(pixel[~labels.wrong]).min() > -1.0
 
 
-def test_points_of_moving_things_move_and_have_no_true_position() -> None:
+def test_points_on_moving_objects_move_and_have_no_true_position() -> None:
     s, labels = simulate_with_labels(Simulation(moving_share=0.15, **CLEAN, duration=120))
     assert 0.07 < labels.moving.mean() < 0.2
     assert s.truth is not None
@@ -145,7 +147,7 @@ def test_the_share_of_wrong_matches_is_the_declared_one_single_and_persistent() 
     assert np.mean(single) < 0.6
 
 
-def test_a_burst_is_where_it_was_put() -> None:
+def test_a_burst_of_wrong_matches_lies_at_the_simulated_times() -> None:
     s, labels = simulate_with_labels(Simulation(bursts=((20.0, 22.0, 0.6),), wrong_share=0.0))
     t = s.t[s.observations.frame]
     inside = (t >= 20.0) & (t <= 22.0)
@@ -162,7 +164,7 @@ def test_nothing_is_seen_in_a_blackout_and_tracks_end_there() -> None:
     assert counts[252:260].min() > 25
 
 
-def test_tracks_never_return_unless_they_are_told_to() -> None:
+def test_tracks_return_only_as_set() -> None:
     def gaps(s: Sequence) -> float:
         order = s.observations.by_track()
         landmark, frame = s.observations.landmark[order], s.observations.frame[order]
@@ -213,7 +215,7 @@ def test_the_mean_of_two_instantaneous_velocities_is_right_to_second_order() -> 
     assert worst(10.0) < 0.2 * np.abs(recorded(held)[:-1] - true_twists(held)).max()
 
 
-def test_bias_scale_and_axes_are_what_a_diagnosis_would_take_off() -> None:
+def test_simulated_bias_scale_and_axes_are_what_a_diagnosis_removes() -> None:
     clean = simulate(Simulation(path="handheld", **CLEAN))
     s = simulate(
         Simulation(
@@ -234,7 +236,7 @@ def test_bias_scale_and_axes_are_what_a_diagnosis_would_take_off() -> None:
     assert np.allclose(s.linear_velocity[:, 2] / 1.05, clean.linear_velocity[:, 1])  # IMU y is the recorded z
 
 
-def test_a_time_offset_says_when_a_stamped_velocity_was() -> None:
+def test_a_velocity_stamped_t_is_measured_at_t_plus_the_time_offset() -> None:
     clean = simulate(Simulation(path="handheld", frame_rate=10.0, **CLEAN))
     late = simulate(Simulation(path="handheld", frame_rate=10.0, time_offset=0.3, **CLEAN))
     assert np.allclose(recorded(late)[:-3], recorded(clean)[3:], atol=1e-9)
@@ -284,7 +286,7 @@ def test_following_a_sequence_uses_its_camera_and_its_axes() -> None:
     assert s.up[2] < -0.99
 
 
-def test_a_known_bias_is_taken_off_what_is_followed() -> None:
+def test_a_known_bias_is_subtracted_from_the_followed_velocities() -> None:
     followed = wandering()
     s = simulate(Simulation(path="along", along=followed, along_gyro_bias=(0.01, 0.0, -0.02), duration=5.0, **CLEAN))
     assert s.t[-1] <= 5.0
@@ -384,7 +386,7 @@ def test_there_are_24_conventions_each_a_rotation_with_its_own_name() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["x,y,-z", "x,x,x", "", "xyz"])
-def test_what_is_no_right_handed_convention_is_refused(wrong: str) -> None:
+def test_a_left_handed_axis_convention_is_refused(wrong: str) -> None:
     with pytest.raises(InputError, match="24"):
         axes_matrix(wrong)
 
@@ -431,13 +433,12 @@ def test_what_is_no_right_handed_convention_is_refused(wrong: str) -> None:
         ("sigma_linear", "much"),
     ],
 )
-def test_what_cannot_be_is_refused_with_setting_and_value(name: str, value: object) -> None:
-    with pytest.raises(InputError, match=name) as refusal:
+def test_impossible_settings_are_refused_with_their_value(name: str, value: object) -> None:
+    with refused(name):
         Simulation(**{name: value})  # type: ignore[arg-type]
-    assert "\n" not in str(refusal.value)
 
 
-def test_velocities_that_cannot_be_followed_are_refused() -> None:
+def test_impossible_velocities_are_refused() -> None:
     good = wandering(10)
     with pytest.raises(InputError, match="along"):
         Simulation(path="along")

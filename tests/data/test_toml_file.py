@@ -71,7 +71,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_good_file_becomes_the_model_and_names_its_keys(file: Path) -> None:
+def test_a_valid_file_gives_the_model_and_its_faults_have_key_paths(file: Path) -> None:
     read = read_toml(file, Car)
     assert read.content.wheel == (Wheel(side=Side.LEFT, size=0.3), Wheel(side=Side.RIGHT, size=0.3, kind="alloy"))
     assert (read.content.engine, read.content.manual) == (Engine(power=40.0), Path("docs/manual.pdf"))
@@ -103,7 +103,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("old", "new", "place", "names"), BAD)
-def test_what_is_wrong_is_one_sentence_with_its_key_path(
+def test_a_fault_is_one_sentence_with_its_key_path(
     old: str, new: str, place: str, names: tuple[str, ...], file: Path
 ) -> None:
     file.write_text(GOOD.replace(old, new, 1))
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_one_sentence_with_its_key_path(
     assert all(name in text for name in names), text
 
 
-def test_the_first_of_several_is_told(file: Path) -> None:
+def test_the_first_of_several_faults_is_reported(file: Path) -> None:
     file.write_text(GOOD.replace("power = 40", "power = '40'").replace('"left"', '"up"'))
     with pytest.raises(InputError, match=r"engine\.power = "):
         read_toml(file, Car)
@@ -131,7 +131,7 @@ def test_the_first_of_several_is_told(file: Path) -> None:
         (b"", ("'name' is missing",)),
     ],
 )
-def test_what_is_no_such_text_at_all(content: bytes, names: tuple[str, ...], file: Path) -> None:
+def test_a_file_that_is_no_toml_text_is_refused(content: bytes, names: tuple[str, ...], file: Path) -> None:
     file.write_bytes(content)
     with pytest.raises(InputError) as error:
         read_toml(file, Car)

@@ -36,7 +36,7 @@ def spoiled(i: int, row: int, column: int, value: float) -> FloatArray:
         ([], poses(0), r"a.tum: a trajectory needs at least one pose"),
     ],
 )
-def test_what_is_wrong_is_named_by_its_line(t: list[float], path: FloatArray, sentence: str) -> None:
+def test_a_fault_is_reported_with_its_line(t: list[float], path: FloatArray, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         Trajectory(np.array(t, dtype=float), path, source="a.tum", line=np.arange(10, 15))
 

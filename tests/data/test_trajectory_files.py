@@ -21,6 +21,7 @@ from fgbaseline.data.formats import (
 )
 from fgbaseline.geometry import FloatArray, InputError, se3
 
+from ..builders.refusals import refused
 from ..builders.synthetic import drive
 
 FORMS = ("tum", "kitti", "euroc", "npz")
@@ -45,7 +46,7 @@ def write(form: str, path: Path, t: FloatArray, poses: FloatArray) -> Path:
 
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(FORMS), st.integers(0, 2**32 - 1), st.integers(2, 20))
-def test_what_was_written_comes_back_and_a_second_time_to_the_byte(tmp_path_factory, form, seed, n):
+def test_written_files_are_read_back_and_written_again_to_the_byte(tmp_path_factory, form, seed, n):
     folder = tmp_path_factory.mktemp("forms")
     t, poses = path_of(seed, n)
     back = read_trajectory(write(form, folder / "a", t, poses))
@@ -66,9 +67,8 @@ def test_insisting_on_the_right_form_changes_nothing_and_on_another_is_refused(t
     expected = read_trajectory(path)
     np.testing.assert_array_equal(read_trajectory(path, form).world_T_body, expected.world_T_body)
     for other in set(FORMS) - {form}:
-        with pytest.raises(InputError, match=r"a: ") as raised:
+        with refused("a: ", path):
             read_trajectory(path, other)
-        assert "\n" not in str(raised.value)
 
 
 def test_evo_reads_the_same_from_what_we_write(tmp_path):
@@ -82,7 +82,7 @@ def test_evo_reads_the_same_from_what_we_write(tmp_path):
     np.testing.assert_allclose(euroc.timestamps, t, rtol=1e-15)
 
 
-def test_we_read_the_same_as_evo_from_a_euroc_state_file(tmp_path):
+def test_a_euroc_state_file_reads_as_in_evo(tmp_path):
     rows = ["#timestamp, p_RS_R_x [m], and so on"]
     for k in range(4):
         rows.append(f"140363658083855539{k},4.6,-1.7,{0.5 + k},0.5,-0.5,0.5,-0.5" + ",0.1" * 9)
@@ -175,13 +175,11 @@ def test_any_line_ends_are_line_ends(tmp_path):
 
 
 @pytest.mark.parametrize("case", BAD_TEXT)
-def test_a_bad_text_file_is_told_with_its_line(tmp_path, case):
+def test_a_bad_text_file_is_refused_with_its_line(tmp_path, case):
     text, sentence = BAD_TEXT[case]
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(InputError, match=sentence) as raised:
+    with refused(sentence, tmp_path / "a.csv"):
         read_trajectory(tmp_path / "a.csv")
-    assert str(raised.value).startswith(f"{tmp_path / 'a.csv'}: ")
-    assert "\n" not in str(raised.value)
 
 
 def reflect(arrays):
@@ -229,7 +227,7 @@ def misshape(arrays):
         (misshape, r"covariance: expected shape \(4, 6, 6\)"),
     ],
 )
-def test_a_bad_npz_is_told_with_its_key(tmp_path, spoil, sentence):
+def test_a_bad_npz_is_refused_with_its_key(tmp_path, spoil, sentence):
     t, poses = path_of(4, 4)
     arrays = {"t": t, "world_T_body": poses}
     spoil(arrays)
@@ -238,7 +236,7 @@ def test_a_bad_npz_is_told_with_its_key(tmp_path, spoil, sentence):
         read_trajectory(tmp_path / "a.npz")
 
 
-def test_what_a_form_cannot_hold_is_not_written(tmp_path):
+def test_data_that_a_format_cannot_hold_are_not_written(tmp_path):
     t, poses = path_of(6, 3)
     with pytest.raises(InputError, match="negative"):
         write_euroc(tmp_path / "a", t - t[0] - 1.0, poses)

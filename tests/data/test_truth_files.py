@@ -125,7 +125,7 @@ def test_positions_and_every_tenth_pose_are_no_truth_of_a_run(tmp_path):
 
 
 @pytest.mark.parametrize("body", [None, "body"])
-def test_the_body_must_be_said(tmp_path, recorded, body):
+def test_the_body_must_be_specified(tmp_path, recorded, body):
     sequence, poses = recorded
     write_kitti(tmp_path / "truth", poses)
     with pytest.raises(InputError, match=f"the truth frame is {body!r}; say whether .* 'camera' or the 'imu'"):

@@ -70,7 +70,7 @@ def test_arbitrary_bytes(tmp_path, magic, content):
         read(path)
 
 
-def test_the_name_says_nothing_about_the_form(tmp_path, course_arrays):
+def test_the_format_is_detected_from_the_content(tmp_path, course_arrays):
     path = tmp_path / "recording.mat"
     with path.open("wb") as file:
         np.savez(file, **course_arrays)

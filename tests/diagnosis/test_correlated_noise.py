@@ -25,7 +25,7 @@ def town(seed: int, **settings: float) -> Sequence:
     return simulate(Simulation(duration=40.0, seed=seed, wrong_share=0.0, **settings))
 
 
-def test_an_offset_of_the_disparities_is_found_told_and_taken_off() -> None:
+def test_a_disparity_offset_is_estimated_reported_and_subtracted() -> None:
     sequence = town(3)
     by = np.zeros((len(sequence.observations), 4))
     by[:, 2] = 0.4
@@ -42,7 +42,7 @@ def test_an_offset_of_the_disparities_is_found_told_and_taken_off() -> None:
     assert any("px taken off every uR" in sentence for sentence in problem.repairs)
 
 
-def test_white_noise_is_not_inflated_and_errors_that_last_are() -> None:
+def test_white_noise_is_not_inflated_and_time_correlated_errors_are() -> None:
     sequence = town(5)
     white = diagnose(sequence)
     assert white.fit is not None
@@ -61,7 +61,7 @@ def test_white_noise_is_not_inflated_and_errors_that_last_are() -> None:
     assert lasting.fit.inflation.velocity == 1.0
 
 
-def test_velocities_that_drift_are_blamed_where_the_cameras_do_not() -> None:
+def test_time_correlated_velocity_errors_inflate_the_velocity_noise_alone() -> None:
     sequence = town(7, sigma_angular=0.002)
     turn = 0.03 * np.sin(2.0 * np.pi * np.arange(sequence.n_frames) / 50.0)[:, None] * [1.0, -1.0, 1.0]
     found = diagnose(replace(sequence, angular_velocity=sequence.angular_velocity + turn)).fit
@@ -79,7 +79,7 @@ def velocities(n: int, seed: int) -> tuple[FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("length", [1, 3])
-def test_a_blind_interval_is_bridged_better_than_its_own_sample_says_and_knows_by_how_much(length: int) -> None:
+def test_a_bridged_dropout_is_more_accurate_than_its_sample_and_its_variance_is_consistent(length: int) -> None:
     whitened, own = [], []
     for seed in range(40):
         true, recorded = velocities(300, seed)
@@ -98,7 +98,7 @@ def test_a_blind_interval_is_bridged_better_than_its_own_sample_says_and_knows_b
     assert np.mean(own) > 2.0
 
 
-def test_a_velocity_without_noise_is_left_alone() -> None:
+def test_a_velocity_without_noise_is_unchanged() -> None:
     true, _ = velocities(100, 0)
     blind = np.zeros(100, dtype=np.bool_)
     blind[50] = True
@@ -115,7 +115,7 @@ def test_blind_intervals_have_too_few_landmarks_in_common() -> None:
     assert dropout_intervals(observations, 5).tolist() == [False, False, True, True]
 
 
-def test_a_whole_shift_is_told_by_the_fit_or_not_at_all() -> None:
+def test_an_integer_delay_is_the_minimum_of_the_fit_or_undetermined() -> None:
     dt = 0.1
 
     def parabola(depth: float, at: float) -> float | None:
@@ -128,7 +128,7 @@ def test_a_whole_shift_is_told_by_the_fit_or_not_at_all() -> None:
     assert parabola(100.0, -2.4) is None
 
 
-def test_braking_tells_to_which_interval_a_velocity_belongs() -> None:
+def test_braking_determines_the_interval_of_a_velocity() -> None:
     still = town(2)
     n, t = still.n_frames, still.t
     velocity = np.column_stack([8.0 + 4.0 * np.sin(1.2 * t), np.zeros((n, 2))])

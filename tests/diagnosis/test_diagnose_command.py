@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Sequence, write_npz
-from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 
 from ..builders.commands import everything_in, fgbaseline
 
@@ -23,6 +23,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             Simulation(path="handheld", duration=15.0, angular_axes="x,-y,-z", gyro_bias=(0.02, 0.0, 0.0), seed=4)
         ),
         "blind": simulate(Simulation(duration=10.0, blackouts=((0.5, 9.9),))),
+        "blind samples": simulate(Simulation(duration=5.0, blackouts=((0.15, 4.9),), imu=SimulatedImu())),
     }
     for name, sequence in made.items():
         write_npz(sequence, folder / f"{name}.npz")
@@ -39,7 +40,7 @@ def strict(text: str) -> dict[str, Any]:
     return read
 
 
-def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
+def test_a_clean_drive_exits_with_zero(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], cwd=tmp_path)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "No fault detected" in result.stdout
@@ -47,7 +48,7 @@ def test_a_clean_drive_ends_with_zero(files: dict[str, Path], tmp_path: Path) ->
     assert everything_in(tmp_path) == set()
 
 
-def test_findings_end_with_one_and_stand_in_the_table(files: dict[str, Path], tmp_path: Path) -> None:
+def test_findings_exit_with_one_and_are_in_the_table(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["biased"], "--out", "out/d", cwd=tmp_path)
     assert result.returncode == 1, result.stdout + result.stderr
     assert "angular_axes" in result.stdout
@@ -65,7 +66,7 @@ def test_findings_end_with_one_and_stand_in_the_table(files: dict[str, Path], tm
     assert "--force" in again.stderr
 
 
-def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: Path) -> None:
+def test_json_is_alone_on_standard_output(files: dict[str, Path], tmp_path: Path) -> None:
     result = fgbaseline("diagnose", files["clean"], "--json", cwd=tmp_path)
     report = strict(result.stdout)
     assert report["schema"] == "fgbaseline/diagnosis/1"
@@ -76,7 +77,7 @@ def test_json_stands_alone_on_standard_output(files: dict[str, Path], tmp_path: 
     assert "wrong_matches" in report["notes"]
 
 
-def test_what_cannot_be_told_ends_with_two_and_a_reason(files: dict[str, Path], tmp_path: Path) -> None:
+def test_an_undetermined_motion_exits_with_two_and_the_reason(files: dict[str, Path], tmp_path: Path) -> None:
     finished = fgbaseline("diagnose", files["blind"], cwd=tmp_path)
     assert finished.returncode == 2
     assert "the cameras determine the motion of only" in finished.stdout
@@ -86,6 +87,17 @@ def test_what_cannot_be_told_ends_with_two_and_a_reason(files: dict[str, Path], 
     assert report["sigma"]["pixel"] is None
     assert "sigma.pixel" in report["notes"]
     assert report["gyro_bias"] == [None, None, None]
+
+
+def test_recordings_of_both_kinds_get_the_same_sentences(files: dict[str, Path], tmp_path: Path) -> None:
+    for name, measured in (("blind", "velocities"), ("blind samples", "inertial samples")):
+        finished = fgbaseline("diagnose", files[name], "--out", name, cwd=tmp_path)
+        assert finished.returncode == 2, finished.stderr
+        assert f"The {measured} cannot be diagnosed: " in finished.stdout
+        assert finished.stdout.endswith(f"\n\nThe diagnosis is in {name}\n")
+    refused = fgbaseline("diagnose", files["blind samples"], "--write-repairs", "repairs.toml", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "raw inertial samples has no repairs" in refused.stderr
 
 
 def test_bad_input_is_one_sentence(tmp_path: Path) -> None:

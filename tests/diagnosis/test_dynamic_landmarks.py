@@ -11,7 +11,7 @@ from fgbaseline.geometry import se3
 from ..builders.synthetic import Scene, drive
 
 
-def test_things_that_move_are_taken_out_and_hardly_anything_that_stands() -> None:
+def test_dynamic_landmarks_are_masked_and_static_ones_are_kept() -> None:
     settings = Simulation(duration=20.0, seed=4, wrong_share=0.0, moving_share=0.08)
     sequence, labels = simulate_with_labels(settings)
     problem = calibrated(sequence, diagnosis=diagnose(sequence))
@@ -26,7 +26,7 @@ def test_things_that_move_are_taken_out_and_hardly_anything_that_stands() -> Non
     assert np.mean(out[~moves]) < 0.06
 
 
-def test_in_a_clean_drive_everything_stands() -> None:
+def test_in_a_static_scene_no_landmark_is_dynamic() -> None:
     sequence = drive(seconds=10.0, features_per_frame=60.0)
     excluded = calibrated(sequence, diagnosis=diagnose(sequence)).excluded
     assert np.mean(excluded == Excluded.MOVING) < 0.002
@@ -46,7 +46,7 @@ def test_points_behind_or_without_a_distance_are_undetermined() -> None:
     assert (exclude_landmarks(sequence, turned, excluded, 0.5) != Excluded.NO).all()
 
 
-def test_what_is_out_already_stays_out_for_its_own_reason() -> None:
+def test_masked_observations_keep_their_reason() -> None:
     sequence = Scene().sequence()
     assert sequence.truth is not None
     excluded = np.full(len(sequence.observations), Excluded.COPIED, dtype=np.uint8)

@@ -9,7 +9,7 @@ from fgbaseline.diagnosis import calibrated, diagnose
 
 
 @pytest.mark.parametrize("error", [np.linalg.LinAlgError("Singular matrix"), ValueError("only finite values")])
-def test_a_diagnosis_that_breaks_says_so_and_the_recording_is_taken_as_it_is(
+def test_a_failed_diagnosis_is_reported_and_the_recording_is_used_as_recorded(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     module = importlib.import_module("fgbaseline.diagnosis.estimation.pipeline")

@@ -63,7 +63,7 @@ def test_a_car_shows_only_which_axis_is_forward() -> None:
     assert codes(d) == ["angular_axes", "linear_axes"]
 
 
-def test_a_wrong_speed_is_found_and_left_alone() -> None:
+def test_a_wrong_speed_is_detected_and_not_repaired() -> None:
     d = diagnosed(duration=20.0, velocity_scale=1.06, seed=5)
     (finding,) = findings_of(d)
     assert finding.code == "velocity_scale"
@@ -106,7 +106,7 @@ def test_copied_frames_are_found_and_their_stale_observations_masked() -> None:
     assert copied.after == 0
 
 
-def test_truth_is_never_looked_at() -> None:
+def test_ground_truth_is_never_used() -> None:
     sequence = simulate(Simulation(path="handheld", duration=10.0, gyro_bias=(0.02, 0.0, 0.0), seed=8))
     absurd = np.tile(np.eye(4), (sequence.n_frames, 1, 1))
     absurd[1:, 0, 3] = np.nan

@@ -97,7 +97,7 @@ def test_no_other_share_is_taken(share: float) -> None:
         diagnosis.hold_out(recording(), share)
 
 
-def test_nothing_is_spared_where_there_is_nothing_to_spare() -> None:
+def test_a_recording_without_tracks_has_none_to_hold_out() -> None:
     with pytest.raises(InputError, match="the recording has 0 tracks"):
         diagnosis.hold_out(replace(recording(), observations=Observations.none()), 0.2)
 

@@ -57,13 +57,13 @@ def test_clean_tracks_are_untouched(seed: int) -> None:
 
 
 @given(st.integers(0, TRACKS - 1), st.integers(1, FRAMES - 2), WRONG)
-def test_one_wrong_match_inside_a_track_is_taken_out_alone(track: int, frame: int, by: FloatArray) -> None:
+def test_one_wrong_match_inside_a_track_is_masked_alone(track: int, frame: int, by: FloatArray) -> None:
     where = at(track, frame)
     np.testing.assert_array_equal(mask(shifted(where, by)), expected(where, Excluded.PREDICTION))
 
 
 @given(st.integers(0, TRACKS - 1), st.sampled_from([0, FRAMES - 1]), WRONG)
-def test_a_wrong_match_at_the_end_of_a_track_is_taken_out_alone(track: int, frame: int, by: FloatArray) -> None:
+def test_a_wrong_match_at_the_end_of_a_track_is_masked_alone(track: int, frame: int, by: FloatArray) -> None:
     where = at(track, frame)
     np.testing.assert_array_equal(mask(shifted(where, by)), expected(where, Excluded.PREDICTION))
 
@@ -80,13 +80,13 @@ def test_a_track_that_jumps_onto_another_point_keeps_its_longer_half_and_of_equa
     np.testing.assert_array_equal(mask(with_pixels(SCENE, pixel)), expected(at(track, shorter), Excluded.PREDICTION))
 
 
-def test_several_wrong_matches_that_agree_with_nothing_are_taken_out_alone() -> None:
+def test_several_inconsistent_wrong_matches_are_masked_alone() -> None:
     where = at(3, [2, 4, 6])
     by = np.array([[40.0, 0.0, 40.0, 0.0], [-50.0, 20.0, -50.0, 20.0], [0.0, -60.0, 0.0, -60.0]])
     np.testing.assert_array_equal(mask(shifted(where, by)), expected(where, Excluded.PREDICTION))
 
 
-def test_wrong_matches_that_alternate_with_right_ones_do_not_stay() -> None:
+def test_wrong_matches_that_alternate_with_right_ones_are_masked() -> None:
     # Right and wrong ones each agree among themselves: some right ones may go with them.
     excluded = mask(shifted(at(3, [2, 4, 6]), np.full(4, 40.0)))
     assert np.all(excluded[at(3, [2, 4, 6])] == Excluded.PREDICTION)
@@ -103,7 +103,7 @@ def test_a_track_of_two_is_too_short_to_check(length: int) -> None:
     np.testing.assert_array_equal(mask(sequence)[sequence.observations.landmark != 5], Excluded.NO)
 
 
-def test_what_a_jump_leaves_is_short_where_it_is() -> None:
+def test_segments_between_jumps_that_are_too_short_are_masked() -> None:
     # Three runs of 2, 2 and 2: the first is the longest, and too short.
     o = SCENE.observations
     keep = (o.landmark != 5) | (o.frame < 6)
@@ -117,7 +117,7 @@ def test_what_a_jump_leaves_is_short_where_it_is() -> None:
 
 
 @given(st.integers(0, TRACKS - 1), st.integers(0, FRAMES - 1), st.floats(-30.0, 0.999))
-def test_a_small_disparity_is_taken_out_and_its_neighbours_are_not(track: int, frame: int, disparity: float) -> None:
+def test_a_small_disparity_is_masked_and_its_neighbours_are_not(track: int, frame: int, disparity: float) -> None:
     where = at(track, frame)
     pixel = SCENE.observations.pixel.copy()
     pixel[where, 2] = pixel[where, 0] - disparity
@@ -125,7 +125,7 @@ def test_a_small_disparity_is_taken_out_and_its_neighbours_are_not(track: int, f
 
 
 @given(st.integers(0, TRACKS - 1), st.integers(0, FRAMES - 1), st.floats(5.0, 50.0), st.sampled_from([1, 3]))
-def test_rows_that_disagree_are_taken_out(track: int, frame: int, by: float, row: int) -> None:
+def test_rows_that_disagree_are_masked(track: int, frame: int, by: float, row: int) -> None:
     where = at(track, frame)
     shift = np.zeros(4)
     shift[row] = by
@@ -145,7 +145,7 @@ def test_the_mask_of_a_track_depends_on_that_track_alone(seed: int, share: float
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.9))
-def test_what_is_left_is_in_runs_that_agree_and_are_long_enough(seed: int, share: float) -> None:
+def test_kept_segments_are_consistent_and_long_enough(seed: int, share: float) -> None:
     random = np.random.default_rng(seed)
     wrong = random.random(FRAMES * TRACKS) < share
     excluded = mask(shifted(np.flatnonzero(wrong), 60.0 * random.normal(size=4)))

@@ -220,7 +220,7 @@ def test_held_velocities_at_the_usual_shifts() -> None:
     assert np.allclose(zero_order_hold(sequence, Shift.MIDDLE), 0.5 * (u[:-1] + u[1:]))
 
 
-def test_a_track_that_jumps_is_cut_and_both_pieces_take_part() -> None:
+def test_a_track_that_jumps_is_cut_and_both_segments_are_used() -> None:
     scene = Scene(frames=12, sigma_pixel=0.1).sequence()
     assert scene.truth is not None
     o = scene.observations

@@ -80,7 +80,9 @@ MUTATIONS = [
 
 @pytest.mark.parametrize(("what", "factor"), MUTATIONS)
 @pytest.mark.parametrize("path", ["loop", "handheld"])
-def test_a_field_in_another_unit_gives_the_same_problem_and_its_factor(path: str, what: str, factor: float) -> None:
+def test_a_field_in_another_unit_gives_the_same_problem_and_the_factor_is_reported(
+    path: str, what: str, factor: float
+) -> None:
     found = diagnose(scaled(drive(path), what, factor))
     assert not found.units.doubt
     ours = [finding for finding in findings_of(found) if finding.code in UNIT_CODES]
@@ -113,7 +115,7 @@ def test_stamps_of_a_clock_since_1970_show_their_unit(tmp_path: Path, unit: Time
     assert data.documented(data.read(file)).findings == (finding,)
 
 
-def test_a_unit_that_is_given_is_not_judged(tmp_path: Path) -> None:
+def test_a_user_specified_unit_is_not_diagnosed(tmp_path: Path) -> None:
     slow = written(tmp_path, time_stamps=drive().t[None, :] * 1e3)
     assert codes(diagnose(data.read(slow, time_unit=TimeUnit.MS))).isdisjoint(UNIT_CODES)
     as_given = known_units(data.read(slow, time_unit=TimeUnit.S))

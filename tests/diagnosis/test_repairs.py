@@ -58,14 +58,14 @@ def file_with(tmp_path: Path, text: str) -> Path:
         ('sigma.pixel = "as-recorded"', "sigma.pixel", "a number from"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_key_path(tmp_path: Path, text: str, place: str, said: str) -> None:
+def test_an_invalid_setting_is_refused_with_its_key_path(tmp_path: Path, text: str, place: str, said: str) -> None:
     with pytest.raises(InputError) as raised:
         read_repairs(file_with(tmp_path, text))
     assert f"repairs.toml: {place}" in str(raised.value)
     assert said in str(raised.value)
 
 
-def test_what_is_set_by_hand_is_what_the_problem_has() -> None:
+def test_the_problem_has_the_user_specified_repairs() -> None:
     found = faulty()
     repairs = Repairs(
         angular_axes="-y,x,z",
@@ -125,7 +125,7 @@ def test_the_bias_is_found_for_the_axes_that_are_given() -> None:
     assert right.shift == found.shift
 
 
-def test_nothing_by_hand_changes_nothing() -> None:
+def test_empty_user_specified_repairs_change_nothing() -> None:
     assert with_overrides(faulty(), Repairs()) is faulty()
 
 
@@ -134,7 +134,7 @@ def test_a_shift_beyond_the_recording_is_refused() -> None:
         with_overrides(faulty(), Repairs(time_offset_s=15.0))
 
 
-def test_what_the_diagnosis_writes_poses_the_problem_that_it_would_pose_itself(tmp_path: Path) -> None:
+def test_the_written_repairs_give_the_problem_of_the_diagnosis(tmp_path: Path) -> None:
     found = faulty()
     repairs = read_repairs(file_with(tmp_path, repairs_text(found)))
     by_hand, by_itself = (calibrated(found.sequence, diagnosis=found, repairs=r) for r in (repairs, None))
@@ -145,7 +145,7 @@ def test_what_the_diagnosis_writes_poses_the_problem_that_it_would_pose_itself(t
     assert by_hand.pixel_variance == pytest.approx(by_itself.pixel_variance, rel=1e-4)
 
 
-def test_the_mask_by_hand_is_the_mask() -> None:
+def test_a_user_specified_mask_is_the_mask() -> None:
     found = faulty()
     loose = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskOverrides(prediction_gate=1000.0)))
     whole = calibrated(found.sequence, diagnosis=found, repairs=Repairs(mask=MaskOverrides(split_tracks=False)))
@@ -160,7 +160,7 @@ def test_the_mask_by_hand_is_the_mask() -> None:
     assert np.bincount(strict.observations().landmark)[strict.features].min() >= 6
 
 
-def test_a_recording_that_tells_nothing_takes_what_is_given() -> None:
+def test_a_recording_that_determines_nothing_takes_the_given_values() -> None:
     blind = simulate(Simulation(duration=5.0, blackouts=((0.3, 4.9),)))
     found = diagnose(blind)
     assert found.cannot_tell

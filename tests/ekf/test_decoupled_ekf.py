@@ -55,7 +55,7 @@ def assert_covariances(estimate: Estimate) -> None:
 
 
 @pytest.mark.parametrize("depth", [1e-5, -1e-5, 1e-9])
-def test_a_landmark_at_the_camera_plane_is_told_and_the_run_goes_on(depth: float) -> None:
+def test_a_landmark_in_the_camera_plane_is_reported_and_the_run_continues(depth: float) -> None:
     problem, frame = at_camera_plane(depth)
     estimate = ekf.ekf(problem)
     assert estimate.status is Status.RECOVERED
@@ -74,7 +74,7 @@ def test_the_same_landmark_farther_away_is_no_event() -> None:
     assert estimate.events == ()
 
 
-def test_a_landmark_exactly_in_the_camera_plane_fails_with_its_frame_and_keeps_what_came_before() -> None:
+def test_a_landmark_in_the_camera_plane_fails_with_its_frame_and_earlier_poses_are_kept() -> None:
     frame = 4
     sequence = Scene(velocity=(0.0,) * 6, sigma_velocity=(0.0, 0.0)).sequence()
     sequence = replace(
@@ -139,7 +139,7 @@ def test_on_clean_data_the_filter_is_nearer_to_the_truth_than_dead_reckoning() -
 
 
 @given(st.integers(0, 10_000))
-def test_a_landmark_without_prior_starts_where_it_is_first_seen_with_what_that_sight_tells(seed: int) -> None:
+def test_a_landmark_without_prior_is_initialized_by_its_first_observation_and_its_covariance(seed: int) -> None:
     problem = plain_problem(Scene(frames=2, n_points=5, seed=seed).sequence())
     pose = se3.exp(np.random.default_rng(seed).normal(size=6))
     pixel = problem.sequence.observations.pixel[:5]
@@ -158,7 +158,7 @@ def test_a_landmark_without_prior_starts_where_it_is_first_seen_with_what_that_s
     np.testing.assert_allclose(np.swapaxes(R, 1, 2) @ R, information, rtol=1e-9, atol=1e-9 * information.max())
 
 
-def test_a_mapped_landmark_is_where_its_sights_meet() -> None:
+def test_a_mapped_landmark_is_where_its_rays_intersect() -> None:
     sequence = Scene(sigma_pixel=0.0, sigma_velocity=(0.0, 0.0)).sequence()
     problem = plain_problem(sequence)
     blocks, _ = map_landmarks(problem, dead_reckoned_path(problem.increment))
@@ -177,7 +177,7 @@ def test_the_landmarks_of_dead_reckoning_are_the_average_back_projections() -> N
     np.testing.assert_allclose(landmarks.position, expected, rtol=1e-12, atol=1e-12)
 
 
-def test_progress_is_told_after_every_frame_and_time_is_kept() -> None:
+def test_progress_is_reported_after_every_frame_and_the_time_is_measured() -> None:
     calls: list[tuple[int, int]] = []
     problem = matched(drive())
     for estimator in (ekf.ekf, ekf.landmark_mapping):
@@ -200,7 +200,7 @@ def test_a_problem_is_not_changed_by_solving_it() -> None:
     np.testing.assert_array_equal(ekf.ekf(problem).world_T_imu, first.world_T_imu)
 
 
-def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None:
+def test_the_lost_definiteness_of_the_printed_covariance_is_an_event_with_its_eigenvalue() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
     weight = np.ones(12)
     assert _standard_form_failure(1e-6 * np.eye(6), innovation, weight) == ""
@@ -210,7 +210,7 @@ def test_what_the_printed_covariance_loses_is_told_with_its_eigenvalue() -> None
     assert _standard_form_failure(np.zeros((6, 6)), innovation, weight).endswith("an eigenvalue of 0.0e+00")
 
 
-def test_a_singular_innovation_is_told_in_words_and_figures() -> None:
+def test_a_singular_innovation_is_an_event_with_condition_number_and_eigenvalue() -> None:
     problem, frame = at_camera_plane(1e-5)
     estimate = ekf.ekf(problem)
     assert re.fullmatch(

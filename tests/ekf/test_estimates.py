@@ -26,7 +26,7 @@ def problem() -> Problem:
 
 
 @pytest.mark.parametrize("name", OURS)
-def test_it_has_its_name_the_time_of_each_frame_and_tells_how_far_it_is(name: str, problem: Problem) -> None:
+def test_an_estimate_has_its_name_the_time_of_each_frame_and_reports_progress(name: str, problem: Problem) -> None:
     calls: list[tuple[int, int]] = []
     estimate = OURS[name](problem, lambda done, total: calls.append((done, total)))
     frames = problem.n_frames

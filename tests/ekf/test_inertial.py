@@ -105,7 +105,7 @@ def test_dead_reckoning_and_the_joint_filter_are_consistent(motion: str, solve: 
 
 
 @pytest.mark.parametrize("linearization", [Linearization.INVARIANT, Linearization.FIRST_ESTIMATE])
-def test_observations_say_nothing_of_position_and_heading(linearization: Linearization) -> None:
+def test_position_and_heading_are_unobservable(linearization: Linearization) -> None:
     problem, settings = inertial_problem(1, n_frames=25), JointSettings(linearization=linearization)
     sigma = 0.05
     known, unknown = (ekf.joint_ekf(p, settings=settings) for p in (problem, uncertain_world(problem, sigma)[0]))
@@ -185,7 +185,7 @@ def test_frames_without_observations_are_predicted() -> None:
         assert (np.diff(position[4:8]) > 0.0).all()
 
 
-def test_the_kernel_takes_part() -> None:
+def test_a_tighter_kernel_gives_a_larger_covariance() -> None:
     problem = inertial_problem(7, n_frames=10)
     loose, tight = (ekf.joint_ekf(replace(problem, kernel=HuberKernel(k))) for k in (50.0, 0.5))
     assert loose.covariance is not None

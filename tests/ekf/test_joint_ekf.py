@@ -46,7 +46,9 @@ def assert_covariances(covariances: FloatArray) -> None:
 
 
 @given(st.integers(0, 10_000), st.sampled_from(LandmarkRepresentation))
-def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: LandmarkRepresentation) -> None:
+def test_the_derivatives_of_an_observation_are_its_finite_differences(
+    seed: int, coordinates: LandmarkRepresentation
+) -> None:
     random = np.random.default_rng(seed)
     camera, T = SCENE.camera, random_pose(seed)
     rows = np.column_stack([random.uniform(100, 900, 4), random.uniform(50, 90, 4), random.uniform(50, 300, 4)])
@@ -71,7 +73,7 @@ def test_the_derivatives_of_a_sight_are_its_differences(seed: int, coordinates: 
 
 
 @given(st.integers(0, 10_000))
-def test_three_rows_say_what_four_say(seed: int) -> None:
+def test_three_rows_have_the_information_of_four(seed: int) -> None:
     # The gain on (uL, uR, (vL + vR) / 2) against that on (uL, vL, uR, vR), the textbook's way.
     random = np.random.default_rng(seed)
     n, size = 4, 6 + 3 * 5
@@ -96,7 +98,7 @@ def test_three_rows_say_what_four_say(seed: int) -> None:
     np.testing.assert_array_equal(updated, updated.T)
 
 
-def test_an_update_with_what_is_no_covariance_is_refused_and_changes_nothing() -> None:
+def test_an_update_with_an_indefinite_covariance_is_refused_and_changes_nothing() -> None:
     P = -np.eye(9)
     before = P.copy()
     H = StackedJacobian(np.array([0]), np.ones((1, 3, 6)), np.eye(3)[None])
@@ -107,7 +109,9 @@ def test_an_update_with_what_is_no_covariance_is_refused_and_changes_nothing() -
 
 
 @given(st.integers(0, 10_000), st.sampled_from(LandmarkRepresentation))
-def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: LandmarkRepresentation) -> None:
+def test_observations_are_invariant_to_a_rigid_motion_of_poses_and_landmarks(
+    seed: int, coordinates: LandmarkRepresentation
+) -> None:
     random = np.random.default_rng(seed)
     T = random_pose(seed)
     points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)])
@@ -125,7 +129,7 @@ def test_no_sight_tells_of_a_rigid_motion_of_everything(seed: int, coordinates: 
 
 
 @given(st.integers(0, 10_000))
-def test_world_points_come_out_of_their_charts_with_the_right_spread(seed: int) -> None:
+def test_converted_world_points_have_the_propagated_covariance(seed: int) -> None:
     random = np.random.default_rng(seed)
     C = random_pose(seed)
     points = np.column_stack([random.uniform(-5, 5, (6, 2)), random.uniform(5, 50, 6), np.ones(6)]) @ C.T
@@ -146,7 +150,9 @@ def test_world_points_come_out_of_their_charts_with_the_right_spread(seed: int) 
 
 
 @pytest.mark.parametrize("coordinates", LandmarkRepresentation)
-def test_a_landmark_without_prior_enters_as_with_a_prior_that_says_nothing(coordinates: LandmarkRepresentation) -> None:
+def test_initialization_without_prior_is_the_limit_of_an_uninformative_prior(
+    coordinates: LandmarkRepresentation,
+) -> None:
     o = SCENE.observations
     two = plain_problem(replace(SCENE, observations=o.select((o.frame < 2) & (o.landmark < 4))))
     plain = ekf.joint_ekf(two, settings=JointSettings(coordinates))
@@ -189,7 +195,7 @@ def test_where_the_world_has_its_origin_makes_no_difference(how: JointSettings) 
 
 
 @pytest.mark.parametrize("coordinates", LandmarkRepresentation)
-def test_doubt_about_where_the_world_is_moves_nothing_unless_linearized_by_the_textbook(
+def test_uncertainty_of_the_world_frame_moves_nothing_but_in_the_textbook_linearization(
     coordinates: LandmarkRepresentation,
 ) -> None:
     problem = replace(matched(drive("town", seconds=5.0, features_per_frame=20.0)), kernel=None)
@@ -258,7 +264,7 @@ def test_a_gate_rejects_wrong_matches_and_counts_them() -> None:
 
 
 @pytest.mark.parametrize("kernel", [HuberKernel(), None])
-def test_a_frame_of_garbage_costs_that_frame_and_not_the_filter(kernel: HuberKernel | None) -> None:
+def test_a_frame_of_wrong_matches_is_rejected_and_the_filter_recovers(kernel: HuberKernel | None) -> None:
     clean = replace(matched(drive("town", seconds=10.0, features_per_frame=40.0)), kernel=kernel)
     problem, _ = garbled(0.9, range(50, 51))
     problem = replace(problem, kernel=kernel)
@@ -275,7 +281,7 @@ def test_a_frame_of_garbage_costs_that_frame_and_not_the_filter(kernel: HuberKer
     assert np.abs(position_errors(believing, clean.sequence) - undisturbed).max() > 0.1
 
 
-def test_a_jump_of_everything_is_got_over_when_new_landmarks_come() -> None:
+def test_the_filter_recovers_from_a_jump_of_all_observations_by_new_landmarks() -> None:
     # A velocity that never was: all that is known disagrees until other landmarks take over.
     sequence = drive("town", seconds=10.0, features_per_frame=40.0)
     velocity = sequence.linear_velocity.copy()
@@ -299,7 +305,7 @@ def at_infinity(disparity: float) -> Sequence:
 
 
 @pytest.mark.parametrize("disparity", [0.0, -3.0])
-def test_landmarks_at_infinity_take_part_and_are_told(disparity: float) -> None:
+def test_landmarks_at_infinity_are_used_and_reported(disparity: float) -> None:
     estimate = ekf.joint_ekf_ungated(plain_problem(at_infinity(disparity)))
     assert estimate.status is Status.OK
     assert np.isfinite(estimate.world_T_imu).all()
@@ -313,7 +319,7 @@ def test_landmarks_at_infinity_take_part_and_are_told(disparity: float) -> None:
     assert np.isfinite(estimate.landmarks.position).all()
 
 
-def test_in_world_coordinates_nothing_enters_without_depth() -> None:
+def test_in_world_coordinates_landmarks_without_depth_are_deferred() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
     assert not estimate.used[SCENE.observations.landmark < 2].any()
     assert estimate.used[SCENE.observations.landmark >= 2].all()
@@ -322,7 +328,7 @@ def test_in_world_coordinates_nothing_enters_without_depth() -> None:
     assert estimate.status is Status.OK
 
 
-def test_what_was_never_a_covariance_is_told_with_its_frame() -> None:
+def test_a_covariance_that_was_never_definite_is_an_event_with_its_frame() -> None:
     problem = replace(plain_problem(SCENE), initial_covariance=-np.eye(6))
     estimate = ekf.joint_ekf(problem)
     assert estimate.status is Status.RECOVERED
@@ -331,7 +337,7 @@ def test_what_was_never_a_covariance_is_told_with_its_frame() -> None:
     assert estimate.events[0].frame == 1
 
 
-def test_what_is_not_finite_fails_with_its_frame() -> None:
+def test_a_state_that_is_not_finite_fails_with_its_frame() -> None:
     problem = plain_problem(SCENE)
     increment = problem.increment.copy()
     increment[4] = np.nan
@@ -360,7 +366,7 @@ def test_settings_that_cannot_be_are_named(wrong: dict[str, float]) -> None:
         JointSettings(**wrong)
 
 
-def test_masked_observations_take_no_part() -> None:
+def test_masked_observations_are_excluded() -> None:
     problem = plain_problem(SCENE)
     excluded = problem.excluded.copy()
     excluded[::3] = Excluded.PREDICTION
@@ -371,7 +377,7 @@ def test_masked_observations_take_no_part() -> None:
     np.testing.assert_array_equal(masked.used, excluded == Excluded.NO)
 
 
-def test_progress_is_told_after_every_frame_and_time_is_kept() -> None:
+def test_progress_is_reported_after_every_frame_and_the_time_is_measured() -> None:
     calls: list[tuple[int, int]] = []
     estimate = ekf.joint_ekf(matched(drive()), lambda done, total: calls.append((done, total)))
     assert calls == [(k + 1, 50) for k in range(50)]
@@ -425,7 +431,7 @@ def measured(kernel: HuberKernel | None) -> StereoMeasurement:
 @pytest.mark.parametrize(
     ("wild", "tame", "believed"), [(3, 3, True), (4, 3, False), (4, 0, True), (3, 2, False), (0, 6, True)]
 )
-def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
+def test_a_frame_is_rejected_where_more_than_half_of_five_or_more_observations_disagree(
     wild: int, tame: int, believed: bool
 ) -> None:
     verdict = gate_observations(np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None))
@@ -437,7 +443,7 @@ def test_a_frame_is_not_believed_where_more_than_half_of_five_or_more_disagree(
     assert always.full_weight
 
 
-def test_what_is_no_number_disagrees() -> None:
+def test_nan_residuals_reject_the_frame() -> None:
     assert gate_observations(np.full(5, np.nan), measured(None), JointSettings()).rejection is EventKind.FRAME_DISAGREES
 
 
@@ -456,7 +462,7 @@ def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
     assert not gated.full_weight
 
 
-def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it_cost() -> None:
+def test_a_covariance_that_becomes_indefinite_is_an_event_with_its_frame() -> None:
     problem = plain_problem(SCENE)
     noise = problem.increment_covariance.copy()
     noise[4] = -np.eye(6)
@@ -466,7 +472,7 @@ def test_a_covariance_that_is_lost_on_the_way_is_told_with_its_frame_and_what_it
     assert estimate.used[SCENE.observations.frame < 5].all()
 
 
-def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() -> None:
+def test_deferred_landmarks_are_counted_in_every_frame_and_reported_at_their_last() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
     said = (f"2 of {2 if k else 12} observations take no part" for k in range(10))
     put_off = [data.Event(k, EventKind.INITIALIZATION_DEFERRED, text) for k, text in enumerate(said)]
@@ -474,7 +480,7 @@ def test_what_does_not_enter_is_counted_in_every_frame_and_told_at_its_last() ->
     assert list(estimate.events) == [*put_off, *never]
 
 
-def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
+def test_a_negative_variance_is_reported_in_every_frame_that_has_one() -> None:
     estimate = ekf.joint_ekf(replace(plain_problem(SCENE), initial_covariance=-np.eye(6)))
     said = "P - W^T W has a negative variance after the update"
     assert list(estimate.events) == [data.Event(k, EventKind.COVARIANCE_LOST, said) for k in range(1, 10)]
@@ -483,7 +489,7 @@ def test_a_negative_variance_is_told_in_every_frame_that_has_one() -> None:
     )
 
 
-def test_troubles_of_several_kinds_are_told_one_after_another() -> None:
+def test_events_of_several_kinds_are_reported_in_turn() -> None:
     problem, _ = garbled(0.9, range(50, 51))
     estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=10))
     full = [event for event in estimate.events if event.kind == "state full"]

@@ -143,7 +143,7 @@ def test_poses_and_landmarks_are_those_of_the_filter_that_keeps_everything(
     same_as_dense(problem, estimate, DenseJointFilter(problem, coordinates, linearization).run())
 
 
-def test_a_landmark_that_comes_back_after_it_was_marginalized_is_a_new_one() -> None:
+def test_a_landmark_observed_again_after_marginalization_is_a_new_one() -> None:
     problem = PROBLEMS["returning"]
     o = problem.observations()
     order = np.lexsort((o.frame, o.landmark))
@@ -165,7 +165,7 @@ def test_a_landmark_that_comes_back_after_it_was_marginalized_is_a_new_one() -> 
     np.testing.assert_allclose(ours.covariance, expected.covariance, rtol=1e-6, atol=1e-12)
 
 
-def test_a_landmark_that_comes_back_does_not_use_its_prior_twice() -> None:
+def test_a_landmark_that_is_observed_again_uses_its_prior_once() -> None:
     """One observation of a landmark, a frame without it, and one more: its estimate is the second observation's."""
     problem = PROBLEMS["returning, prior"]
     o = problem.observations()

@@ -23,7 +23,7 @@ BIAS = (0.012, -0.02, 0.015)
 SEEDS = 8
 
 
-def test_a_wrong_bias_turns_the_motion_as_the_transition_says() -> None:
+def test_the_effect_of_a_wrong_bias_is_that_of_the_transition() -> None:
     prior, dt, step = GyroBiasPrior(deviation=0.03, walk=0.02), 0.25, 1e-6
     twist = np.array([0.8, -0.2, 0.1, 0.3, -0.5, 0.4])
     transition, noise = np.diag(np.arange(1.0, 7.0)), np.diag(np.arange(2.0, 8.0))
@@ -68,7 +68,7 @@ def test_the_right_jacobian_is_the_difference_of_motions(seed: int, angle: float
 
 @pytest.mark.parametrize("path", ["town", "handheld"])
 @pytest.mark.parametrize("linearization", [Linearization.INVARIANT, Linearization.FIRST_ESTIMATE])
-def test_a_constant_bias_is_found_to_within_what_the_filter_says(path: PathName, linearization: Linearization) -> None:
+def test_a_constant_bias_is_estimated_within_the_filters_sigma(path: PathName, linearization: Linearization) -> None:
     settings = JointSettings(linearization=linearization, gyro_bias=GyroBiasPrior())
     of_pose, of_bias = [], []
     for seed in range(SEEDS):
@@ -88,7 +88,7 @@ def test_a_constant_bias_is_found_to_within_what_the_filter_says(path: PathName,
         assert np.all((low < mean) & (mean < high))
 
 
-def test_a_bias_that_is_not_asked_for_bends_the_path_and_one_that_is_does_not() -> None:
+def test_a_gyroscope_bias_bends_the_path_unless_it_is_estimated() -> None:
     # A good gyroscope and few features: what it reads counts.
     noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.005)
     squares = []
@@ -106,7 +106,7 @@ def test_a_bias_that_is_not_asked_for_bends_the_path_and_one_that_is_does_not() 
     assert straight < 0.4 * bent
 
 
-def test_the_last_word_on_the_bias_is_an_event_in_words() -> None:
+def test_the_final_bias_estimate_is_an_event() -> None:
     estimate = ekf.joint_ekf_bias(matched(biased("town", 1, 5.0)))
     (event,) = (event for event in estimate.events if event.kind == "gyroscope bias")
     assert estimate.gyro_bias is not None
@@ -115,7 +115,7 @@ def test_the_last_word_on_the_bias_is_an_event_in_words() -> None:
     assert estimate.status == "ok"
 
 
-def test_a_bias_known_to_be_nothing_changes_nothing() -> None:
+def test_a_bias_prior_of_zero_variance_leaves_the_estimate_unchanged() -> None:
     problem = plain_problem(Scene().sequence())
     sure = ekf.joint_ekf(problem, settings=JointSettings(gyro_bias=GyroBiasPrior(1e-9, 0.0)))
     without = ekf.joint_ekf(problem)
@@ -125,7 +125,7 @@ def test_a_bias_known_to_be_nothing_changes_nothing() -> None:
     np.testing.assert_allclose(sure.covariance, without.covariance, rtol=1e-6, atol=1e-12)
 
 
-def test_a_path_that_is_not_finite_from_the_first_frame_on_tells_no_bias() -> None:
+def test_a_path_without_a_finite_pose_determines_no_bias() -> None:
     problem = replace(plain_problem(Scene().sequence()), initial_pose=np.full((4, 4), np.nan))
     estimate = ekf.joint_ekf_bias(problem)
     assert estimate.status == "failed"
@@ -155,7 +155,7 @@ def test_other_settings_of_the_joint_filter_have_names(name: str) -> None:
     np.testing.assert_array_equal(estimate.world_T_imu, expected.world_T_imu)
 
 
-def test_the_bias_is_told_with_its_deviation_on_each_axis() -> None:
+def test_the_bias_is_an_event_with_its_sigma_on_each_axis() -> None:
     estimate = ekf.joint_ekf_bias(matched(biased("town", 1, 5.0)))
     assert estimate.gyro_bias is not None
     deviation = np.sqrt(np.diagonal(estimate.gyro_bias.covariance[-1]))

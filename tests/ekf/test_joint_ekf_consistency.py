@@ -39,7 +39,7 @@ def mean_nees(path: PathName, way: str) -> FloatArray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["town", "handheld"])
-def test_the_filter_knows_its_error_and_the_textbook_believes_too_much(path: PathName) -> None:
+def test_the_invariant_filter_is_consistent_and_the_textbook_one_overconfident(path: PathName) -> None:
     print(f"\n{path:38s}" + "".join(f"{f'frame {k}':>11s}" for k in FRAMES) + f"{'all':>11s}")
     for way in (
         "inverse-depth, invariant",
@@ -60,7 +60,7 @@ def test_the_filter_knows_its_error_and_the_textbook_believes_too_much(path: Pat
     assert np.nanmean(first_estimate) < np.nanmean(mean_nees(path, "inverse-depth, textbook"))
 
 
-def test_every_way_agrees_on_what_is_nearly_linear() -> None:
+def test_all_linearizations_agree_in_a_nearly_linear_problem() -> None:
     # With a fiftieth of the noise the updates are small, and all ways of linearizing say the same.
     sequence = simulate(
         Simulation(

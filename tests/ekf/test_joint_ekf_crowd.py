@@ -45,7 +45,7 @@ def most_at_once(problem: Problem) -> int:
 
 
 @pytest.mark.parametrize("cap", [60, CAP])
-def test_a_crowd_ends_and_leaves_a_covariance_that_is_honest(cap: int) -> None:
+def test_many_landmarks_at_once_leave_a_consistent_covariance(cap: int) -> None:
     sequence = crowd()
     problem = matched(sequence)
     estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=cap))
@@ -70,7 +70,7 @@ def test_a_crowd_ends_and_leaves_a_covariance_that_is_honest(cap: int) -> None:
     assert never == set(np.setdiff1d(o.landmark, o.landmark[used]).tolist())
 
 
-def test_a_recording_below_the_cap_is_what_it_was_to_the_bit() -> None:
+def test_a_recording_below_the_cap_is_unchanged_to_the_bit() -> None:
     problem = matched(drive("town", seconds=6.0, features_per_frame=40.0, wrong=0.05))
     most = most_at_once(problem)
     assert most < CAP
@@ -92,7 +92,7 @@ def test_landmarks_without_an_observation_give_their_places_to_those_with_one() 
     assert not turned_away(ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=observed)))
 
 
-def test_who_waits_outside_comes_in_when_others_have_left() -> None:
+def test_deferred_landmarks_are_initialized_when_others_are_marginalized() -> None:
     sequence = drive("town", seconds=6.0, features_per_frame=40.0)
     problem = matched(sequence)
     estimate = ekf.joint_ekf(problem, settings=JointSettings(max_landmarks=15))
@@ -109,7 +109,7 @@ def test_who_waits_outside_comes_in_when_others_have_left() -> None:
     assert sigmas(estimate, sequence) < 1.5
 
 
-def test_landmarks_with_a_prior_wait_too() -> None:
+def test_landmarks_with_a_prior_are_deferred_too() -> None:
     scene = Scene().sequence()
     assert scene.truth is not None
     assert scene.truth.landmarks is not None
@@ -129,9 +129,7 @@ def sights(random: np.random.Generator, n: int) -> FloatArray:
 
 
 @given(st.integers(0, 10_000), st.integers(0, 300), st.integers(0, 100), st.integers(-3, 320))
-def test_no_more_enter_than_there_are_places_and_no_place_stays_empty(
-    seed: int, n: int, inside: int, places: int
-) -> None:
+def test_the_state_is_filled_to_its_capacity_and_no_further(seed: int, n: int, inside: int, places: int) -> None:
     random = np.random.default_rng(seed)
     selected = select_features(sights(random, n), sights(random, inside), places)
     assert np.count_nonzero(selected) == min(n, max(places, 0))

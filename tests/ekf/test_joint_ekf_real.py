@@ -89,7 +89,7 @@ def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_text
     assert ours < 0.8 * reckoned
 
 
-def test_landmarks_that_come_back_are_the_same_landmarks(recordings: Recordings) -> None:
+def test_landmarks_observed_again_keep_their_identity(recordings: Recordings) -> None:
     problem = diagnosis.calibrated(data.read(recordings("utias/dataset3.mat")))
     problem = replace(problem, pixel_variance=40.0)  # about what the recording comes with
     o = problem.observations()

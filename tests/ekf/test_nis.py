@@ -39,7 +39,7 @@ def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
     assert decoupled_nis(innovation, sigma) == pytest.approx(nu @ np.linalg.solve(S, nu), rel=1e-9)
 
 
-def test_what_is_no_covariance_has_no_norm() -> None:
+def test_a_covariance_that_is_not_finite_has_no_nis() -> None:
     innovation = first_innovation(Scene().sequence(), np.eye(4))
     assert np.isnan(decoupled_nis(innovation, np.full((6, 6), np.nan)))
 
@@ -60,7 +60,7 @@ def test_the_joint_filter_s_innovations_are_chi_square_only_with_the_true_noise(
 
 
 @pytest.mark.parametrize("estimator", [ekf, joint_ekf])
-def test_a_kernel_hides_no_innovation(estimator: object) -> None:
+def test_the_nis_is_taken_before_the_robust_kernel(estimator: object) -> None:
     assert callable(estimator)
     problem = plain_problem(Scene(frames=3).sequence())
     plain, robust = (estimator(replace(problem, kernel=k)).innovations for k in (None, HuberKernel(1e-3)))

@@ -69,7 +69,7 @@ def test_the_posterior_is_that_of_the_printed_gain(seed: int) -> None:
 
 
 @given(SEEDS, st.floats(-3.0, 20.0), st.floats(-12.0, 6.0), st.integers(1, 12))
-def test_a_posterior_is_positive_and_no_worse_than_the_prior_however_awful_the_jacobian(
+def test_a_posterior_covariance_is_positive_and_below_the_prior_for_any_jacobian(
     seed: int, log_jacobian: float, log_sigma: float, n: int
 ) -> None:
     random = np.random.default_rng(seed)
@@ -91,7 +91,7 @@ def test_a_posterior_is_positive_and_no_worse_than_the_prior_however_awful_the_j
     np.linalg.cholesky(still.covariance(S))
 
 
-def test_one_point_at_the_camera_plane_does_not_hide_what_the_others_say() -> None:
+def test_an_observation_in_the_camera_plane_does_not_dominate_the_pose_update() -> None:
     random = np.random.default_rng(4)
     innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(random))
     sigma = covariance_of(random, 0.01)
@@ -139,7 +139,7 @@ def test_observations_of_no_weight_change_nothing(seed: int) -> None:
     np.testing.assert_array_equal(posterior.correction, 0.0)
 
 
-def test_a_covariance_that_is_none_is_refused() -> None:
+def test_an_indefinite_covariance_is_refused() -> None:
     innovation = pose_innovation(PRINTED, CAM_T_IMU, *sight(np.random.default_rng(0)))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         pose_posterior(np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -1e-3]), innovation, np.ones(8))

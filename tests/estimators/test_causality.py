@@ -124,14 +124,12 @@ PROBLEMS = {path: with_gaps(path, seed) for seed, path in enumerate(("town", "ha
     ends=st.sampled_from([0.0, 0.5, 1.0]),
     moved=st.sampled_from([0.0, 1.0, 100.0]),
 )
-def test_what_is_reported_up_to_a_frame_does_not_depend_on_what_comes_after_it(
-    name: str, path: str, k: int, seed: int, ends: float, moved: float
-) -> None:
+def test_online_estimates_are_causal(name: str, path: str, k: int, seed: int, ends: float, moved: float) -> None:
     problem = PROBLEMS[path]
     assert_same_until(k, FILTERS[name], problem, other_future(problem, k, seed, ends, moved))
 
 
-def test_the_tree_is_exchanged_without_knowing_which_landmarks_come_back() -> None:
+def test_the_tree_is_exchanged_causally() -> None:
     problem = matched(drive(seconds=12.0, features_per_frame=15.0))
     assert_same_until(100, FILTERS["isam2-online, short trees"], problem, other_future(problem, 100, 0, 0.5, 1.0))
 

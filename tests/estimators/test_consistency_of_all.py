@@ -49,7 +49,7 @@ ESTIMATORS: dict[str, Callable[[int], Estimate]] = {
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_the_mean_nees_of_the_pose_is_that_of_an_estimator_that_knows_its_errors(name: str) -> None:
+def test_the_mean_nees_of_the_pose_is_that_of_a_consistent_estimator(name: str) -> None:
     table = compare.anees((ESTIMATORS[name](seed), truth(seed)) for seed in range(SEEDS))
     assert (table.loc[FRAMES, "runs"] == SEEDS).all()
     mean = table.loc[FRAMES, "anees"]
@@ -58,7 +58,7 @@ def test_the_mean_nees_of_the_pose_is_that_of_an_estimator_that_knows_its_errors
     assert 4.5 < table.loc[1:, "anees"].mean() < 8.0
 
 
-def test_an_estimator_that_is_told_half_the_noise_is_found_out() -> None:
+def test_an_estimator_with_half_the_noise_is_overconfident() -> None:
     runs = []
     for seed in range(SEEDS):
         problem = true_noise_problem(seed)

@@ -36,7 +36,7 @@ def promised(recording: Hostile, estimator: str) -> Cell:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BY_NAME)
-def test_every_estimator_admits_its_errors_or_fails_with_a_reason_and_the_tables_come_out(name: str) -> None:
+def test_every_estimator_is_consistent_or_fails_with_a_reason_and_the_tables_are_written(name: str) -> None:
     recording, run = BY_NAME[name], solved(BY_NAME[name])
     assert {e: cell(result) for e, result in run.results.items()} == {e: promised(recording, e) for e in ESTIMATORS}
     for result in run.results.values():
@@ -51,7 +51,7 @@ def test_every_estimator_admits_its_errors_or_fails_with_a_reason_and_the_tables
 
 
 @pytest.mark.parametrize("name", BY_NAME)
-def test_it_is_diagnosed_without_a_word_of_python(name: str) -> None:
+def test_a_hostile_recording_is_diagnosed_without_an_exception_text(name: str) -> None:
     diagnosis = diagnose(BY_NAME[name].make())
     tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
@@ -61,7 +61,7 @@ def test_it_is_diagnosed_without_a_word_of_python(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_recording_is_refused_by_field_and_frame(tmp_path: Path, name: str) -> None:
+def test_an_invalid_recording_is_refused_by_field_and_frame(tmp_path: Path, name: str) -> None:
     make, sentence = REFUSED[name]
     np.savez(tmp_path / "a.npz", **make())
     with pytest.raises(InputError, match=sentence):
@@ -69,7 +69,7 @@ def test_what_is_no_recording_is_refused_by_field_and_frame(tmp_path: Path, name
 
 
 @pytest.mark.parametrize("name", ["zero and negative disparities only", "one velocity sample of 500 m/s"])
-def test_the_report_is_written_by_the_command_and_diagnose_ends_well(tmp_path: Path, name: str) -> None:
+def test_the_report_is_written_and_diagnose_exits_zero(tmp_path: Path, name: str) -> None:
     data.write_npz(BY_NAME[name].make(), tmp_path / "drive.npz")
     estimators = "dead-reckoning,joint-ekf,isam2"
     run = fgbaseline("run", "drive.npz", "--out", "out", "--estimators", estimators, cwd=tmp_path, drawing=False)
@@ -83,7 +83,7 @@ def test_the_report_is_written_by_the_command_and_diagnose_ends_well(tmp_path: P
     assert read_repairs(tmp_path / "repairs.toml")
 
 
-def test_a_cut_cannot_be_seen_but_that_it_may_be_there_is_said() -> None:
+def test_a_possible_cut_of_the_recording_is_reported() -> None:
     sequence = cut()
     diagnosis = diagnose(sequence)
     (finding,) = [f for f in findings_of(diagnosis, track_statistics(diagnosis)) if f.code == "cuts"]
@@ -94,7 +94,7 @@ def test_a_cut_cannot_be_seen_but_that_it_may_be_there_is_said() -> None:
     assert not any(f.code == "cuts" for f in calibrated(base()).findings)
 
 
-def test_the_recordings_are_what_they_are_said_to_be() -> None:
+def test_the_recordings_match_their_description() -> None:
     truth = cut().truth
     assert truth is not None
     step = np.linalg.norm(np.diff(truth.world_T_imu[:, :3, 3], axis=0), axis=1)

@@ -41,7 +41,7 @@ def test_isam2_errs_a_fifth_as_much_as_dead_reckoning_on_noisy_velocities(record
 
 
 @pytest.mark.slow
-def test_isam2_explains_03_and_ends_at_the_height_it_began(recordings: Recordings) -> None:
+def test_isam2_fits_03_and_ends_at_its_initial_height(recordings: Recordings) -> None:
     sequence = read(recordings("03.npz"))
     far = disparity(sequence.observations.pixel) > 1.0
     assert far.sum() == 64945

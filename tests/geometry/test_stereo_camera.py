@@ -42,7 +42,7 @@ def test_depth_comes_from_the_disparity_and_height_from_the_left_image() -> None
     assert disparity(pixel) == 10.0
 
 
-def test_a_disparity_of_zero_has_no_point_and_a_negative_one_lies_behind() -> None:
+def test_zero_disparity_has_no_point_and_negative_disparity_violates_cheirality() -> None:
     assert not np.isfinite(CAMERA.triangulate([700.0, 300.0, 700.0, 300.0])).any()
     assert CAMERA.triangulate([700.0, 300.0, 710.0, 300.0])[2] < 0.0
 

@@ -154,6 +154,18 @@ def test_world_axes_turn_the_velocity_only(seed: int) -> None:
     np.testing.assert_allclose(Q, after_R @ motion.noise @ after_R.T, atol=1e-20)
 
 
+@given(SEEDS)
+def test_rotating_the_velocity_of_a_stack_rotates_each_and_the_inverse_rotation_undoes_it(seed: int) -> None:
+    P = np.array([random(seed + i).motion().noise for i in range(3)])
+    R = se3.exp(np.random.default_rng(seed).normal(size=(3, 6)))[:, :3, :3]
+    rotated = strapdown.rotated_velocity(P, R, R)
+    each = [strapdown.rotated_velocity(p, r, r) for p, r in zip(P, R, strict=True)]
+    tolerance = 1e-14 * np.abs(P).max()
+    np.testing.assert_allclose(rotated, each, rtol=0.0, atol=tolerance)
+    back = np.swapaxes(R, 1, 2)
+    np.testing.assert_allclose(strapdown.rotated_velocity(rotated, back, back), P, rtol=0.0, atol=tolerance)
+
+
 def preintegrated(samples: Samples) -> gtsam.PreintegratedCombinedMeasurements:
     """GTSAM's preintegration with the noise of ours and no error of integration."""
     params = gtsam.PreintegrationCombinedParams.MakeSharedU(9.81)

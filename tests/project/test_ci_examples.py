@@ -79,7 +79,7 @@ def bash(command: str, repository: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_commands_run_in_their_order_and_tell_good_from_bad(repository: Path) -> None:
+def test_the_commands_run_in_their_order_and_separate_good_from_bad(repository: Path) -> None:
     page = (ROOT / "docs" / "ci.md").read_text()
     update = next(line for line in page.splitlines() if line.endswith("--update-baseline"))
     for step in (step for step in STEPS if "run" in step):

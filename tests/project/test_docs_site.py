@@ -87,7 +87,7 @@ def test_formulas_are_mathml_without_leftovers(site: Path) -> None:
             assert not re.search(r"\\|amp;|linebreak|merror", formula), formula
 
 
-def test_the_example_ran(site: Path) -> None:
+def test_the_example_of_the_site_runs(site: Path) -> None:
     text = (site / "examples" / "my-filter.html").read_text()
     assert text.count('class="dataframe"') == 1
     assert '<div class="figure"><svg' in text
@@ -96,7 +96,7 @@ def test_the_example_ran(site: Path) -> None:
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
-def test_from_a_folder_it_is_searched_and_asks_nobody(site: Path, width: int, scheme: str) -> None:
+def test_docs_opened_from_a_folder_are_searchable_offline(site: Path, width: int, scheme: str) -> None:
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     path = next((found for name in NAMES if name and (found := shutil.which(name))), None)
     if path is None:

@@ -26,7 +26,7 @@ def test_a_new_folder_appears_with_its_parents(tmp_path: Path) -> None:
     assert everything_in(tmp_path) == {"a", "a/b", "a/b/inner", f"a/b/{MARK}"}
 
 
-def test_nothing_is_seen_of_it_before_it_is_whole(tmp_path: Path) -> None:
+def test_a_folder_is_not_visible_before_it_is_complete(tmp_path: Path) -> None:
     with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
         (folder / MARK).write_text("half")
         assert not (tmp_path / "out").exists()
@@ -34,7 +34,9 @@ def test_nothing_is_seen_of_it_before_it_is_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, InputError])
 @pytest.mark.parametrize("place", ["out", "a/b/c"])
-def test_nothing_is_left_of_one_that_ended_badly(tmp_path: Path, error: type[BaseException], place: str) -> None:
+def test_nothing_is_left_of_a_folder_whose_writing_failed(
+    tmp_path: Path, error: type[BaseException], place: str
+) -> None:
     def fail() -> None:
         with atomic_folder(tmp_path / place, force=False, mark=MARK) as folder:
             (folder / "file").write_text("half")
@@ -56,7 +58,7 @@ def test_an_existing_folder_is_refused_and_replaced_with_force(tmp_path: Path) -
     assert (tmp_path / "out" / MARK).read_text() == "new"
 
 
-def test_a_folder_that_appears_after_the_last_look_is_not_replaced(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_folder_created_after_the_last_check_is_not_replaced(tmp_path: Path, monkeypatch: Any) -> None:
     def late(place: Path, **options: Any) -> None:
         require_free(place, **options)
         if list(tmp_path.glob(f".out.*/{MARK}")):  # the second look: the block has ended
@@ -98,7 +100,7 @@ def a_dangling_link(place: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [a_file, a_link_to_a_run, a_dangling_link])
-def test_what_is_no_folder_is_never_replaced(tmp_path: Path, make: Callable[[Path], None]) -> None:
+def test_a_file_or_link_is_never_replaced_by_a_folder(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / "out")
     before = everything_in(tmp_path)
     with pytest.raises(InputError, match="no folder"):
@@ -153,7 +155,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
     assert (tmp_path / "out" / MARK).read_text() == expected
 
 
-def test_a_folder_that_appeared_in_the_meantime_is_kept(tmp_path: Path) -> None:
+def test_a_folder_created_during_the_write_is_kept(tmp_path: Path) -> None:
     def overtaken() -> None:
         with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
             (folder / MARK).write_text("mine")

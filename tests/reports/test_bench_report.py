@@ -95,7 +95,7 @@ def test_a_process_that_dies_and_an_estimator_that_fails_are_rows_and_stop_nothi
     assert r"go\_by" in (tmp_path / "out" / "tables" / "table.tex").read_text()
 
 
-def test_a_recording_that_changes_under_way_is_no_run(tmp_path: Path) -> None:
+def test_a_recording_that_changes_during_the_run_is_refused(tmp_path: Path) -> None:
     drive = simulate(Simulation(duration=1.0, features_per_frame=5.0))
     write_npz(drive, tmp_path / "drive.npz")
     suite = 'name = "x"\nestimators = ["dead-reckoning"]\n[[sequence]]\nfiles = "drive.npz"\n'
@@ -194,7 +194,7 @@ def test_the_page_is_whole_escaped_and_leads_to_every_run(results: Results) -> N
         assert sentence in page.text
 
 
-def test_every_job_is_told_of_and_the_bars_move(results: Results, tmp_path: Path) -> None:
+def test_every_job_is_a_progress_event_and_the_bars_move(results: Results, tmp_path: Path) -> None:
     one: Planned = results.planned[0]
     with open_cache(tmp_path / "out", force=False) as cache:
         seen: list[ProgressEvent] = []
@@ -228,9 +228,9 @@ def test_events_are_the_last_of_each_worker_and_none_too_often(tmp_path: Path) -
     assert next(channel.events()).done == 50
 
 
-@pytest.mark.parametrize(("seconds", "told"), [(3.21, "3.2 s"), (250.0, "4.2 min"), (8000.0, "2.2 h")])
-def test_durations_are_read_at_a_glance(seconds: float, told: str) -> None:
-    assert duration(seconds) == told
+@pytest.mark.parametrize(("seconds", "text"), [(3.21, "3.2 s"), (250.0, "4.2 min"), (8000.0, "2.2 h")])
+def test_durations_have_two_digits_and_the_largest_unit(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
 
 
 def test_ranks_over_cases_count_every_case_once(results: Results) -> None:

@@ -85,7 +85,7 @@ def test_force_runs_all_anew_and_one_process_gives_the_same_tables(place: Path, 
 
 
 @pytest.mark.slow
-def test_an_interrupt_keeps_what_is_done_and_leaves_nothing_half_done(place: Path, undisturbed: Path) -> None:
+def test_an_interrupt_keeps_complete_results_and_leaves_no_partial_ones(place: Path, undisturbed: Path) -> None:
     process = started("bench", "suite.toml", "--out", "interrupted", "--workers", "1", cwd=place)
     assert process.stderr is not None
     assert process.stderr.readline().startswith(f"1 of {N_RUNS}, about ")
@@ -147,7 +147,7 @@ def test_check_holds_every_run_to_limits(place: Path, undisturbed: Path) -> None
     assert "all 4 limits hold" in result.stdout.lower()
 
 
-def test_no_table_knows_time_or_place(undisturbed: Path) -> None:
+def test_tables_do_not_depend_on_time_or_place(undisturbed: Path) -> None:
     document = json.loads((undisturbed / "summary.json").read_text())
     assert document["schema"] == "fgbaseline/bench/1"
     text = b"".join(tables_of(undisturbed).values())
@@ -155,7 +155,7 @@ def test_no_table_knows_time_or_place(undisturbed: Path) -> None:
         assert word not in text
 
 
-def test_a_folder_of_somebody_elses_is_left_alone(place: Path) -> None:
+def test_a_folder_without_the_mark_is_left_unchanged(place: Path) -> None:
     (place / "letters").mkdir(exist_ok=True)
     (place / "letters" / "dear.txt").write_text("diary")
     result = fgbaseline("bench", "suite.toml", "--out", "letters", "--force", cwd=place)
@@ -164,7 +164,7 @@ def test_a_folder_of_somebody_elses_is_left_alone(place: Path) -> None:
     assert [path.name for path in (place / "letters").iterdir()] == ["dear.txt"]
 
 
-def test_a_cluster_that_is_not_there_is_told_in_a_sentence(place: Path) -> None:
+def test_a_missing_cluster_is_reported_in_one_sentence(place: Path) -> None:
     pytest.importorskip("distributed")
     result = fgbaseline("bench", "suite.toml", "--out", "nowhere", "--scheduler", "tcp://127.0.0.1:9", cwd=place)
     assert result.returncode == 2

@@ -71,7 +71,7 @@ def drive(tmp_path: Path) -> Path:
         ('name = "a/b"\n' + DRIVE, "name", "no slashes"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_key_path(drive: Path, text: str, place: str, said: str) -> None:
+def test_an_invalid_setting_is_refused_with_its_key_path(drive: Path, text: str, place: str, said: str) -> None:
     with pytest.raises(InputError) as error:
         planned(drive.parent, text)
     assert f"suite.toml: {place}" in str(error.value)
@@ -106,7 +106,7 @@ def test_every_combination_is_a_job_with_a_name_of_its_own(tmp_path: Path) -> No
     assert [job.case for job in jobs[:2]] == ["town"] * 2
 
 
-def test_a_preset_is_not_multiplied_by_settings_it_has_no_use_for(tmp_path: Path) -> None:
+def test_a_preset_is_not_multiplied_by_settings_that_it_does_not_use(tmp_path: Path) -> None:
     sweep = (
         '[sweep]\npreset = ["calibrated", "documented"]\nnoise = ["estimated", { pixel = 1.0 }]\n'
         'landmarks = ["in-turn", "held"]\nfeatures = [20, "all"]\n'
@@ -121,7 +121,7 @@ def test_ranges_go_from_end_to_end(tmp_path: Path) -> None:
     assert [job.name.partition("=")[2] for job in planned(tmp_path, text)] == ["0.5", "1", "1.5", "2"]
 
 
-def test_a_job_is_known_by_content_and_not_by_where_files_lie(drive: Path) -> None:
+def test_a_job_is_identified_by_content_and_not_by_paths(drive: Path) -> None:
     here = planned(drive.parent, 'name = "x"\n' + FILE)[0].job
     elsewhere = drive.parent / "elsewhere"
     elsewhere.mkdir()

@@ -91,7 +91,7 @@ def value_of(comparison: ComparisonReport, metric: str, row: int = 0) -> float:
 
 
 @pytest.mark.parametrize("case", RIGHT)
-def test_a_situation_gives_what_other_tools_find(recordings: Recordings, case: str) -> None:
+def test_a_situation_gives_the_values_of_other_tools(recordings: Recordings, case: str) -> None:
     files, options, right = RIGHT[case]
     result = compared(recordings, f"cases/{case.partition(',')[0]}", files, options)
     for metric, value in right.items():
@@ -99,14 +99,14 @@ def test_a_situation_gives_what_other_tools_find(recordings: Recordings, case: s
 
 
 @pytest.mark.parametrize("case", SAID)
-def test_what_was_recognized_is_said(recordings: Recordings, case: str) -> None:
+def test_detected_conventions_are_reported(recordings: Recordings, case: str) -> None:
     files, sentence = SAID[case]
     result = compared(recordings, f"cases/{case.partition(',')[0]}", files, {})
     assert any(sentence in said for said in result.verdict), result.verdict
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_compared_is_refused_by_its_cause(recordings: Recordings, case: str) -> None:
+def test_incomparable_trajectories_are_refused_with_the_cause(recordings: Recordings, case: str) -> None:
     files, sentence = REFUSED[case]
     with pytest.raises(InputError, match=sentence):
         compared(recordings, f"cases/{case}", files, {})

@@ -54,7 +54,7 @@ def test_the_command_exits_with_what_it_found(document: Any, code: int, tmp_path
         assert result.stdout.startswith("The reference, isam2, is untrusted: it | lost <it>.")
 
 
-def test_a_row_says_value_bound_margin_and_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_row_has_value_bound_margin_and_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, BAD, LIMITS, GOOD)
     assert held(tmp_path) == 1
     rows = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
@@ -66,7 +66,7 @@ def test_a_row_says_value_bound_margin_and_change(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("document", [GOOD, BAD, UNTRUSTED])
-def test_the_junit_file_says_the_same_to_another_reader(document: Any, tmp_path: Path) -> None:
+def test_the_junit_file_reads_the_same_in_another_parser(document: Any, tmp_path: Path) -> None:
     write(tmp_path, document, LIMITS, GOOD)
     code = held(tmp_path)
     lines = json.loads((tmp_path / "check.json").read_text())["lines"]
@@ -149,7 +149,7 @@ def test_the_json_file_has_every_number_in_full(tmp_path: Path) -> None:
         (UNTRUSTED, "The limit holds, but the reference is not trusted enough"),
     ],
 )
-def test_a_reference_that_is_not_trusted_keeps_good_figures_from_counting(
+def test_a_reference_that_is_not_trusted_keeps_metrics_within_limits_from_holding(
     document: Any, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path, document, '[[limit]]\nmetric = "ate.rmse"\nestimators = "ekf"\nat_most = 0.5\n')
@@ -216,7 +216,7 @@ def test_a_new_baseline_holds_the_guarded_figures_sorted_and_rounded(tmp_path: P
     assert (tmp_path / "baseline.json").read_text() == TEXT
 
 
-def test_a_baseline_is_not_updated_where_a_limit_falls_short_unless_told(
+def test_a_baseline_is_updated_where_a_limit_falls_short_only_on_request(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path, THIRD, LIMITS)
@@ -288,10 +288,10 @@ def test_bad_input_is_one_sentence(
     monkeypatch.setattr("signal.signal", lambda *_: None)
     with pytest.raises(SystemExit) as ended:
         main(line.split())
-    told = capsys.readouterr()
-    assert (ended.value.code, told.out) == (2, "")
-    assert len(told.err.strip().splitlines()) == 1
-    assert all(name in told.err for name in names), told.err
+    printed = capsys.readouterr()
+    assert (ended.value.code, printed.out) == (2, "")
+    assert len(printed.err.strip().splitlines()) == 1
+    assert all(name in printed.err for name in names), printed.err
     assert everything_in(tmp_path) == there
 
 

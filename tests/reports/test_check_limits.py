@@ -51,7 +51,7 @@ def test_the_larger_tolerance_counts_and_sums_are_exact() -> None:
 
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
-def test_what_is_no_finite_number_never_holds(value: float | None) -> None:
+def test_a_value_that_is_not_finite_never_holds(value: float | None) -> None:
     infinite = value is not None and math.isinf(value)
     assert Bounds().judge(value) is (Outcome.FALLS_SHORT if infinite else Outcome.CANNOT_TELL)
 
@@ -100,7 +100,7 @@ def test_every_estimator_that_a_glob_matches_is_judged(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("asked", ["at_most = 1e9", 'baseline = { better = "lower", relative = 9 }', "at_least = -1e9"])
-def test_what_is_missing_or_failed_never_passes(
+def test_a_missing_or_failed_metric_never_passes(
     values: Any, reason: str, outcome: Outcome, asked: str, tmp_path: Path
 ) -> None:
     document = summary(isam2=estimator(), ekf=values)
@@ -176,7 +176,7 @@ DIVERGENCE = '[[limit]]\nmetric = "divergence.rmse"\nat_most = 1\n'
         ("untrusted", 'reference = "none"\n' + DIVERGENCE.replace("divergence.rmse", "map.median"), "cannot tell", 2),
     ],
 )
-def test_a_reference_that_is_not_trusted_cannot_tell(
+def test_a_reference_that_is_not_trusted_leaves_the_check_undecided(
     trust: str, limits: str, outcome: str, code: int, tmp_path: Path
 ) -> None:
     result = checked(tmp_path, summary(trust, isam2=estimator()), limits)
@@ -187,23 +187,23 @@ def test_a_reference_that_is_not_trusted_cannot_tell(
     assert result.references == said
 
 
-def test_a_baseline_that_cannot_be_compared_with_cannot_tell(tmp_path: Path) -> None:
+def test_a_baseline_that_is_not_comparable_is_undecided(tmp_path: Path) -> None:
     limits = '[[limit]]\nmetric = "divergence.rmse"\nbaseline = { better = "lower" }\n'
     new = summary(isam2=estimator())
 
-    def told(baseline: Any) -> str:
+    def undecided_reason(baseline: Any) -> str:
         result = checked(tmp_path, new, limits, baseline)
         assert (only(result).outcome, result.exit_code) == (Outcome.CANNOT_TELL, 2)
         return only(result).reason
 
-    assert "no isam2" in told(summary(ekf=estimator()))
-    assert "untrusted" in told(summary("untrusted", isam2=estimator()))
-    assert "no run 'town'; it has 'loop'" in told({**new, "sequence": {"name": "loop"}})
-    assert "the baseline is batch, that of this run isam2" in told(
+    assert "no isam2" in undecided_reason(summary(ekf=estimator()))
+    assert "untrusted" in undecided_reason(summary("untrusted", isam2=estimator()))
+    assert "no run 'town'; it has 'loop'" in undecided_reason({**new, "sequence": {"name": "loop"}})
+    assert "the baseline is batch, that of this run isam2" in undecided_reason(
         {**new, "reference": {"name": "batch", "trust": "trusted"}}
     )
-    assert "no divergence.rmse" in told(summary(isam2={"status": "ok", "ate": {"rmse": 1.0}}))
-    assert "lost its way" in told(summary(isam2=estimator(status="failed")))
+    assert "no divergence.rmse" in undecided_reason(summary(isam2={"status": "ok", "ate": {"rmse": 1.0}}))
+    assert "lost its way" in undecided_reason(summary(isam2=estimator(status="failed")))
 
 
 def test_several_runs_are_held_each_by_its_name(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("limits", "place", "names"), WRONG)
-def test_limits_that_say_or_match_nothing_are_told_with_their_key_path(
+def test_empty_or_unmatched_limits_are_refused_with_their_key_path(
     limits: str, place: str, names: tuple[str, ...], tmp_path: Path
 ) -> None:
     with pytest.raises(InputError) as error:
@@ -306,7 +306,7 @@ def test_limits_that_say_or_match_nothing_are_told_with_their_key_path(
         ('{"schema": "fgbaseline/bench/1", "runs": {}}', ("runs",)),
     ],
 )
-def test_a_summary_that_is_none_is_told(text: str, names: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_file_that_is_no_summary_is_refused(text: str, names: tuple[str, ...], tmp_path: Path) -> None:
     write(tmp_path, BOTH, ATE)
     (tmp_path / "out" / "summary.json").write_text(text)
     with pytest.raises(InputError, match=r"summary\.json: ") as error:

@@ -107,7 +107,7 @@ def joint_jacobian(patch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("estimator", "broken"), [("ekf", pose_jacobian), ("ekf", camera_jacobian), ("joint-ekf", joint_jacobian)]
 )
-def test_a_jacobian_of_the_wrong_sign_does_not_get_by(
+def test_a_jacobian_of_the_wrong_sign_fails_the_check(
     estimator: str,
     broken: Callable[[pytest.MonkeyPatch], None],
     quick: Quick,

@@ -120,7 +120,7 @@ def test_coverage_asks_for_no_more_than_the_reference_has() -> None:
     assert time_coverage(t[:1], t[:1]) == 1.0
 
 
-def test_what_cannot_be_asked_is_told() -> None:
+def test_assert_accuracy_refuses_missing_limits_and_unmatched_trajectories() -> None:
     truth = (STAMPS, true_path())
     with pytest.raises(InputError, match=r"there is no limit; give ate=0\.5"):
         assert_accuracy(truth, truth)
@@ -175,7 +175,7 @@ def test_without_a_folder_figures_go_to_that_of_the_test(tmp_path: Path) -> None
     assert figure.is_file()
 
 
-def test_nothing_of_ours_is_imported_where_nobody_asks_for_it(tmp_path: Path) -> None:
+def test_the_pytest_plugin_imports_nothing_of_the_package_before_its_use(tmp_path: Path) -> None:
     assert users_pytest(tmp_path, "-k", "without_it").returncode == 0
 
 
@@ -185,7 +185,7 @@ def rows_of(poses: FloatArray) -> list[list[str]]:
     return [list(map(repr, row)) for row in numbers.tolist()]
 
 
-def test_files_are_settled_by_each_other_as_compare_does(tmp_path: Path) -> None:
+def test_the_units_of_files_are_determined_from_each_other_as_in_compare(tmp_path: Path) -> None:
     truth, mine = tmp_path / "truth.tum", tmp_path / "mine.txt"
     write_tum(truth, STAMPS, true_path())
     lines = [
@@ -216,7 +216,7 @@ def test_positions_are_compared_in_positions_only(tmp_path: Path) -> None:
             assert_accuracy((STAMPS, estimated()), truth, ate=1.0, **options)
 
 
-def test_what_stays_in_doubt_is_refused(tmp_path: Path) -> None:
+def test_undetermined_units_are_refused(tmp_path: Path) -> None:
     names = ("truth.txt", "mine.txt")
     for name, poses in zip(names, (true_path(), estimated()), strict=True):
         rows = zip(100 * np.arange(T), rows_of(poses), strict=True)

@@ -62,7 +62,7 @@ def test_every_number_of_a_run_and_of_a_comparison_has_its_sample_or_is_none() -
 @pytest.mark.parametrize(
     ("n", "every", "code"), [(3, 1, 2), (3, 60, 2), (29, 1, 2), (99, 1, 2), (101, 1, 0), (29, 6, 2), (33, 6, 0)]
 )
-def test_fewer_than_30_poses_or_half_of_the_time_cannot_be_told(n: int, every: int, code: int, tmp_path: Path) -> None:
+def test_fewer_than_30_poses_or_half_of_the_time_are_undecided(n: int, every: int, code: int, tmp_path: Path) -> None:
     document = compared(n, every=every)
     for metric in ("translation.rmse.value", "rotation_deg.max", "final_m", "shares.scale_percent"):
         assert judged(document, tmp_path, LIMIT.format(metric)) == code
@@ -94,7 +94,9 @@ def test_one_stretch_of_many_metres_is_too_little_of_a_path(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("missing", "code"), [(0, 0), (20, 0), (31, 2), (59, 2)])
-def test_a_run_with_little_truth_cannot_be_told_and_says_so_first(missing: int, code: int, tmp_path: Path) -> None:
+def test_a_run_with_little_ground_truth_is_undecided_and_reports_it_first(
+    missing: int, code: int, tmp_path: Path
+) -> None:
     sequence = scene()
     assert sequence.truth is not None
     problem = plain_problem(scene(truth=partly_known(sequence.truth, missing)))
@@ -108,7 +110,7 @@ def test_a_run_with_little_truth_cannot_be_told_and_says_so_first(missing: int, 
     assert any(sentence.startswith("ATE (") for sentence in verdict(run)) == (code == 0)
 
 
-def test_what_is_too_little_is_said_first_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_small_samples_are_reported_first_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert judged(compared(3), tmp_path, LIMIT.format("translation.rmse.value")) == 2
     files = Outputs(tmp_path / "c.xml", tmp_path / "c.md", tmp_path / "c.json")
     assert check(tmp_path, tmp_path / "limits.toml", None, files) == 2
@@ -136,7 +138,7 @@ def test_the_pytest_fixture_asks_for_the_same_sample() -> None:
     assert assert_accuracy((t[:29], poses[:29]), (t[:29], poses[:29]), ate=1.0, smallest_sample=20)["pairs"] == 29
 
 
-def test_a_truth_at_one_frame_is_no_truth_for_the_command(tmp_path: Path) -> None:
+def test_a_truth_of_one_frame_leaves_the_check_undecided(tmp_path: Path) -> None:
     sequence = scene()
     assert sequence.truth is not None
     data.write_npz(sequence, tmp_path / "drive.npz")

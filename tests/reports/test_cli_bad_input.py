@@ -108,7 +108,7 @@ def identity(bad: Bad) -> str:
 
 
 @pytest.mark.parametrize("bad", RUN + SIMULATE, ids=identity)
-def test_it_is_told_in_one_sentence_and_nothing_is_written(bad: Bad, folder: Path) -> None:
+def test_the_fault_is_one_sentence_and_nothing_is_written(bad: Bad, folder: Path) -> None:
     before = {name: (folder / name).stat().st_mtime_ns for name in everything_in(folder)}
     result = fgbaseline(*bad.line.split(), cwd=folder)
     assert result.returncode == 2
@@ -141,7 +141,7 @@ def a_pickle(arrays: dict[str, np.ndarray]) -> None:
     ("spoil", "field"),
     [(a_null, "linear_velocity"), (falling_stamps, "time_stamps"), (no_rotation, "imu_T_cam"), (a_pickle, "K")],
 )
-def test_a_spoilt_recording_is_told_with_its_field(
+def test_a_corrupted_recording_is_refused_with_its_field(
     spoil: Callable[[dict[str, np.ndarray]], None], field: str, folder: Path
 ) -> None:
     with np.load(folder / "drive.npz") as file:

@@ -10,7 +10,7 @@ import pytest
 
 from ..builders.commands import COMMAND, environment, fgbaseline, installed
 
-COMMANDS = ("run", "compare", "diagnose", "check", "bench", "export", "figures", "reproduce", "simulate")
+COMMANDS = ("run", "compare", "estimators", "diagnose", "check", "bench", "export", "figures", "reproduce", "simulate")
 FOR_GOOD_INPUT = ("scipy", "pandas", "gtsam", "matplotlib", "jinja2", "rich", "fgbaseline.data.simulate")
 HEAVY = ("numpy", "pandas", "scipy", "gtsam", "matplotlib", "pydantic", "jinja2", "rich", "fgbaseline.data")
 
@@ -37,7 +37,7 @@ def test_help_imports_nothing_heavy(arguments: tuple[str, ...], tmp_path: Path) 
 
 
 @pytest.mark.parametrize("command", ["run", "diagnose", "export --out problem"])
-def test_a_recording_that_cannot_be_read_is_told_before_its_analysis_is_imported(command: str, tmp_path: Path) -> None:
+def test_an_unreadable_recording_is_refused_before_the_analysis_is_imported(command: str, tmp_path: Path) -> None:
     imported = imported_by((*command.split(), "missing.npz"), 2, tmp_path)
     assert "fgbaseline.data" in imported
     assert not [module for module in imported if module.startswith(FOR_GOOD_INPUT)]
@@ -46,8 +46,10 @@ def test_a_recording_that_cannot_be_read_is_told_before_its_analysis_is_imported
 def test_a_run_imports_no_package_that_only_other_commands_need() -> None:
     whole = "fgbaseline.ekf", "fgbaseline.smoother", "fgbaseline.reports.run.folder", "fgbaseline.reports.progress"
     code = f"import sys, {', '.join(whole)}; print(*sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True)
-    modules = told.stdout.split()
+    finished = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True
+    )
+    modules = finished.stdout.split()
     assert {"gtsam", "pandas", "matplotlib.figure"} <= set(modules)
     others = ("scipy.interpolate", "scipy.optimize", "scipy.sparse", "scipy.spatial", "fgbaseline.data.simulate")
     assert not [module for module in modules if module.startswith(others)]

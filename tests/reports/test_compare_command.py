@@ -41,14 +41,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_against_a_run_the_trust_comes_first_and_its_estimators_stand_beside(made: Path) -> None:
-    told = fgbaseline(
+    finished = fgbaseline(
         *["compare", "run", "mine.tum", "--sequence", "problem", "--landmarks", "mine.csv", "--out", "out/c"],
         cwd=made,
         drawing=False,
         COLUMNS="200",
     )
-    assert told.returncode == 0, told.stderr
-    first = told.stdout.splitlines()[0]
+    assert finished.returncode == 0, finished.stderr
+    first = finished.stdout.splitlines()[0]
     assert first.startswith("The reference, ekf, is ")
     summary = json.loads((made / "out/c/comparison.json").read_text())
     run = json.loads((made / "run/summary.json").read_text())
@@ -83,12 +83,12 @@ def test_the_problem_of_a_run_is_posed_again_from_its_recording(made: Path) -> N
     assert one.summary.estimates == other.summary.estimates
 
 
-def test_against_a_file_the_table_and_its_caption_are_told(made: Path) -> None:
-    told = fgbaseline(*["compare", "truth.tum", "k=moved.txt", "mine.tum", "--sequence", "drive.npz"], cwd=made)
-    assert told.returncode == 0, told.stderr
-    assert told.stdout.startswith("The reference, truth, is taken as given")
-    assert "SE(3)-aligned over all 50 poses" in told.stdout
-    assert "ATE: RMSE, m" in told.stdout
+def test_against_a_reference_file_the_table_is_captioned_and_no_page_is_written(made: Path) -> None:
+    finished = fgbaseline(*["compare", "truth.tum", "k=moved.txt", "mine.tum", "--sequence", "drive.npz"], cwd=made)
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout.startswith("The reference, truth, is taken as given")
+    assert "SE(3)-aligned over all 50 poses" in finished.stdout
+    assert "ATE: RMSE, m" in finished.stdout
     assert not (made / "report.html").exists()
 
 
@@ -105,8 +105,8 @@ def in_process(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str,
             main(line.split())
     finally:
         signal.signal(signal.SIGTERM, handler)
-    told = capsys.readouterr()
-    return int(ended.value.code or 0), told.out, told.err
+    printed = capsys.readouterr()
+    return int(ended.value.code or 0), printed.out, printed.err
 
 
 BAD = {
@@ -164,7 +164,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(
     assert everything_in(made) == before
 
 
-def test_stamps_and_poses_that_are_no_numbers_are_told_with_their_line(
+def test_stamps_and_poses_that_are_no_numbers_are_refused_with_their_line(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -179,7 +179,7 @@ def test_stamps_and_poses_that_are_no_numbers_are_told_with_their_line(
 
 
 @pytest.mark.parametrize("text", ["{}", "[", '{"reference": [], "estimators": {}}'])
-def test_a_summary_that_is_none_is_told(
+def test_a_file_that_is_no_summary_is_refused(
     made: Path, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -21,6 +21,7 @@ from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.results.comparison import json_schema
 from fgbaseline.reports.tables import latex, markdown
 
+from ..builders.refusals import refused
 from ..builders.synthetic import drive, matched
 
 
@@ -109,7 +110,7 @@ def test_two_paths_without_stamps_are_compared_by_frame(files: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["none", "first-pose", "yaw", "se3", "sim3"])
-def test_every_alignment_is_said(files: Path, kind: str) -> None:
+def test_every_alignment_is_reported(files: Path, kind: str) -> None:
     result = compare(files / "truth.tum", files / "near.csv", align=kind)
     said = {"none": "not aligned", "first-pose": "first pose", "yaw": "yaw", "se3": "SE(3)", "sim3": "Sim(3)"}[kind]
     assert said in result.caption
@@ -117,12 +118,12 @@ def test_every_alignment_is_said(files: Path, kind: str) -> None:
     assert said.lower() in markdown(result.text_table).lower()
 
 
-def test_an_offset_is_found_and_told(files: Path) -> None:
+def test_a_time_offset_is_estimated_and_reported(files: Path) -> None:
     t, poses = truth()
     data.write_tum(files / "late.tum", t + 0.25, poses)
     result = compare(files / "truth.tum", files / "late.tum", search_offset=0.5, association="interpolated")
     assert result.results["late"].matched.offset == pytest.approx(-0.25, abs=1e-3)
-    assert any("fit best 250 ms earlier" in sentence for sentence in result.verdict)
+    assert any("fit best: late 250 ms earlier" in sentence for sentence in result.verdict)
 
 
 def test_poses_of_the_camera_are_brought_to_the_imu(files: Path) -> None:
@@ -182,7 +183,7 @@ def test_held_out_tracks_rank_the_paths(files: Path) -> None:
     assert compare(files / "truth.tum", files / "near.csv", sequence=files / "drive.npz").held_out is None
 
 
-def test_when_a_path_leaves_is_said_only_of_paths_that_start_together(files: Path) -> None:
+def test_the_divergence_onset_is_reported_only_for_paths_with_a_common_start(files: Path) -> None:
     aligned = compare(files / "truth.tum", files / "far.npz")
     assert aligned.results["far"].passing is None
     assert "do not start together" in aligned.results["far"].notes["passing"]
@@ -220,7 +221,7 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     assert "reprojection" in result.figures()
 
 
-def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
+def test_the_nearest_estimator_is_decided_by_paired_errors(files: Path) -> None:
     """Both share an error that makes their own intervals wide; one adds to it everywhere."""
     t, poses = truth()
     shared = se3.compose(se3.exp(np.random.default_rng(0).normal(size=(len(t) - 1, 6)) * 1e-3))
@@ -241,7 +242,7 @@ def test_who_is_nearest_is_settled_by_pairs_of_errors(files: Path) -> None:
     assert summary["two"].behind.value == pytest.approx(rmse["two"] - rmse["one"], rel=1e-9)
 
 
-def test_stamps_that_are_no_frames_of_the_recording_are_told(files: Path) -> None:
+def test_stamps_that_are_no_frames_of_the_recording_are_reported(files: Path) -> None:
     t, poses = truth()
     data.write_npz(drive(), files / "drive.npz")
     data.write_tum(files / "later.tum", t + 1e6, poses)
@@ -250,7 +251,7 @@ def test_stamps_that_are_no_frames_of_the_recording_are_told(files: Path) -> Non
     assert any(s.startswith("No pose of later and later2 is at a frame of ") for s in result.verdict)
 
 
-def test_covariances_that_came_along_are_judged_with_and_without_alignment(files: Path) -> None:
+def test_reported_covariances_are_evaluated_with_and_without_alignment(files: Path) -> None:
     t, poses = truth()
     deviation = np.repeat([0.1, 0.01], 3)
     error = deviation * np.random.default_rng(0).normal(size=(len(t), 6))
@@ -267,7 +268,7 @@ def test_covariances_that_came_along_are_judged_with_and_without_alignment(files
     covariance[3] = -covariance[3]
     data.write_trajectory_npz(files / "bad.npz", t, poses @ se3.exp(error), covariance)
     bad = compare(files / "truth.tum", files / "bad.npz", align="none")
-    assert any(f"1 of the {len(t)} covariances of bad are not positive definite" in s for s in bad.verdict)
+    assert any(f"left out by NEES: 1 of the {len(t)} covariances of bad" in s for s in bad.verdict)
     aligned = compare(files / "truth.tum", files / "mine.npz").summary.estimates["mine"]
     assert aligned.nees is not None
     assert aligned.nees.mean == pytest.approx(nees.mean, rel=0.05)
@@ -310,7 +311,7 @@ def test_the_published_schema_is_the_one_that_is_kept_to() -> None:
     assert published.read_text() == json_schema() + "\n"  # make schema writes it
 
 
-def test_short_and_standing_paths_say_what_they_lack(tmp_path: Path) -> None:
+def test_short_and_standing_paths_report_the_missing_metrics(tmp_path: Path) -> None:
     poses = np.tile(np.eye(4), (5, 1, 1))
     data.write_tum(tmp_path / "standing.tum", np.arange(5.0), poses)
     off = poses.copy()
@@ -353,13 +354,12 @@ BAD: dict[str, Bad] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_is_wrong_is_said_in_a_sentence(files: Path, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_is_one_sentence(files: Path, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     given, options, sentence = BAD[case]
     monkeypatch.chdir(files)
     options = {k: Path(v) if k == "extrinsic" else v for k, v in options.items()}
-    with pytest.raises(InputError, match=sentence) as raised:
+    with refused(sentence):
         compare(*given, **options)
-    assert "\n" not in str(raised.value)
 
 
 BAD_LANDMARKS = {
@@ -373,7 +373,7 @@ BAD_LANDMARKS = {
 
 
 @pytest.mark.parametrize("text", BAD_LANDMARKS)
-def test_bad_landmarks_are_told_with_their_line(tmp_path: Path, text: str) -> None:
+def test_bad_landmarks_are_refused_with_their_line(tmp_path: Path, text: str) -> None:
     (tmp_path / "l.csv").write_text(text)
     with pytest.raises(InputError, match=BAD_LANDMARKS[text]):
         data.formats.read_landmarks(tmp_path / "l.csv")

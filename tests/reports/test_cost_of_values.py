@@ -72,7 +72,7 @@ def test_every_command_ends_whatever_the_numbers_are(change: str, tmp_path: Path
 
 
 @pytest.mark.parametrize("command", [("diagnose", "drive.npz"), ("run", "drive.npz", "--out", "run")])
-def test_a_velocity_that_no_sensor_measures_is_refused_in_a_sentence(tmp_path: Path, command: tuple[str, ...]) -> None:
+def test_an_impossible_velocity_is_refused_in_one_sentence(tmp_path: Path, command: tuple[str, ...]) -> None:
     arrays = {key: np.array(array) for key, array in good_recording(0).items()}
     arrays["linear_velocity"][0, 30] = 1e300
     np.savez(tmp_path / "drive.npz", **arrays)

@@ -33,11 +33,11 @@ def test_the_length_of_a_path_is_that_of_the_path_and_not_of_a_fit(scale: float)
     estimate = data.Trajectory(reference.t, bent, "mine")
     result = compared(reference, estimate)
     own, its = (np.linalg.norm(np.diff(p.world_T_body[:, :3, 3], axis=0), axis=1).sum() for p in (estimate, reference))
-    sentence = next((s for s in result.verdict if s.startswith("The path of mine")), "")
+    sentence = next((s for s in result.verdict if "of the path over the paired poses" in s), "")
     assert bool(sentence) == (number(own) != number(its))
     if sentence:
         than = "longer" if own > its else "shorter"
-        assert f"{number(float(own))} m long, {number(100.0 * abs(own / its - 1.0))} % {than} than" in sentence
+        assert f"{number(float(own))} m, {number(100.0 * abs(own / its - 1.0))} % {than}." in sentence
 
 
 @pytest.mark.parametrize(("shift", "word"), [(0.2, "earlier"), (-0.2, "later")])
@@ -45,7 +45,7 @@ def test_a_shift_of_time_has_no_sign_beside_its_word(shift: float, word: str) ->
     reference = path()
     estimate = data.Trajectory(reference.t + shift, reference.world_T_body, "mine")
     result = compared(reference, estimate, search_offset=1.0)
-    assert any(s.startswith(f"The stamps of mine fit best 200 ms {word} ") for s in result.verdict)
+    assert any(s.startswith(f"The stamps fit best: mine 200 ms {word} ") for s in result.verdict)
 
 
 def test_paths_without_stamps_are_paired_by_their_number(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_writer_killed_at_any_moment_leaves_one_whole_folder(tmp_path: Path) -> None:
+def test_a_writer_killed_at_any_moment_leaves_one_complete_folder(tmp_path: Path) -> None:
     chance, place, seen = random.Random(1), tmp_path / "out", set()
     with atomic_folder(place, force=False, mark=MARK) as first:
         for name in [*(f"{i}.txt" for i in range(FILES)), MARK]:
@@ -131,7 +131,7 @@ LIMITS = {"repairs": 8, "check": 8, "compare": 3000, "export": 3000, "diagnose":
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_on_a_full_disk_what_was_there_survives_and_one_sentence_says_why(folder: Path, name: str) -> None:
+def test_on_a_full_disk_earlier_output_survives_and_one_sentence_gives_the_reason(folder: Path, name: str) -> None:
     (folder / "out").mkdir()
     (folder / "out" / MARKS.get(name, "mine.txt")).write_text("old")
     if name == "repairs":
@@ -186,7 +186,7 @@ def test_a_disk_of_three_pages_is_left_as_it_was(folder: Path, name: str) -> Non
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_where_nothing_may_be_written_one_sentence_says_so(folder: Path, name: str) -> None:
+def test_an_unwritable_folder_is_refused_in_one_sentence(folder: Path, name: str) -> None:
     places = {"out": "/proc/new"}  # not even root may make files in /proc
     nowhere = [places.get(part, part.replace("out/", "/proc/")) for part in COMMANDS[name]]
     before = everything_in(folder)
@@ -198,7 +198,7 @@ def test_where_nothing_may_be_written_one_sentence_says_so(folder: Path, name: s
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_of_two_writers_to_one_folder_one_whole_result_stays(tmp_path: Path, force: bool) -> None:
+def test_of_two_processes_that_write_one_folder_one_complete_result_remains(tmp_path: Path, force: bool) -> None:
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     command = [sys.executable, "-c", RIVAL, tmp_path / "out", "force" if force else ""]
     writers = [subprocess.Popen(command, **pipes) for _ in range(3)]  # type: ignore[call-overload]
@@ -207,9 +207,9 @@ def test_of_two_writers_to_one_folder_one_whole_result_stays(tmp_path: Path, for
     for writer in writers:
         writer.stdin.write("go\n")
         writer.stdin.flush()
-    told = [writer.communicate(timeout=60)[0] for writer in writers]
-    assert all("done\n" in text or "out: the folder" in text for text in told)
-    done = [writer.pid for writer, text in zip(writers, told, strict=True) if "done" in text]
+    outputs = [writer.communicate(timeout=60)[0] for writer in writers]
+    assert all("done\n" in text or "out: the folder" in text for text in outputs)
+    done = [writer.pid for writer, text in zip(writers, outputs, strict=True) if "done" in text]
     assert len(done) >= 1 if force else len(done) == 1
     written = {path.read_text() for path in (tmp_path / "out").iterdir()}
     assert everything_in(tmp_path / "out") == {*(f"{i}.txt" for i in range(FILES)), MARK}
@@ -241,7 +241,7 @@ def test_where_the_system_cannot_exchange_names_the_folder_is_replaced_all_the_s
     assert contents(tmp_path) == {f"out/{MARK}": b"new"}
 
 
-def test_a_folder_that_another_made_in_the_meantime_is_not_overwritten(tmp_path: Path) -> None:
+def test_a_folder_created_by_another_process_during_the_run_is_not_overwritten(tmp_path: Path) -> None:
     def late() -> None:
         with atomic_folder(tmp_path / "out", force=False, mark=MARK) as folder:
             (folder / MARK).write_text("late")

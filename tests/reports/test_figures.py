@@ -94,7 +94,7 @@ def test_divergence_panels_hold_the_columns_of_the_comparison() -> None:
         assert not lines(axes, "isam2 (reference)")
 
 
-def test_the_reference_takes_part_where_errors_are_those_to_the_truth() -> None:
+def test_the_reference_is_included_where_errors_are_those_to_the_truth() -> None:
     run = standard_run()
     table = run.results["isam2"].truth
     assert table is not None
@@ -114,7 +114,7 @@ def test_paths_lie_in_the_horizontal_plane_with_equal_scales() -> None:
     np.testing.assert_allclose(np.cross(view.ahead, view.left), run.problem.sequence.up, atol=1e-12)
 
 
-def test_the_distribution_ends_where_the_table_says_under_3_px() -> None:
+def test_the_distribution_ends_at_the_share_under_3_px_of_the_table() -> None:
     run = standard_run()
     ((x, y),) = lines(drawn_standard()["reprojection_distribution"].axes[0], "isam2 (reference)")
     errors = run.results["isam2"].reprojection["error"].to_numpy()
@@ -140,7 +140,7 @@ def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black()
         assert drawn <= {ESTIMATOR_COLORS["ekf"].lower()}, name
 
 
-def test_a_known_name_keeps_its_colour_whoever_else_runs_and_strangers_take_what_is_left() -> None:
+def test_a_known_estimator_keeps_its_colour_in_every_run_and_others_take_the_remaining_ones() -> None:
     problem = plain_problem(scene())
     strangers = [answer(problem, f"mine-{i}") for i in range(9)]
     run = run_of(problem, *strangers, answer(problem, "ekf"), answer(problem, "isam2"))
@@ -160,7 +160,7 @@ def test_saved_bytes_are_those_of_the_run(tmp_path: Path) -> None:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
 
 
-def test_what_the_user_has_set_for_figures_of_their_own_stays(tmp_path: Path) -> None:
+def test_user_matplotlib_settings_are_kept(tmp_path: Path) -> None:
     with mpl.rc_context({"font.size": 31.0, "axes.facecolor": "red", "text.usetex": True}):
         height = drawn(standard_run(), "height")
         assert mpl.rcParams["font.size"] == 31.0
@@ -197,7 +197,7 @@ def test_frames_without_pose_or_truth_are_gaps(tmp_path: Path) -> None:
     figures.save({name: every[name] for name in ("error_to_truth", "path_ekf")}, tmp_path)
 
 
-def test_a_runaway_does_not_decide_what_the_others_look_like() -> None:
+def test_a_diverged_path_does_not_set_the_axes_of_the_others() -> None:
     problem = plain_problem(scene(truth=None))
     run = run_of(
         problem,
@@ -277,7 +277,7 @@ def test_a_logarithmic_axis_is_labelled_with_numbers_and_powers_where_these_woul
     assert shown == expected
 
 
-def test_labels_of_a_column_of_panels_stand_in_one_line() -> None:
+def test_labels_of_a_column_of_panels_are_aligned() -> None:
     panels = drawn_standard()["divergence"].axes
     assert len({axes.yaxis.label.get_position()[0] for axes in panels}) == 1
 

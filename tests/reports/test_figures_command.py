@@ -60,7 +60,7 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, capsys: pytest.Captu
         assert path.read_bytes() == (folder / "two" / path.name).read_bytes(), path.name
 
 
-def test_what_is_read_is_what_the_run_had(folder: Path) -> None:
+def test_a_run_is_read_back_as_it_was_written(folder: Path) -> None:
     run, read = standard_run(), figures.of_folder(folder)
     for name, result in run.results.items():
         there = result.estimate.world_T_imu[:, :3, 3]
@@ -81,7 +81,7 @@ def test_an_existing_folder_is_replaced_only_with_force(folder: Path, capsys: py
     assert call(capsys, *arguments, "--force")[0] == 0
 
 
-def test_what_a_run_lacks_is_not_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_without_data_are_not_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "draw", lambda _: {})
     problem = plain_problem(scene(truth=None))
     write_run(
@@ -98,7 +98,7 @@ def test_what_a_run_lacks_is_not_drawn(tmp_path: Path, monkeypatch: pytest.Monke
     assert set(figures.draw_for_paper(read)) == {"paths", "landmarks", "reprojection", "time_per_frame"}
 
 
-def test_bad_input_is_told_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_refused_in_one_sentence(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, said = call(capsys, "figures", tmp_path)
     assert code == 2
     assert re.fullmatch(r"fgbaseline: .*has no summary.json; give the folder that fgbaseline run wrote\n", said)

@@ -11,7 +11,8 @@ from fgbaseline.compare.limits import Better
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results import metrics
 from fgbaseline.reports.results.comparison import Summary as Comparison
-from fgbaseline.reports.results.metrics import COMPARISON, DELTA, MAIN, METRICS, TERMINAL, TERMS, Metric
+from fgbaseline.reports.results.metric import COMPARISON, DELTA, MAIN, TERMINAL, TERMS, Metric
+from fgbaseline.reports.results.metrics import METRICS
 from fgbaseline.reports.results.run import Summary
 from fgbaseline.reports.tables.run import evidence_table, main_table, terminal_table
 

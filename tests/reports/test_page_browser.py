@@ -109,7 +109,7 @@ def opened(chromium: Any, address: str) -> Iterator[Opened]:
     it.page.context.close()
 
 
-def test_it_loads_without_a_word_and_without_asking_anybody(opened: Opened, run: Run) -> None:
+def test_docs_load_without_console_messages_and_without_network(opened: Opened, run: Run) -> None:
     assert opened.text("h1") == SCRIPT
     assert opened.count("#path-view .line") == 4
     assert opened.count(".chart svg") == opened.count(".chart") >= 10
@@ -154,7 +154,7 @@ def test_the_slider_moves_one_cursor_through_every_plot(opened: Opened) -> None:
     assert opened.attribute("#frame", "aria-valuetext") == "frame 40, 4.0\u00a0s"
 
 
-def test_a_frame_shows_what_became_of_each_observation_and_its_true_reprojection_error(
+def test_a_frame_shows_the_outcome_of_each_observation_and_its_true_reprojection_error(
     opened: Opened, run: Run
 ) -> None:
     opened.set_frame(7)
@@ -183,7 +183,7 @@ def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> N
     ]
 
 
-def test_the_paths_turn_into_space_with_landmarks_and_ellipses(opened: Opened) -> None:
+def test_the_paths_are_shown_in_3d_with_landmarks_and_ellipses(opened: Opened) -> None:
     flat = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.click('[data-do="solid"]')
     assert opened.attribute('[data-do="solid"]', "aria-pressed") == "true"
@@ -194,21 +194,21 @@ def test_the_paths_turn_into_space_with_landmarks_and_ellipses(opened: Opened) -
     assert opened.count("#path-view .ellipse.estimator-2") >= 1
 
 
-def test_a_path_tells_frame_time_and_error_where_it_is_pointed_at_and_a_click_goes_there(opened: Opened) -> None:
+def test_a_path_shows_frame_time_and_error_under_the_pointer_and_a_click_moves_the_cursor(opened: Opened) -> None:
     opened.set_frame(30)
     box = opened.page.locator("#path-view .here.estimator-2").bounding_box()
     opened.set_frame(5)
     at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     opened.page.mouse.move(*at)
-    told = opened.text(".hint")
-    assert "frame 30" in told
-    assert "3.0\u00a0s" in told
-    assert "from the truth" in told or told.startswith("truth")
+    hint = opened.text(".hint")
+    assert "frame 30" in hint
+    assert "3.0\u00a0s" in hint
+    assert "from the truth" in hint or hint.startswith("truth")
     opened.page.mouse.click(*at)
     assert opened.text("#clock").startswith("frame 30 ")
 
 
-def test_the_keyboard_is_enough(opened: Opened) -> None:
+def test_the_page_is_operable_by_keyboard(opened: Opened) -> None:
     opened.set_frame(10)
     opened.page.focus("#frame")
     opened.page.keyboard.press("ArrowRight")
@@ -225,7 +225,7 @@ def test_the_keyboard_is_enough(opened: Opened) -> None:
     assert opened.attribute("#path-view .line.estimator-1", "d") == before
     reached = {""}
     opened.page.focus(".skip")
-    for _ in range(60):
+    for _ in range(90):
         opened.page.keyboard.press("Tab")
         reached.add(str(opened.page.evaluate("document.activeElement.id || document.activeElement.dataset.do || ''")))
     assert {"solid", "landmarks", "ellipses", "in", "out", "reset", "frame", "play"} <= reached
@@ -282,7 +282,7 @@ def test_figures_folded_away_are_there_when_unfolded_or_printed(chromium: Any, a
         page_.context.close()
 
 
-def test_a_run_that_has_little_to_show_is_shown_without_a_complaint(chromium: Any, tmp_path: Path) -> None:
+def test_a_run_with_little_data_is_drawn_without_warnings(chromium: Any, tmp_path: Path) -> None:
     problem = plain_problem(scene(truth=None))
     alone = answer(problem, "dead-reckoning", covariance=None, seconds=np.empty(0), landmarks=Landmarks.none())
     gone = alone.world_T_imu.copy()

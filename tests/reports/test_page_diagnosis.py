@@ -37,21 +37,21 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     assert "<li>Set by hand: velocity_scale = 1.5.</li>" in html
 
 
-def test_a_clean_recording_is_said_to_be_clean_and_one_taken_as_it_is_is_not() -> None:
+def test_a_clean_recording_is_reported_as_such_and_an_undiagnosed_one_is_not() -> None:
     run = standard_run()
     assert "The recording:" not in rendered(run)
     clean = rendered(replace(run, problem=replace(run.problem, diagnosed=True)))
     assert "The recording: no fault detected" in clean
 
 
-def test_three_sentences_stand_above_the_table_and_the_rest_is_folded_below() -> None:
+def test_six_sentences_stand_on_top_and_the_rest_is_folded_away() -> None:
     run = standard_run()
     sentences, page = verdict(run), rendered(run)
-    assert len(sentences) > 3
-    table = page.index('<section id="table"')
-    above, below = page[:table], page[table:]
-    assert above.count("<li>") == 3
-    assert f"{len(sentences) - 3} more sentences" in below
+    assert len(sentences) > 6
+    shown, folded = page[: page.index('<section id="table"')].split("<details>")
+    assert shown.count("<li>") == 6
+    assert f"{len(sentences) - 6} more sentence" in folded
+    assert folded.count("<li>") == len(sentences) - 6
 
 
 @pytest.mark.parametrize(

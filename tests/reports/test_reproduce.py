@@ -120,7 +120,7 @@ def test_a_second_run_needs_force(reproduced: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("nowhere.npz",), "nowhere.npz"),
         (("velocities.npz", "velocities.npz"), "give each once"),
@@ -132,14 +132,14 @@ def test_a_second_run_needs_force(reproduced: Path, folder: Path) -> None:
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_nothing(
-    arguments: tuple[str, ...], told: str, folder: Path, tmp_path: Path
+    arguments: tuple[str, ...], message: str, folder: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "velocities.npz").symlink_to(folder / "velocities.npz")
     before = everything_in(tmp_path)
     result = fgbaseline("reproduce", *arguments, "--out", "new/out", cwd=tmp_path)
     assert result.returncode == 2, result.stdout
     assert len(result.stderr.splitlines()) == 1
-    assert told in result.stderr
+    assert message in result.stderr
     assert everything_in(tmp_path) == before
 
 
@@ -192,18 +192,18 @@ def test_each_repair_of_what_was_simulated_brings_dead_reckoning_nearer_to_the_t
     assert len(stages[-1].sequence.observations) == int(np.sum(~simulated.wrong))
 
 
-def test_what_the_diagnosis_repairs_is_repaired_one_cause_at_a_time(faulty: Sequence) -> None:
+def test_the_repairs_of_the_diagnosis_are_applied_one_at_a_time(faulty: Sequence) -> None:
     from fgbaseline.diagnosis import diagnose
 
     stages = diagnosed_stages(diagnose(faulty))
     assert [stage.name for stage in stages][:2] == ["as recorded", "axes agree"]
     assert np.array_equal(stages[1].sequence.angular_velocity, faulty.angular_velocity * [1.0, -1.0, -1.0])
     assert stages[0].sequence is faulty
-    # Without observations there is nothing that could be told apart.
+    # Without observations no stage differs from the recorded one.
     assert len(diagnosed_stages(diagnose(without_features(faulty)))) == 1
 
 
-def test_without_any_noise_the_first_update_has_no_inverse(faulty: Sequence) -> None:
+def test_without_noise_the_first_innovation_covariance_is_singular(faulty: Sequence) -> None:
     outcome, _ = run_filter(faulty, FilterSettings(features=50, motion=0.0))
     assert outcome.status is Status.FAILED
     assert outcome.breaks

@@ -14,7 +14,7 @@ from fgbaseline.reports.run import rerun as rerun_file
 from ..builders.runs import standard_run
 
 
-def test_without_the_extra_one_sentence_says_what_to_install(
+def test_without_the_extra_one_sentence_names_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(rerun_file, "find_spec", lambda _: None)

@@ -18,7 +18,8 @@ import pytest
 from fgbaseline import data
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence, solve
+from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence
+from fgbaseline.reports.run.solution import solve
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 
@@ -69,13 +70,13 @@ def rows(path: Path) -> Iterator[dict[str, str]]:
         yield from csv.DictReader(file)
 
 
-def test_it_exits_well_and_says_where_the_report_is(finished: Finished) -> None:
+def test_the_command_exits_zero_and_prints_the_place_of_the_report(finished: Finished) -> None:
     assert finished.result.returncode == 0, finished.result.stderr
     assert finished.result.stdout.rstrip().endswith("The report is in out/report.html")
     assert all(name in finished.result.stdout for name in ESTIMATORS)
 
 
-def test_the_folder_holds_what_was_promised_and_nothing_else(finished: Finished) -> None:
+def test_the_folder_holds_the_documented_files_and_nothing_else(finished: Finished) -> None:
     figures = {path.stem for path in (finished.out / "figures").iterdir()}
     assert len(figures) >= 6
     expected = {"summary.json", "metrics.csv", "report.html", "truth.tum"}
@@ -83,7 +84,10 @@ def test_the_folder_holds_what_was_promised_and_nothing_else(finished: Finished)
     expected |= {f"trajectories/{name}.tum" for name in ESTIMATORS}
     expected |= {f"landmarks/{name}.csv" for name in ESTIMATORS}
     expected |= {f"series/{name}.csv" for name in ESTIMATORS}
-    expected |= {"tables", *(f"tables/{name}.csv" for name in ("map_by_depth", "moved_points", "reprojection_classes"))}
+    expected |= {
+        "tables",
+        *(f"tables/{name}.csv" for name in ("map_by_depth", "moved_points", "reprojection_classes", "trust")),
+    }
     expected |= {f"figures/{name}.{kind}" for name in figures for kind in ("png", "svg")}
     assert everything_in(finished.out) == expected
     assert everything_in(finished.folder) == {"out", *(f"out/{name}" for name in expected)}
@@ -236,7 +240,9 @@ vanished = a_module_that_is_gone:solve
 """
 
 
-def test_estimators_of_other_packages_take_part_and_their_crashes_stop_nobody(recording: Path, tmp_path: Path) -> None:
+def test_user_estimators_are_compared_and_their_crashes_stop_no_other_estimator(
+    recording: Path, tmp_path: Path
+) -> None:
     site = tmp_path / "site"
     described = site / "outside_filters-1.0.dist-info"
     described.mkdir(parents=True)
@@ -277,7 +283,7 @@ def test_estimators_of_other_packages_take_part_and_their_crashes_stop_nobody(re
         (signal.SIGINT, "writing the report", "an earlier run"),
     ],
 )
-def test_an_interruption_leaves_what_was_there_and_nothing_half_written(
+def test_an_interruption_keeps_earlier_files_and_leaves_no_partial_ones(
     recording: Path, tmp_path: Path, number: signal.Signals, line: str, before: str
 ) -> None:
     if before == "an earlier run":
@@ -286,8 +292,8 @@ def test_an_interruption_leaves_what_was_there_and_nothing_half_written(
     there = everything_in(tmp_path)
     run = started("run", recording, "--out", "out", "--force", "--estimators", "dead-reckoning,isam2", cwd=tmp_path)
     assert run.stderr is not None
-    told = iter(run.stderr)
-    assert any(read.strip() == line for read in told)
+    printed = iter(run.stderr)
+    assert any(read.strip() == line for read in printed)
     run.send_signal(number)
     _, rest = run.communicate(timeout=60)
     assert run.returncode == 130

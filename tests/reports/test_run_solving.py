@@ -13,6 +13,7 @@ from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress,
 from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
+from fgbaseline.reports.run.solution import batch_is_added, solve
 
 from ..builders.synthetic import Scene, plain_problem
 
@@ -90,7 +91,7 @@ ANSWERS = {
 
 
 @pytest.mark.parametrize("reason", ANSWERS)
-def test_an_answer_that_is_none_is_a_failed_row_that_says_what_is_wrong(installed: dict[str, Any], reason: str) -> None:
+def test_an_invalid_estimate_is_a_failed_row_with_its_reason(installed: dict[str, Any], reason: str) -> None:
     installed["odd"] = ANSWERS[reason]
     answers = solve_all(PROBLEM, ["odd", "dead-reckoning"])
     assert answers["odd"].status is Status.FAILED
@@ -98,7 +99,7 @@ def test_an_answer_that_is_none_is_a_failed_row_that_says_what_is_wrong(installe
     compare_all(PROBLEM, answers, {})
 
 
-def test_an_answer_goes_by_the_name_it_was_asked_for(installed: dict[str, Any]) -> None:
+def test_an_estimate_has_the_name_it_was_requested_by(installed: dict[str, Any]) -> None:
     installed["mine"] = ekf.dead_reckoning
     assert solve_all(PROBLEM, ["mine"])["mine"].name == "mine"
 
@@ -128,22 +129,22 @@ def test_poses_from_a_frame_on_may_be_missing(installed: dict[str, Any]) -> None
     assert divergence["position"].notna().sum() == 7
 
 
-def test_an_estimator_that_asks_for_it_is_given_the_answers_so_far(installed: dict[str, Any]) -> None:
-    told: list[list[str]] = []
+def test_an_estimator_that_requests_them_receives_earlier_estimates(installed: dict[str, Any]) -> None:
+    received: list[list[str]] = []
 
     def asking(problem: Problem, progress: Progress | None, given: Mapping[str, Estimate] | None = None) -> Estimate:
-        told.append(list(given or {}))
+        received.append(list(given or {}))
         answer = ekf.dead_reckoning(problem)
         return replace(answer, by_products={"other": answer})
 
     installed["asking"] = asking
     installed["asking too"] = asking
     solve_all(PROBLEM, ["dead-reckoning", "asking", "asking too"])
-    assert told[0] == ["dead-reckoning"]
-    assert set(told[1]) == {"dead-reckoning", "asking", "other"}
+    assert received[0] == ["dead-reckoning"]
+    assert set(received[1]) == {"dead-reckoning", "asking", "other"}
 
 
-def test_what_one_run_gives_along_is_not_solved_again(installed: dict[str, Any]) -> None:
+def test_by_products_of_a_run_are_not_solved_again(installed: dict[str, Any]) -> None:
     def both(problem: Problem, progress: Progress | None) -> Estimate:
         answer = ekf.dead_reckoning(problem)
         return replace(answer, by_products={"other": replace(answer, name="other", reason="given along")})
@@ -152,7 +153,7 @@ def test_what_one_run_gives_along_is_not_solved_again(installed: dict[str, Any])
     assert solve_all(PROBLEM, ["both", "other"])["other"].reason == "given along"
 
 
-def test_an_estimator_that_failed_on_the_way_does_not_narrow_what_all_used(installed: dict[str, Any]) -> None:
+def test_an_estimator_that_failed_midway_does_not_narrow_the_common_observations(installed: dict[str, Any]) -> None:
     some = np.arange(N) < N // 2
     installed["failing"] = with_changes(status=Status.FAILED, reason="frame 3", used=np.arange(N) < 3)
     installed["half"] = with_changes(used=some)
@@ -175,7 +176,7 @@ def test_estimators_are_checked_before_anything_runs(names: tuple[str, ...], mes
 
 
 @pytest.mark.parametrize("name", ["a/b", "..", ".hidden", "c\\d"])
-def test_a_name_that_can_be_no_files_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_an_impossible_file_name_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr("fgbaseline.reports.run.problem.estimator_names", lambda: [name])
     with pytest.raises(InputError, match="cannot be a file name"):
         check_estimators((name,))
@@ -185,3 +186,19 @@ def test_the_simulated_drive_is_another_one_with_another_seed() -> None:
     one, other = (read_sequence(RunSettings(seed=seed)) for seed in (0, 1))
     assert one.n_frames == other.n_frames == 600
     assert not np.array_equal(one.linear_velocity, other.linear_velocity)
+
+
+@pytest.mark.parametrize("estimators", [("isam2",), ("isam2", "batch"), ("ekf",)])
+def test_batch_is_added_up_to_a_number_of_observations_where_it_has_the_answer_of_isam2(
+    estimators: tuple[str, ...],
+) -> None:
+    n = int(PROBLEM.mask.sum())
+    asked = RunSettings(estimators=estimators, batch_up_to=n)
+    assert batch_is_added(PROBLEM, asked) == (estimators == ("isam2",))
+    assert not batch_is_added(PROBLEM, replace(asked, batch_up_to=n - 1))
+    run = solve(PROBLEM, asked)
+    expected = ["isam2", "batch"] if "isam2" in estimators else ["ekf"]
+    assert list(run.results) == expected
+    assert run.settings["estimators"] == ",".join(expected)
+    events = {str(event.kind) for event in run.results["batch"].estimate.events} if "batch" in run.results else set()
+    assert ("started at isam2's answer only" in events) == (estimators == ("isam2",))

@@ -6,19 +6,17 @@ import gtsam
 import numpy as np
 import pytest
 
-from fgbaseline import data, smoother
+from fgbaseline import compare, data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
 from fgbaseline.data.motion import dead_reckoned_path
-from fgbaseline.geometry import FloatArray
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent, values_from_state
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key
 from fgbaseline.smoother.graph.marginal_covariances import marginal_covariances
 from fgbaseline.smoother.initialization.windowed_initialization import optimize_in_windows
 
-from ..builders.four_rows import assert_no_small_step_lowers_the_cost, information
 from ..builders.synthetic import Scene, drive, matched, plain_problem, with_pixels
-from .test_isam2 import PROBLEMS, SCENE, state_of
+from .test_isam2 import PROBLEMS, SCENE
 
 
 def kinds(estimate: Estimate) -> set[str]:
@@ -37,32 +35,6 @@ def test_from_both_starts_it_ends_where_isam2_does(name: str) -> None:
     np.testing.assert_allclose(estimate.world_T_imu, isam2.world_T_imu, rtol=0, atol=5e-5)
 
 
-@pytest.mark.parametrize("name", ["plain", "held", "prior"])
-def test_no_small_step_lowers_the_cost_of_the_four_rows(name: str) -> None:
-    problem = PROBLEMS[name]
-    assert_no_small_step_lowers_the_cost(problem, state_of(smoother.batch(problem)))
-
-
-@pytest.mark.parametrize("name", ["plain", "prior"])
-def test_the_covariances_are_the_dense_inverse_of_the_curvature(name: str) -> None:
-    problem = PROBLEMS[name]
-    estimate = smoother.batch(problem)
-    assert estimate.covariance is not None
-    assert estimate.landmarks.covariance is not None
-    dense, T = np.linalg.inv(information(problem, state_of(estimate))), problem.n_frames
-    for k, covariance in enumerate(estimate.covariance):
-        assert_near(covariance, dense[6 * k : 6 * k + 6, 6 * k : 6 * k + 6])
-    for row, covariance in enumerate(estimate.landmarks.covariance):
-        at = slice(6 * T + 3 * row, 6 * T + 3 * row + 3)
-        assert_near(covariance, dense[at, at])
-
-
-def assert_near(covariance: FloatArray, expected: FloatArray) -> None:
-    unit = 1.0 / np.sqrt(np.diag(expected))
-    scale = unit[:, None] * unit[None, :]
-    np.testing.assert_allclose(covariance * scale, expected * scale, rtol=0, atol=1e-3)
-
-
 def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
     problem = matched(drive(features_per_frame=30.0))
     estimate = smoother.isam2(problem)
@@ -77,7 +49,7 @@ def test_the_sweep_gives_the_covariances_of_gtsams_marginals() -> None:
     np.testing.assert_allclose(estimate.covariance[9], reorder_tangent(swept[pose_key(9)]), rtol=1e-6, atol=1e-12)
 
 
-def test_an_answer_that_is_given_is_not_found_again() -> None:
+def test_a_given_estimate_is_not_computed_again() -> None:
     problem = PROBLEMS["plain"]
     known = smoother.isam2(problem)
     calls: list[tuple[int, int]] = []
@@ -101,7 +73,7 @@ def biased(problem: Problem, rate: float) -> Problem:
     return replace(problem, increment=increment, increment_covariance=covariance)
 
 
-def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> None:
+def test_windowed_initialization_brings_a_bent_path_to_where_a_descent_converges() -> None:
     problem = biased(matched(drive(seconds=15.0, features_per_frame=40.0)), 0.15)
     truth = problem.sequence.truth
     assert truth is not None
@@ -116,7 +88,7 @@ def test_pieces_bring_a_path_that_bends_wrongly_to_where_a_descent_begins() -> N
     assert "both starts end at the same cost" in kinds(estimate)
 
 
-def test_starts_that_end_apart_are_told_loudly_and_the_lower_cost_counts() -> None:
+def test_starts_that_end_at_different_minima_are_an_event_and_the_lower_cost_counts() -> None:
     problem = PROBLEMS["plain"]
     good = smoother.isam2(problem)
     # Behind the cameras no landmark pulls: a start from there stays there.
@@ -129,7 +101,7 @@ def test_starts_that_end_apart_are_told_loudly_and_the_lower_cost_counts() -> No
     np.testing.assert_allclose(estimate.world_T_imu, good.world_T_imu, rtol=0, atol=1e-5)
 
 
-def test_without_an_answer_of_isam2_there_is_one_start_and_batch_says_so() -> None:
+def test_without_isam2_batch_has_one_start_and_reports_it() -> None:
     problem = PROBLEMS["kernel"]
     failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
     estimate = smoother.batch(problem, given={"isam2": failed})
@@ -140,7 +112,24 @@ def test_without_an_answer_of_isam2_there_is_one_start_and_batch_says_so() -> No
     np.testing.assert_allclose(estimate.world_T_imu, smoother.isam2(problem).world_T_imu, rtol=0, atol=1e-3)
 
 
-def test_a_landmark_behind_the_cameras_is_given_up() -> None:
+def test_started_at_isam2_alone_it_reaches_the_minimum_of_both_starts_unless_isam2_failed() -> None:
+    problem = PROBLEMS["plain"]
+    given = {"isam2": smoother.isam2(problem)}
+    both, one = smoother.batch(problem, given=given), smoother.batch(problem, given=given, from_dead_reckoning=False)
+    (event,) = one.events
+    assert event.kind == "started at isam2's answer only"
+    assert "dead reckoning" not in event.reason
+    assert one.status is Status.OK
+    np.testing.assert_allclose(one.world_T_imu, both.world_T_imu, rtol=0, atol=1e-5)
+    verdict = compare.trust(problem, given["isam2"], one)
+    assert any("started at isam2's answer agrees" in reason for reason in verdict.reasons)
+
+    failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
+    alone = smoother.batch(problem, given={"isam2": failed}, from_dead_reckoning=False)
+    assert "one start only" in kinds(alone)
+
+
+def test_a_landmark_that_violates_cheirality_is_dropped() -> None:
     pixel = SCENE.observations.pixel.copy()
     flipped = SCENE.observations.landmark == 5
     pixel[flipped & (SCENE.observations.frame > 3)] = pixel[flipped & (SCENE.observations.frame > 3)][:, [2, 1, 0, 3]]

@@ -68,7 +68,7 @@ def everything(isam: CheckpointedISAM2) -> FloatArray:
 
 @pytest.mark.parametrize("failure", [behind_the_camera, unknown_variable])
 @pytest.mark.parametrize("interval", [1, 3, 50])
-def test_after_a_failure_the_estimate_is_what_it_was(failure: object, interval: int) -> None:
+def test_after_a_failed_update_the_estimate_is_restored(failure: object, interval: int) -> None:
     assert callable(failure)
     isam = CheckpointedISAM2(parameters(), interval)
     for k in range(8):

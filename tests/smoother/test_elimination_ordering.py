@@ -30,7 +30,7 @@ def seen_at(frame: int) -> list[int]:
     return [key(j) for j in range(max(0, frame - LIFE + 1), frame + 1)]
 
 
-def test_what_came_first_is_eliminated_first() -> None:
+def test_older_variables_are_eliminated_first() -> None:
     ordering = EliminationOrdering()
     frame = 0
     for frame in range(2 * GROUP_FRAMES * N_GROUPS):
@@ -58,18 +58,18 @@ def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool
         assert groups[AUXILIARY_POSE] > max(group for k, group in groups.items() if k != AUXILIARY_POSE)
 
 
-def test_of_a_crowd_only_the_pose_is_kept_for_the_end() -> None:
+def test_among_many_new_landmarks_only_the_pose_is_eliminated_last() -> None:
     crowd = list(map(key, range(MANY_LANDMARKS + 1)))
     assert EliminationOrdering().groups(5, crowd) == {pose_key(5): 1, AUXILIARY_POSE: 2}
     assert EliminationOrdering().groups(5, crowd, all_new=True) == {pose_key(5): 1, AUXILIARY_POSE: 2}
 
 
-def test_where_all_is_fresh_the_frame_before_is_kept_for_the_end() -> None:
+def test_where_all_landmarks_are_new_the_previous_frame_is_eliminated_late() -> None:
     groups = EliminationOrdering().groups(5, [key(0)], all_new=True)
     assert groups == {pose_key(4): 1, pose_key(5): 1, key(0): 1, AUXILIARY_POSE: 2}
 
 
-def test_the_tail_is_no_landmark() -> None:
+def test_the_auxiliary_pose_is_no_landmark() -> None:
     assert landmark_of(AUXILIARY_POSE) is None
 
 

@@ -178,7 +178,7 @@ def test_the_order_of_tangents_is_turned_and_turned_back() -> None:
     np.testing.assert_array_equal(reorder_tangent(reorder_tangent(named)), named)
 
 
-def test_a_point_behind_the_camera_throws_nothing() -> None:
+def test_a_point_behind_the_camera_raises_no_exception() -> None:
     problem = PROBLEMS["no prior"]
     factors = FactorBuilder(problem)
     state = near_truth(problem, np.random.default_rng(0), 0.0)

@@ -25,7 +25,7 @@ LONG = FixedLagSettings(lag=1e3, isam2=TIGHT)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_a_window_that_holds_everything_ends_like_isam2(name: str) -> None:
+def test_a_window_over_all_frames_ends_at_the_solution_of_isam2(name: str) -> None:
     problem = PROBLEMS[name]
     lagged, full = smoother.fixed_lag(problem, settings=LONG), smoother.isam2(problem)
     assert lagged.status is Status.OK
@@ -48,7 +48,7 @@ def assert_within(poses: FloatArray, expected: FloatArray, covariance: FloatArra
     np.testing.assert_array_less(apart, sigmas * np.sqrt(np.einsum("tii->ti", covariance)) + 1e-5)
 
 
-def test_a_pose_is_the_one_known_when_it_was_last_in_the_window() -> None:
+def test_a_fixed_lag_pose_is_that_of_its_last_frame_in_the_window() -> None:
     problem = replace(matched(drive(features_per_frame=30.0)), kernel=None)
     settings = FixedLagSettings(lag=1.05)
     estimate = smoother.fixed_lag(problem, settings=settings)
@@ -62,7 +62,7 @@ def test_a_pose_is_the_one_known_when_it_was_last_in_the_window() -> None:
         np.testing.assert_allclose(np.sqrt(np.diag(estimate.covariance[k])), sigma, rtol=0.1)
 
 
-def test_a_longer_lag_is_nearer_to_the_whole() -> None:
+def test_a_longer_lag_is_nearer_to_the_full_smoother() -> None:
     problem = matched(drive(seconds=8.0, features_per_frame=40.0))
     full = smoother.isam2(problem)
     apart = []
@@ -72,7 +72,7 @@ def test_a_longer_lag_is_nearer_to_the_whole() -> None:
     assert apart[0] > apart[1] > apart[2]
 
 
-def test_a_landmark_that_comes_back_is_made_anew() -> None:
+def test_a_landmark_that_is_observed_again_is_initialized_again() -> None:
     sequence = Scene(frames=30).sequence()
     o = sequence.observations
     gap = replace(sequence, observations=o.select((o.landmark != 3) | (o.frame < 6) | (o.frame >= 22)))
@@ -87,7 +87,7 @@ def test_a_landmark_that_comes_back_is_made_anew() -> None:
     np.testing.assert_allclose(estimate.world_T_imu, whole.world_T_imu, rtol=0, atol=0.1)
 
 
-def test_sights_before_the_window_do_not_help_a_landmark_in() -> None:
+def test_observations_before_the_window_do_not_count_for_initialization() -> None:
     o = SCENE.observations
     rare = replace(SCENE, observations=o.select((o.landmark != 3) | (o.frame % 4 == 0)))
     estimate = smoother.fixed_lag(plain_problem(rare), settings=FixedLagSettings(lag=0.45))
@@ -122,7 +122,7 @@ def test_without_observations_there_is_no_answer() -> None:
     assert estimate.status is Status.FAILED
 
 
-def test_frames_that_see_nothing_are_dead_reckoned() -> None:
+def test_frames_without_features_are_dead_reckoned() -> None:
     sequence = drive(features_per_frame=30.0)
     o = sequence.observations
     blind = replace(sequence, observations=o.select((o.frame < 15) | (o.frame > 40)))
@@ -166,7 +166,7 @@ def everything(lag: CheckpointedFixedLag) -> dict[int, FloatArray]:
     return {key: values.atPose3(key).matrix() if key >= pose_key(0) else values.atPoint3(key) for key in keys}
 
 
-def test_after_a_failure_the_window_is_what_it_was_and_goes_on_as_if_nothing_had_been() -> None:
+def test_after_a_failed_update_the_window_is_restored_and_continues() -> None:
     smooth, troubled = window(), window()
     for k in range(12):
         if k in (3, 8, 9):
@@ -186,7 +186,7 @@ def test_after_a_failure_the_window_is_what_it_was_and_goes_on_as_if_nothing_had
         np.testing.assert_allclose(everything(troubled)[key], value, rtol=0, atol=0.03)
 
 
-def test_a_forgotten_landmark_is_seen_no_more_but_what_left_with_it_stays() -> None:
+def test_a_marginalized_landmark_is_not_observed_again_and_its_information_stays() -> None:
     lag = window()
     for k in range(8):
         lag.update(*frame(k))

@@ -41,7 +41,7 @@ def test_isam2_is_at_the_minimum_of_batch_before_and_after(
         assert compare.divergence_summary(compare.divergence(estimate, batch))["rmse"] < 0.05
 
 
-def test_without_it_the_answer_is_another_and_what_was_known_online_the_same() -> None:
+def test_without_the_final_relinearization_the_solution_differs_and_the_online_one_does_not() -> None:
     problem = matched(drive(seconds=5.0, features_per_frame=15.0))
     before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
@@ -72,7 +72,7 @@ def error(increments: IncrementalSmoother) -> float:
     return float(compact_graph(graph).error(tree.calculateEstimate()))
 
 
-def test_steps_from_far_off_end_at_the_minimum_or_say_that_they_do_not() -> None:
+def test_gauss_newton_from_far_initial_values_ends_at_the_minimum_or_reports_failure() -> None:
     problem = matched(drive(seconds=8.0, features_per_frame=20.0, wrong=0.05))
     batch = smoother.batch(problem)
     graph, path = full_graph(problem), dead_reckoned_path(problem.increment, problem.initial_pose)

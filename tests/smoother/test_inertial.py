@@ -71,7 +71,7 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
         [
             se3.log(se3.inverse(problem.initial_pose) @ states.world_T_imu[0]),
             states.velocity[0] - start.velocity,
-            states.bias[0] - np.concatenate([start.gyroscope_bias, start.accelerometer_bias]),
+            states.bias[0] - start.bias,
         ]
     )
     parts = [np.linalg.solve(np.linalg.cholesky(start.covariance + np.diag(held**2)), first)]
@@ -162,18 +162,18 @@ def test_the_prior_of_the_start_has_its_correlations_and_true_jacobians(problem:
     np.testing.assert_allclose(J, np.array(numeric).T, atol=1e-6 * np.abs(J).max())
 
 
-def solution(problem: Problem, estimate: Estimate) -> tuple[FrameStates, dict[int, FloatArray]]:
-    return FrameStates.of_estimate(estimate), dict(
-        zip(estimate.landmarks.index.tolist(), estimate.landmarks.position, strict=True)
-    )
+def without_kernel(seed: int, n_frames: int) -> tuple[Problem, Estimate, FrameStates, dict[int, FloatArray]]:
+    """A problem without kernel, masked to the landmarks that isam2 has estimated, its answer, states and points."""
+    problem = replace(inertial_problem(seed, n_frames=n_frames), kernel=None)
+    estimate = smoother.isam2(problem)
+    seen = np.isin(problem.sequence.observations.landmark, estimate.landmarks.index)
+    kept = replace(problem, excluded=np.where(seen, problem.excluded, np.uint8(1)))
+    points = dict(zip(estimate.landmarks.index.tolist(), estimate.landmarks.position, strict=True))
+    return kept, estimate, FrameStates.of_estimate(estimate), points
 
 
 def test_costs_are_those_of_the_strapdown_equations_at_and_beside_the_solution() -> None:
-    problem = replace(inertial_problem(2, n_frames=6), kernel=None)
-    estimate = smoother.isam2(problem)
-    states, points = solution(problem, estimate)
-    seen = np.isin(problem.sequence.observations.landmark, estimate.landmarks.index)
-    kept = replace(problem, excluded=np.where(seen, problem.excluded, np.uint8(1)))
+    kept, estimate, states, points = without_kernel(2, 6)
     random = np.random.default_rng(1)
     graph = full_graph(kept, states)
     for size in (0.0, 1.0, 3.0):
@@ -206,11 +206,7 @@ def test_windows_find_the_path_that_integration_loses(problem: Problem) -> None:
 
 
 def test_joint_marginals_are_blocks_of_the_dense_inverse() -> None:
-    problem = replace(inertial_problem(0, n_frames=5), kernel=None)
-    estimate = smoother.isam2(problem)
-    states, _ = solution(problem, estimate)
-    seen = np.isin(problem.sequence.observations.landmark, estimate.landmarks.index)
-    kept = replace(problem, excluded=np.where(seen, problem.excluded, np.uint8(1)))
+    kept, estimate, states, _ = without_kernel(0, 5)
     graph, values = full_graph(kept, states), states.values(estimate.landmarks)
     keys = [state_keys(k, True) for k in range(5)]
     swept = marginal_covariances(graph, values, keys)

@@ -104,7 +104,7 @@ def test_under_landmark_priors_too(problem: Problem, exchanged: list[tuple[int, 
     assert_alike(short, one, online=1e-2)
 
 
-def test_landmarks_that_come_back_bring_the_tree_back(
+def test_returning_landmarks_restore_the_full_tree(
     exchanged: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     back, restored = [0], MarginalizedISAM2.restore_all

@@ -37,7 +37,7 @@ def test_qr_finds_the_same_answer() -> None:
     assert "solved by QR" not in {event.kind for event in (*quick.events, *qr.events)}
 
 
-def test_a_frame_that_cholesky_would_cost_is_kept_by_qr_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_frame_that_cholesky_would_lose_is_solved_by_qr_and_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = smoother.isam2(PROBLEM)
     tried = failing(monkeypatch, 5, qr_too=False)
     estimate = smoother.isam2(PROBLEM)
@@ -48,7 +48,7 @@ def test_a_frame_that_cholesky_would_cost_is_kept_by_qr_and_said(monkeypatch: py
     assert tried.count(0) == 2
 
 
-def test_what_neither_can_solve_costs_the_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_frame_that_neither_solver_can_solve_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, 5, qr_too=True)
     estimate = smoother.isam2(PROBLEM)
     assert estimate.status is Status.RECOVERED

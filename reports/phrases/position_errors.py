@@ -1,0 +1,138 @@
+"""Sentences on the position errors of a comparison: RMSE, ranking, maximum, decomposition, length of the path."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fgbaseline.compare import RmseDifference, distance_traveled
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.samples import coverage
+
+from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolved
+from .evidence import threshold_sentences
+
+
+def position_rmse(comparison: Comparison) -> list[str]:
+    """Position RMSEs in order, over the common poses; where these are not all poses, also over all of each."""
+    name = comparison.reference.name
+    others = [result for result in comparison.ranked if not result.entry.by_product]
+    by_products = [
+        f"{result.name}, a by-product of {name} with pose k from data up to frame k: {_rmse(result)}."
+        for result in comparison.ranked
+        if result.entry.by_product
+    ]
+    if not others:
+        return by_products
+    if comparison.ranking.same:
+        path = float(others[0].departure["travelled"][-1])
+        share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
+        first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
+        each = listed([f"{first}{share}", *rest])
+        return [f"Position RMSE against {name}: {each}.", *_order(comparison), *by_products]
+    each = listed(
+        f"{r.name} {_rmse(r)} over {counted(len(r.matched), 'pose')} "
+        f"({per_cent(coverage(comparison, r))} of {name}'s time)"
+        for r in others
+    )
+    return [*_over_common(comparison), f"Position RMSE over all poses of each estimate: {each}.", *by_products]
+
+
+def _over_common(comparison: Comparison) -> list[str]:
+    """Ranking of estimates that do not have the same moments, and the estimates that are not ranked."""
+    ranking, name = comparison.ranking, comparison.reference.name
+    apart = [r.name for r in comparison.ranked if not r.entry.by_product and ranking.rank(r.name) is None]
+    if len(ranking.rivals) < 2:
+        return [f"Not ranked, too few poses in common: {listed([*ranking.rivals, *apart])}."]
+    each = listed(f"{n} {number(ranking.rmse(n))} m" for n in ranking.rivals)
+    having = "the others have" if apart else "all have"
+    text = f"Position RMSE against {name} over the {counted(ranking.moments, 'pose')} that {having}: {each}."
+    missing = [f"Not ranked, too few poses in common with {name}: {listed(apart)}."] if apart else []
+    return [text, *_order(comparison), *missing]
+
+
+def _order(comparison: Comparison) -> list[str]:
+    behind = {n: d for n, d in comparison.behind.items() if not _is_unresolved(comparison.results[n])}
+    return significance_sentences(comparison.ranking.rivals[0], behind) if behind else []
+
+
+def significance_sentences(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
+    """Paired differences from the estimate with the smallest RMSE, `first`: the significant ones, and the others."""
+    groups: dict[bool, list[str]] = {True: [], False: []}
+    for name, d in behind.items():
+        groups[d.settled].append(f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
+    sentences = []
+    if groups[True]:
+        sentences.append(f"Larger position RMSE than {first}, by paired bootstrap: {listed(groups[True])}.")
+    if groups[False]:
+        sentences.append(f"No significant difference from {first}, by paired bootstrap: {listed(groups[False])}.")
+    return sentences
+
+
+def _signed(meters: float) -> str:
+    return number(meters) if not meters < 0 else f"{MINUS}{number(-meters)}"
+
+
+def _rmse(result: Result) -> str:
+    """Position RMSE with its interval, `0.52 m [0.41, 0.66]`; 0 below the resolution of the files."""
+    if _is_unresolved(result):
+        return f"{resolved(result.rmse, result.resolution['m'])} m"
+    value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
+    return f"{value} m{mark}{bounds}"
+
+
+def maximum_errors(comparison: Comparison) -> list[str]:
+    """Largest position error of each estimate, and when it first exceeds the threshold."""
+    onset = {}
+    for result in comparison.ranked:
+        if result.passing is not None:
+            t = result.passing.t - float(result.matched.reference.t[0])
+            when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
+            onset[result.name] = f"{when}, {number(result.passing.travelled)} m along the path"
+    largest = {r.name: float(np.nanmax(r.departure["position"])) for r in comparison.ranked}
+    most = {r.name: (r.bound, resolved(largest[r.name], r.resolution["m"])) for r in comparison.ranked}
+    return threshold_sentences("position error", most, onset)
+
+
+def file_resolution(comparison: Comparison) -> list[str]:
+    """States the resolution where a path is nearer to the reference than the files resolve."""
+    each = [f"{r.name} {number(r.resolution['m'])} m" for r in comparison.ranked if _is_unresolved(r)]
+    if not each:
+        return []
+    return [f"Nearer to {comparison.reference.name} than the decimals of the files resolve: {listed(each)}."]
+
+
+def _is_unresolved(result: Result) -> bool:
+    return result.rmse < result.resolution["m"]
+
+
+def error_decompositions(comparison: Comparison) -> list[str]:
+    """Shares of heading and scale in the squared position error."""
+    each = []
+    for result in comparison.ranked:
+        if np.isfinite(result.shares.noise) and not _is_unresolved(result):
+            heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
+            each.append(
+                f"of {result.name} {heading} from heading, {scale} from scale (least-squares scale "
+                f"{1.0 + 0.01 * result.shares.scale_percent:.4f}) and {rest} from the rest"
+            )
+    return [f"Squared position error: {'; '.join(each)}."] if each else []
+
+
+def _share(result: Result, name: str) -> str:
+    value, low, high = result.share_intervals.by_name[name]
+    if not np.isfinite(low):
+        return per_cent(max(value, 0.0))
+    return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
+
+
+def path_lengths(comparison: Comparison) -> list[str]:
+    """Length of each path over the paired poses, before alignment, against the reference's."""
+    each = []
+    for result in comparison.results.values():
+        matched = result.matched
+        own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
+        path = float(distance_traveled(matched.reference.position)[-1])
+        if path > 0.0 and number(own) != number(path):
+            share = f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'}"
+            each.append(f"{result.name} {number(own)} m, {share}")
+    return [f"Length of the path over the paired poses against the reference's: {'; '.join(each)}."] if each else []

@@ -1,0 +1,165 @@
+"""Record of a metric: its place in the results, its headings, unit, direction and tables, and the glossary's terms."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Flag, auto
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from fgbaseline.compare.limits import Better
+
+from ..formatting import interval, number
+from .json_tree import at
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Result, Run
+
+ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
+REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
+NEES, REFERENCE_NEES, RESIDUALS, COST = "NEES", "reference NEES", "residuals of tracks", "cost"
+SIGMA, CONSISTENCY = "1-sigma", "consistency"
+TERMS: Mapping[str, str] = {
+    "coverage": "Share of the recording's time (in a comparison: of the reference's) in which an estimator has poses.",
+    ATE: "Distance of the positions from ground truth, m. Aligned: after SE(3) alignment, with raw inertial data after "
+    "alignment in yaw and position. Unaligned: both start at one pose, as in the charts over time. In a comparison: "
+    "from the reference, after the alignment that was asked for.",
+    SIGMA: "Standard deviation of the positions by an estimator's own covariances, m, under the problem's noise model, "
+    "with the first pose fixed, unaligned. A consistent estimator's error is as large.",
+    DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
+    RPE: "Error of the motion between two poses a delta apart, m and °.",
+    "drift": "Relative error per meter (or second) over a tenth of the path.",
+    SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; shorter where the path is too short.",
+    REPROJECTION: "Norm of the four pixel differences (uL, vL, uR, vR) of an observation, px. Common observations are "
+    "those that every estimator used.",
+    HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
+    "path, px. It judges motion over a second or two, not drift. A path is separated from the best where "
+    "'above the best by at least' is positive.",
+    NEES: "Normalized estimation error squared of a pose, e^T P^-1 e with e = log(T^-1 T_true): 6 is expected of a "
+    "consistent estimator, 5.35 in the median. A larger figure means that it is overconfident.",
+    REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "
+    "in the median. Frames where P − P_ref is not positive definite are left out. An estimator is overconfident where "
+    "its P is smaller than P_ref in a direction, in most frames.",
+    "NIS per row": "Squared innovations of a filter over their covariance, per degree of freedom: 1 is expected.",
+    "sigma ratio": "Sigma of an estimator over that of the reference, median of the frames: a filter's is above 1.",
+    RESIDUALS: "Squared residuals of a track over the noise assumed, per degree of freedom: 1 is expected. A point is "
+    "dynamic where a constant velocity explains its residuals: it moved, or its track slid.",
+    MAP: "Distance of landmarks from the reference's of the same number, m; in the frame of each one's own camera it "
+    "is without drift. 1.54 sigmas of P − P_ref are expected.",
+}
+"""term -> definition, in the glossary of every page; docs/glossary.md has the formulas"""
+
+
+class Value(NamedTuple):
+    """A figure, and its 95 % interval where it has one; NaN for what is missing."""
+
+    value: float
+    low: float = nan
+    high: float = nan
+
+    @property
+    def text(self) -> str:
+        """`0.52 [0.41, 0.66]`, the value alone, or a dash."""
+        return interval(self.value, self.low, self.high)
+
+    def __bool__(self) -> bool:
+        """Whether there is a finite figure."""
+        return isfinite(self.value)
+
+
+class Tables(Flag):
+    """Tables that a metric is a column of."""
+
+    MAIN = auto()
+    """of a run, on its page"""
+    EVIDENCE = auto()
+    """of a run, below the charts of its page"""
+    TERMINAL = auto()
+    """of a run"""
+    BENCH = auto()
+    COMPARISON = auto()
+
+
+NONE = Tables(0)
+MAIN, EVIDENCE, TERMINAL, BENCH, COMPARISON = Tables
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A figure of an estimator, with one name, unit and direction everywhere."""
+
+    path: tuple[str, ...]
+    """keys below the estimator; `DELTA` stands for each delta of a relative error"""
+    group: str
+    """quantity, the heading above its columns"""
+    title: str
+    """statistic, the heading of its column"""
+    unit: str = ""
+    better: Better = Better.NEITHER
+    tables: Tables = NONE
+    scale: float = 1.0
+    """of the figure in a table over that in the results"""
+    term: str = ""
+    """of the glossary, where it is not the group"""
+    brief: str = ""
+    """heading on the terminal and in a bench, where it is not the group"""
+    name: str = ""
+    """column of a bench's CSV tables; empty: none"""
+    ranked: bool = False
+    """whether a bench ranks by it: it measures accuracy"""
+    same_data: bool = False
+    """whether it is taken over the same data for all, so that it says which is best whatever each one covers"""
+    uneven_only: bool = False
+    """whether it stands in a run's table only where the estimators do not cover the same frames"""
+    nonzero_only: bool = False
+    """whether it stands in a run's table only where it is not 0 for all"""
+    count: bool = False
+    """whether it is a whole number"""
+    absent: str = ""
+    """why it may be missing, where the results do not say"""
+    measure: "Callable[[Run, Result], float] | None" = None
+    """its figure, where no model of the results has it"""
+
+    @property
+    def key(self) -> str:
+        """Name in `metrics.csv` and limits: the path."""
+        return ".".join(self.path)
+
+    @property
+    def short(self) -> str:
+        """Heading without a group above it."""
+        return self.brief or self.group
+
+    @property
+    def glossary_term(self) -> str:
+        """Term of the glossary that explains it; empty where there is none."""
+        term = self.term or self.group
+        return term if term in TERMS else ""
+
+    @property
+    def full_title(self) -> str:
+        """Group, title and unit."""
+        return f"{self.group}: {self.title}, {self.unit}" if self.unit else f"{self.group}: {self.title}"
+
+    @property
+    def heading(self) -> str:
+        """Short title and unit."""
+        return f"{self.short}, {self.unit}" if self.unit else self.short
+
+    def text(self, value: float) -> str:
+        """A figure of it, without its unit."""
+        return number(int(value) if self.count and isfinite(value) else value)
+
+    def value(self, results: Mapping[str, Any]) -> Value:
+        """Its figure in the results of one estimator."""
+        return Value(*(self.scale * part for part in value_at(results, *self.path)))
+
+
+def value_at(results: Mapping[str, Any], *path: str) -> Value:
+    """The number at a path, or the mapping there with `value`, `low` and `high`."""
+    found = at(results, *path)
+    parts = [found.get(key) for key in Value._fields] if isinstance(found, Mapping) else [found]
+    return Value(*map(_float, parts))
+
+
+def _float(value: object) -> float:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan

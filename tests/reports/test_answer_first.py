@@ -1,0 +1,130 @@
+"""The answer first: sigma of the reference, overconfidence, criteria of trust, and no rounding as a result."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fgbaseline import compare, data
+from fgbaseline.compare import Verdict
+from fgbaseline.reports import comparison
+from fgbaseline.reports.accuracy_check.evaluation import evaluate
+from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.results.reader import read_folder
+from fgbaseline.reports.results.run import summarize
+from fgbaseline.reports.run.folder import write_numbers
+from fgbaseline.reports.tables.run import OVERCONFIDENT, main_table, trust_table
+
+from ..builders.runs import answer, run_of, scene
+from ..builders.synthetic import plain_problem
+
+
+def claiming(sigma: float, frames: int) -> np.ndarray:
+    return np.tile(sigma**2 * np.eye(6), (frames, 1, 1))
+
+
+def run_with_claims(*names: str) -> compare.estimate_comparison.Run:
+    """Filters that claim 1 mm beside a reference that claims 10 cm."""
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    filters = [answer(problem, name, (3.0, 0.0, 0.0), covariance=claiming(1e-3, T)) for name in names]
+    return run_of(problem, *filters, answer(problem, "isam2", covariance=claiming(0.1, T)))
+
+
+def test_overconfidence_comes_second_and_many_estimators_make_one_sentence() -> None:
+    names = [f"filter-{i}" for i in range(9)]
+    sentences = verdict(run_with_claims(*names))
+    assert sentences[0].startswith("The reference")
+    assert sentences[1].startswith("Overconfident: filter-0 claims 0.00173 m (1-sigma) and is 1.7")
+    assert all(name in sentences[1] for name in names)
+    assert len([s for s in sentences if "filter-7" in s and "claims" in s]) == 1
+
+
+def test_the_sigma_of_the_reference_is_in_summary_and_sentence() -> None:
+    run = run_with_claims("ekf")
+    reference = summarize(run).reference
+    assert reference.sigma is not None
+    assert reference.sigma.position_rmse == pytest.approx(0.1 * np.sqrt(3.0))
+    assert reference.sigma.rotation_final_deg == pytest.approx(np.rad2deg(0.1 * np.sqrt(3.0)))
+    assert any(s.startswith("1-sigma of isam2 itself: 0.173 m") for s in verdict(run))
+
+
+def test_a_reference_nees_without_a_positive_definite_difference_reads_overconfident() -> None:
+    run = run_with_claims("ekf")
+    summary = summarize(run).model_dump(mode="json")
+    table = main_table(run, summary["estimators"])
+    column = [c.title for c in table.columns].index("reference NEES")
+    ekf = next(row for row in table.rows if row.name == "ekf")
+    assert ekf.cells[column].text == OVERCONFIDENT
+
+
+def test_another_minimum_of_the_same_graph_is_not_called_overconfident() -> None:
+    problem = plain_problem(scene())
+    run = run_of(problem, answer(problem, "isam2"), answer(problem, "batch"))
+    assert not [s for s in verdict(run) if s.startswith("Overconfident")]
+
+
+def test_inflated_pixel_noise_is_stated_and_low_residuals_are_no_praise() -> None:
+    problem = plain_problem(scene())
+    inflated = run_of(replace(problem, pixel_inflation=5.5), answer(problem, "isam2"))
+    pixel = next(c for c in inflated.trust.criteria if c.code == "pixel_scale")
+    assert pixel.remark == "the pixel sigma is inflated 5.5 times for time-correlated track errors"
+    assert any(
+        "inflated 5.5 times" in reason and "0.18 if independent from frame to frame" in reason
+        for reason in inflated.trust.reasons
+    )
+    rows = trust_table(inflated.trust.criteria).rows
+    assert "inflated 5.5 times" in rows[0].cells[-1].text
+    assert summarize(inflated).problem.pixel_inflation == 5.5
+    plain = run_of(problem, answer(problem, "isam2"))
+    assert not any("inflated" in reason for reason in plain.trust.reasons)
+
+
+@pytest.mark.parametrize(("at_most", "code"), [(0.1, 2), (10.0, 0)])
+def test_a_limit_below_the_sigma_of_the_reference_is_undecided(at_most: float, code: int, tmp_path: Path) -> None:
+    run = run_with_claims("ekf")
+    trusted = replace(run, trust=compare.Trust(Verdict.TRUSTED, ("it agrees",)))
+    write_numbers(trusted, tmp_path)
+    limits = tmp_path / "limits.toml"
+    text = f'[[limit]]\nmetric = "divergence.rmse"\nestimators = "ekf"\nat_most = {at_most}\n'
+    limits.write_text(text + "within_reference_sigma = true\n")
+    checked = evaluate(read_limits(limits), read_folder(tmp_path), None)
+    assert checked.exit_code == code
+    assert checked.sigmas[0].startswith("1-sigma of isam2 itself: 0.173 m")
+    limits.write_text(text)
+    assert evaluate(read_limits(limits), read_folder(tmp_path), None).exit_code == (1 if code else 0)
+
+
+def test_a_difference_of_the_decimals_alone_is_zero_and_not_best() -> None:
+    rng = np.random.default_rng(0)
+    poses = np.tile(np.eye(4), (100, 1, 1))
+    poses[:, :3, 3] = np.cumsum(rng.normal(size=(100, 3)), axis=0)
+    t = np.arange(100) / 10.0
+
+    def rounded(decimals: int, name: str, offset: float = 0.0) -> data.Trajectory:
+        moved = poses.copy()
+        moved[:, :3, 3] = np.round(poses[:, :3, 3] + offset * np.sin(t)[:, None], decimals)
+        return data.Trajectory(t, moved, name)
+
+    result = comparison.compare(rounded(9, "truth"), rounded(6, "mine"), rounded(6, "off", 0.1), align="none")
+    rmse = next(row for row in result.text_table.rows if row.name.startswith("RMSE, m"))
+    mine, off = rmse.cells[-2], rmse.cells[-1]
+    assert mine.text.startswith("0 ± 8.67 × 10⁻⁷")
+    assert not mine.best
+    assert not off.text.startswith("0 ±")
+    assert any(s.startswith("Nearer to truth than the decimals of the files resolve: mine") for s in result.verdict)
+
+
+def test_a_claim_above_the_error_is_not_called_overconfident() -> None:
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    loose = answer(problem, "dead-reckoning", (0.5, 0.0, 0.0), covariance=claiming(1.0, T))
+    run = run_of(problem, loose, answer(problem, "isam2", covariance=claiming(0.1, T)))
+    assert not [s for s in verdict(run) if s.startswith("Overconfident")]
+
+
+def test_an_inflation_of_a_few_percent_is_not_mentioned() -> None:
+    problem = replace(plain_problem(scene()), pixel_inflation=1.04)
+    assert not any("inflated" in reason for reason in run_of(problem, answer(problem, "isam2")).trust.reasons)
