@@ -74,6 +74,8 @@ BENCH_FLAGS :=
 bench: install
 	$(BIN)/python -m benchmarks.performance --recordings $(RECORDINGS) --runs $(BENCH_RUNS) \
 	  --figure docs/images/growth.png $(BENCH_FLAGS)
+	$(BIN)/python -m benchmarks.waiting $(if $(BENCH_FLAGS),--runs 1,--write) \
+	  $(addprefix --recording ,$(wildcard $(RECORDINGS)/03.npz))
 
 lint: install
 	$(BIN)/ruff check .

@@ -2,7 +2,7 @@
 there."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from fgbaseline.data import Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 
-from .estimate_comparison import Result, Run
+if TYPE_CHECKING:
+    from .estimate_comparison import Result, Run
 
 FAR = 5.0
 """m, largest threshold"""
@@ -32,17 +33,17 @@ class DivergenceOnset:
     """share of the matches within `AROUND` that the mask excluded as wrong; None without a mask"""
 
 
-def divergence_threshold(result: Result) -> float:
+def divergence_threshold(result: "Result") -> float:
     """Position difference (m) at which an estimate has left the reference: 5 m, or 1 % of the path if less."""
     return min(FAR, FAR_SHARE * path_length(result)) or FAR
 
 
-def path_length(result: Result) -> float:
+def path_length(result: "Result") -> float:
     """Length of the reference's path, m."""
     return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["travelled"].to_numpy()))
 
 
-def divergence_onset(run: Run, result: Result) -> DivergenceOnset | None:
+def divergence_onset(run: "Run", result: "Result") -> DivergenceOnset | None:
     """Onset of the divergence of `result`; None if it stays within the threshold."""
     if result.divergence is None:
         return None

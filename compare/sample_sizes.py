@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 from fgbaseline import compare
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.strapdown import BLOCKS
 
-from .consistency.state import BLOCKS, QUANTITIES
+from .consistency.state import QUANTITIES
 from .estimate_comparison import InertialEvidence, Result, Run, known
 
 

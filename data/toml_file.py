@@ -11,9 +11,7 @@ raise file.wrong(("limit", 0, "metric"), "there is no such metric")  # limits.to
 
 import difflib
 import json
-import re
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeGuard, TypeVar, get_args
@@ -23,7 +21,8 @@ from pydantic_core import ErrorDetails
 
 from fgbaseline.geometry import InputError
 
-from .formats.named_file import FilePath, reading, regular_file, shown
+from .formats.named_file import FilePath, shown
+from .toml_text import toml_values
 
 SHOWN = 60
 """characters of a value that a sentence repeats"""
@@ -55,8 +54,7 @@ def read_toml(path: FilePath, model: type[Content]) -> TomlFile[Content]:
     TOML has types, so "5" is no number and 1 no truth value; arrays may become tuples, and strings enums and paths.
     Raises InputError naming the file, the key path and the allowed values, for the first fault in the file.
     """
-    with reading(path):
-        values = _parsed(regular_file(path).read_bytes())
+    values = toml_values(path)
     try:
         content = model.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
@@ -80,22 +78,6 @@ def _order(place: Place, values: Any) -> tuple[int, ...]:
 
 def _wrong(path: FilePath, key: str, sentence: str) -> InputError:
     return InputError(": ".join(text for text in (shown(path), key, sentence) if text))
-
-
-def _parsed(text: bytes) -> dict[str, Any]:
-    """The values in a text. Raises InputError, with the line where the syntax is wrong."""
-    try:
-        return tomllib.loads(text.decode())
-    except UnicodeDecodeError as error:
-        line = text.count(b"\n", 0, error.start) + 1
-        raise InputError(f"line {line}: this is no UTF-8 text; write the file as TOML") from None
-    except tomllib.TOMLDecodeError as error:
-        why, _, where = str(error).rpartition(" (at ")
-        found = re.search(r"line (\d+)", where)
-        line = int(found[1]) if found else text.rstrip().count(b"\n") + 1
-        raise InputError(f"line {line}: this is not TOML ({why[:1].lower()}{why[1:]}); see https://toml.io") from None
-    except (ValueError, RecursionError):
-        raise InputError("a value in it is too long or too deeply nested to be read; make it simpler") from None
 
 
 def _fault(error: ErrorDetails, values: Any, model: type[BaseModel]) -> tuple[Place, str, str]:

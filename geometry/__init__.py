@@ -1,10 +1,27 @@
 """Rotations, rigid motions, stereo camera and measurement model on stacked arrays; the error base class."""
 
-from . import se3, so3, strapdown
-from .errors import FgbaselineError, InputError
-from .measurement import HuberKernel, StereoMeasurement
-from .so3 import FloatArray
-from .stereo import StereoCamera, disparity
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from . import se3, so3, strapdown
+    from .errors import FgbaselineError, InputError
+    from .measurement import HuberKernel, StereoMeasurement
+    from .so3 import FloatArray
+    from .stereo import StereoCamera, disparity
+else:
+    from fgbaseline.geometry.lazy_names import lazy_names
+
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "se3": "se3",
+            "so3": "so3 FloatArray",
+            "strapdown": "strapdown",
+            "errors": "FgbaselineError InputError",
+            "measurement": "HuberKernel StereoMeasurement",
+            "stereo": "StereoCamera disparity",
+        },
+    )
 
 __all__ = [
     "FgbaselineError",

@@ -24,6 +24,14 @@ from .so3 import FloatArray, hat3
 STATE = 15
 TRANSLATION, ROTATION, VELOCITY, GYROSCOPE_BIAS, ACCELEROMETER_BIAS = (slice(i, i + 3) for i in range(0, STATE, 3))
 """blocks of the error state"""
+BLOCKS = {
+    "translation": TRANSLATION,
+    "rotation": ROTATION,
+    "velocity": VELOCITY,
+    "gyroscope_bias": GYROSCOPE_BIAS,
+    "accelerometer_bias": ACCELEROMETER_BIAS,
+}
+"""blocks of the error state by name, 3 degrees of freedom each"""
 SMALL = 1.0
 """rad, below which coefficients are taken from their series: the closed forms lose digits there"""
 _TERMS = 9

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from functools import wraps
-from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin
 
 from fgbaseline.geometry import InputError
 
@@ -34,7 +34,7 @@ def in_python(sentence: str) -> str:
 
 
 def _require_choices(function: Callable[..., object], keywords: dict[str, Any]) -> None:
-    hints = get_type_hints(function)
+    hints = function.__annotations__  # a type in quotes, which is imported on use, has no Literal in it
     for name, value in keywords.items():
         choices = list(_choices(hints.get(name)))
         if choices and isinstance(value, str) and value not in choices:

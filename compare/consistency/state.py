@@ -11,20 +11,13 @@ import pandas as pd
 
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, strapdown
+from fgbaseline.geometry.strapdown import BLOCKS
 
 from ..statistics.chi_square import mahalanobis_squared
 from ..statistics.descriptive import summarized
 from .covariance import is_positive_definite
 from .nees import body_error
 
-BLOCKS = {
-    "translation": strapdown.TRANSLATION,
-    "rotation": strapdown.ROTATION,
-    "velocity": strapdown.VELOCITY,
-    "gyroscope_bias": strapdown.GYROSCOPE_BIAS,
-    "accelerometer_bias": strapdown.ACCELEROMETER_BIAS,
-}
-"""of the error state, 3 degrees of freedom each"""
 QUANTITIES = ("velocity", "gyroscope_bias", "accelerometer_bias")
 """blocks that are additive, in m/s, rad/s and m/s^2"""
 AXES = "xyz"

@@ -1,32 +1,35 @@
 """Moving-block bootstrap (Kunsch, 1989) for statistics of errors that are correlated in time.
 
-The block length is that of Politis and White (2004). Sums and quantiles are computed without writing the draws out.
+The block length is that of Politis and White (2004).
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.display import Displayed
+from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, InputError
 
+from .block_draws import CONFIDENCE, BlockDraws, draw_blocks, percentile_interval
 from .descriptive import mean, quantile, without_nan
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 REPETITIONS = 1000
-CONFIDENCE = 0.95
 MIN_BLOCKS = 10
 """blocks in a series below which an interval is not reliable"""
 MAX_BLOCKS = 5000
 """blocks in a series at most; longer blocks than the correlation requires do no harm at this number"""
 
 OF_SERIES = ("rmse", "mean", "median", "std", "p95")
+QUANTILES = {"median": 0.5, "p95": 0.95}
 WITHOUT_INTERVAL = ("min", "max", "sse")
 """the bootstrap is not consistent for extremes, and a sum grows with the number of errors"""
-AT_ONCE = 500_000
-"""numbers per batch: few enough to stay in the processor's cache"""
 INSIGNIFICANT_IN_A_ROW = 5
 
 
@@ -83,68 +86,43 @@ def _last_before_quiet(significant: BoolArray, in_a_row: int) -> int | None:
     return int(np.argmax(quiet)) if quiet.any() else None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class BlockDraws:
-    """Draws of r series of n values each: blocks of a series that begin anywhere; the last one is truncated."""
+class Bounded(NamedTuple):
+    """A statistic with its interval; NaN where it has none."""
 
-    start: IntArray
-    """start of each block (r, m)"""
-    length: IntArray
-    """length of each block (m,), n in total"""
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
 
-    def __len__(self) -> int:
-        return len(self.start)
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ErrorStatistics(Displayed):
+    """Statistics of errors in order of time, with bootstrap intervals of some."""
+
+    by_name: Mapping[str, Bounded]
+    """rmse, mean, median, std, p95, min, max, sse (sum of squares) and n"""
+    block: int
+    """block length, in errors"""
+    blocks: float
+    """the number of blocks that fits into the series"""
+    confidence: float
+    reliable: bool
+    """whether there are MIN_BLOCKS of them and the correlation ends within the series, which that of an error that
+    grows with the path does not"""
+    missing: int
+    """number of NaN"""
+
+    def __getitem__(self, name: str) -> Bounded:
+        return self.by_name[name]
 
     @property
-    def n(self) -> int:
-        """Number of values of a series."""
-        return int(self.length.sum())
+    def table(self) -> "pd.DataFrame":
+        """Columns `value`, `low` and `high`, a row for each statistic; the rest is in `attrs`."""
+        import pandas as pd
 
-    def sums(self, values: FloatArray) -> FloatArray:
-        """Sums (r, d) of values (n, d) over each drawn series."""
-        before = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        total = np.empty((len(self), values.shape[1]))
-        for rows in _batches(len(self), len(self.length)):
-            start = self.start[rows]
-            total[rows] = (before[start + self.length] - before[start]).sum(axis=1)
-        return total
-
-    def quantiles(self, values: FloatArray, at: tuple[float, ...]) -> FloatArray:
-        """Quantiles (r, q) `at` (0 to 1) of values (n,) in each drawn series, linear between ranks as numpy's."""
-        n, order = self.n, np.argsort(values, kind="stable")
-        rising = values[order]
-        rank = np.asarray(at) * (n - 1)
-        low = np.floor(rank).astype(np.int64)
-        ranks, share = np.stack([low, np.minimum(low + 1, n - 1)]), rank - low
-        found = np.empty((len(self), len(at)))
-        for rows in _batches(len(self), n):
-            up_to = np.cumsum(np.take(self._counts(rows), order, axis=1), axis=1, dtype=np.int32)
-            for row, rises in zip(range(rows.start, rows.stop), up_to, strict=True):
-                here, there = rising[np.searchsorted(rises, ranks.astype(np.int32), side="right")]
-                found[row] = here + share * (there - here)
-        return found
-
-    def _counts(self, rows: slice) -> NDArray[np.int32]:
-        """Multiplicity (rows, n) of each value in the drawn series."""
-        start, width = self.start[rows], self.n + 1
-        first = width * np.arange(len(start))[:, None]
-        change = np.zeros(width * len(start), dtype=np.int32)
-        np.add.at(change, (first + start).ravel(), np.int32(1))
-        np.subtract.at(change, (first + start + self.length).ravel(), np.int32(1))
-        return np.cumsum(change.reshape(-1, width)[:, :-1], axis=1, dtype=np.int32)
-
-
-def draw_blocks(n: int, block: int, repetitions: int, seed: int) -> BlockDraws:
-    """Draw `repetitions` series of n values from blocks of `block` (1 to n) values."""
-    whole, rest = divmod(n, block)
-    length = np.array([block] * whole + [rest] * (rest > 0), dtype=np.int64)
-    start = np.random.default_rng(seed).integers(0, n - block + 1, size=(repetitions, len(length)))
-    return BlockDraws(start, length)
-
-
-def _batches(rows: int, width: int) -> list[slice]:
-    step = max(1, AT_ONCE // max(width, 1))
-    return [slice(k, min(k + step, rows)) for k in range(0, rows, step)]
+        rows = pd.Index(self.by_name, name="statistic")
+        table = pd.DataFrame(list(self.by_name.values()), index=rows, columns=list(Bounded._fields))
+        table.attrs = {key: getattr(self, key) for key in ("block", "blocks", "confidence", "reliable", "missing")}
+        return table
 
 
 def error_statistics(
@@ -154,17 +132,30 @@ def error_statistics(
     repetitions: int = REPETITIONS,
     seed: int = 0,
     block: int | None = None,
-) -> pd.DataFrame:
-    """Statistics of errors (n,) in order of time, with bootstrap intervals: columns `value`, `low`, `high`.
+) -> "pd.DataFrame":
+    """Table of `bootstrapped` statistics of errors (n,): columns `value`, `low`, `high`.
 
-    Rows: rmse, mean, median, std, p95, min, max, sse (sum of squares) and n. `low` and `high` are percentiles over
-    `repetitions` series of random blocks of the errors, which preserves their correlation in time; NaN
-    for min, max, sse and n. `block` is by default the longer of Politis and White's for the errors and their squares,
-    and no less than n / MAX_BLOCKS. The table's `attrs` have `block`, `blocks` (the number that fits into the series),
-    `confidence` and `reliable`: whether there are MIN_BLOCKS of them and the correlation ends within the series,
-    which that of an error that grows with the path does not; `missing`, the number of NaN. Infinite errors count,
-    and leave no interval. All NaN where there is no error. Raises
-    InputError for a confidence outside (0, 1), fewer than 1 repetition, or a block that is not between 1 and n.
+    Rows: rmse, mean, median, std, p95, min, max, sse (sum of squares) and n. The table's `attrs` have `block`,
+    `blocks` (the number that fits into the series), `confidence`, `reliable` and `missing`, the number of NaN.
+    """
+    return bootstrapped(errors, confidence=confidence, repetitions=repetitions, seed=seed, block=block).table
+
+
+def bootstrapped(
+    errors: ArrayLike,
+    *,
+    of: Collection[str] = OF_SERIES,
+    confidence: float = CONFIDENCE,
+    repetitions: int = REPETITIONS,
+    seed: int = 0,
+    block: int | None = None,
+) -> ErrorStatistics:
+    """Statistics of errors (n,) in order of time, with bootstrap intervals of those named in `of`.
+
+    Intervals are percentiles over `repetitions` series of random blocks of the errors, which preserves their
+    correlation in time. `block` is by default the longer of Politis and White's for the errors and their squares,
+    and no less than n / MAX_BLOCKS. Infinite errors count, and leave no interval. All NaN where there is no error.
+    Raises InputError for a confidence outside (0, 1), fewer than 1 repetition, or a block that is not between 1 and n.
     """
     if not 0.0 < confidence < 1.0 or repetitions < 1:
         raise InputError(f"bootstrap: expected 0 < confidence < 1 and repetitions, got {confidence!r}, {repetitions!r}")
@@ -175,24 +166,18 @@ def error_statistics(
         raise InputError(f"bootstrap: a block of {block} does not fit into {n} errors")
     found = [block_length(e), block_length(e**2)] if n and finite else []
     length = block or max([1, -(-n // MAX_BLOCKS), *(one.length for one in found)])
-    values = {**_of_series(e), "n": n}
-    table = pd.DataFrame({"value": values, "low": np.nan, "high": np.nan}).rename_axis("statistic")
+    statistics = {name: Bounded(value) for name, value in {**_of_series(e), "n": n}.items()}
     if n > 1 and finite:
-        drawn = _of_draws(e, draw_blocks(n, length, repetitions, seed))
-        table.loc[list(OF_SERIES), ["low", "high"]] = percentile_interval(drawn, confidence).T
-    table.attrs = {
-        "block": length,
-        "blocks": n / length,
-        "confidence": confidence,
-        "reliable": finite and n / length >= MIN_BLOCKS and all(one.correlation_ends for one in found),
-        "missing": int(np.size(np.asarray(errors)) - n),
-    }
-    return table
-
-
-def percentile_interval(drawn: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
-    """Percentile interval (2, d), low and high, of drawn statistics (r, d)."""
-    return np.asarray(np.percentile(drawn, [50.0 * (1.0 - confidence), 50.0 * (1.0 + confidence)], axis=0))
+        for name, (low, high) in _intervals(e, draw_blocks(n, length, repetitions, seed), confidence, of).items():
+            statistics[name] = Bounded(statistics[name].value, low, high)
+    return ErrorStatistics(
+        by_name=statistics,
+        block=length,
+        blocks=n / length,
+        confidence=confidence,
+        reliable=finite and n / length >= MIN_BLOCKS and all(one.correlation_ends for one in found),
+        missing=int(np.size(np.asarray(errors)) - n),
+    )
 
 
 def _of_series(e: FloatArray) -> dict[str, float]:
@@ -204,10 +189,18 @@ def _of_series(e: FloatArray) -> dict[str, float]:
     return dict(zip((*OF_SERIES, *WITHOUT_INTERVAL), map(float, figures), strict=True))
 
 
-def _of_draws(e: FloatArray, draws: BlockDraws) -> FloatArray:
-    """Statistics OF_SERIES (r, 5) of each series drawn from e (n,)."""
-    centre = e.mean()
-    square, apart, square_apart = (draws.sums(np.stack([e**2, e - centre, (e - centre) ** 2], axis=1)) / len(e)).T
-    median, p95 = draws.quantiles(e, (0.5, 0.95)).T
-    deviation = np.sqrt(np.maximum(square_apart - apart**2, 0.0))
-    return np.stack([np.sqrt(square), centre + apart, median, deviation, p95], axis=1)
+def _intervals(
+    e: FloatArray, draws: BlockDraws, confidence: float, of: Collection[str]
+) -> dict[str, tuple[float, float]]:
+    """Low and high of the statistics `of` over the series drawn from e (n,)."""
+    drawn: dict[str, FloatArray] = {}
+    if "rmse" in of:
+        drawn["rmse"] = np.sqrt(draws.means(e**2))
+    if "mean" in of or "std" in of:
+        apart = draws.means(e - e.mean())
+        drawn["mean"] = e.mean() + apart
+    if "std" in of:
+        drawn["std"] = np.sqrt(np.maximum(draws.means((e - e.mean()) ** 2) - apart**2, 0.0))
+    found = {name: percentile_interval(each, confidence) for name, each in drawn.items()}
+    found |= {name: draws.quantile_interval(e, QUANTILES[name], confidence) for name in QUANTILES if name in of}
+    return {name: (float(found[name][0]), float(found[name][1])) for name in of}

@@ -8,15 +8,8 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .block_bootstrap import (
-    CONFIDENCE,
-    MAX_BLOCKS,
-    MIN_BLOCKS,
-    REPETITIONS,
-    block_length,
-    draw_blocks,
-    percentile_interval,
-)
+from .block_bootstrap import MAX_BLOCKS, MIN_BLOCKS, REPETITIONS, block_length
+from .block_draws import CONFIDENCE, draw_blocks, percentile_interval
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,17 +4,20 @@ E = A^-1 B takes one pose, or one motion, to another. `PoseRelation` names what 
 """
 
 from enum import StrEnum
-from typing import TypedDict, Unpack
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from ..columns import Columns, to_frame
 from .association import MatchedTrajectories
 from .delta_pairs import TOLERANCE, Unit, pose_pairs
 from .path import distance_traveled
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class PoseRelation(StrEnum):
@@ -85,7 +88,12 @@ def _measured(apart: FloatArray, R: FloatArray, R_ref: FloatArray, what: PoseRel
 POSE_COLUMNS = (PoseRelation.TRANSLATION, PoseRelation.ROTATION_DEG, PoseRelation.ROTATION_CHORD, PoseRelation.POSE)
 
 
-def absolute_errors(matched: MatchedTrajectories) -> pd.DataFrame:
+def absolute_errors(matched: MatchedTrajectories) -> "pd.DataFrame":
+    """Table of `absolute_error_columns`."""
+    return to_frame(absolute_error_columns(matched), "pose_index")
+
+
+def absolute_error_columns(matched: MatchedTrajectories) -> Columns:
     """ATE: one row per pair of poses, with the reference's stamp `t` (s) and the columns of `PoseRelation`
 
     `translation` (m; its RMSE is the ATE of Sturm et al., 2012), `rotation_deg`, `rotation_chord` and `pose`. In the
@@ -93,7 +101,7 @@ def absolute_errors(matched: MatchedTrajectories) -> pd.DataFrame:
     """
     estimate, reference = matched.estimate.world_T_body, matched.reference.world_T_body
     columns = {what.value: absolute_pose_error(estimate, reference, what) for what in POSE_COLUMNS}
-    return pd.DataFrame({"t": matched.reference.t, **columns}).rename_axis("pose_index")
+    return {"t": matched.reference.t, **columns}
 
 
 MOTION_COLUMNS = (
@@ -119,7 +127,14 @@ class Pairing(TypedDict, total=False):
 
 def relative_errors(
     matched: MatchedTrajectories, delta: float, unit: Unit | str, **pairing: Unpack[Pairing]
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
+    """Table of `relative_error_columns`."""
+    return to_frame(relative_error_columns(matched, delta, unit, **pairing))
+
+
+def relative_error_columns(
+    matched: MatchedTrajectories, delta: float, unit: Unit | str, **pairing: Unpack[Pairing]
+) -> Columns:
     """RPE: one row per pair of poses that are `delta` apart (see `matched_pairs`), with the columns
 
     `start`, `end` (indices of the matched poses), `t` (s, of the start), `seconds` and `metres` (of the reference's
@@ -134,16 +149,14 @@ def relative_errors(
         what.value: relative_pose_error(estimate.world_T_body, reference.world_T_body, pairs, what)
         for what in MOTION_COLUMNS
     }
-    return pd.DataFrame(
-        {
-            "start": start,
-            "end": end,
-            "t": reference.t[start],
-            "seconds": reference.t[end] - reference.t[start],
-            "metres": travelled[end] - travelled[start],
-            **columns,
-        }
-    )
+    return {
+        "start": start,
+        "end": end,
+        "t": reference.t[start],
+        "seconds": reference.t[end] - reference.t[start],
+        "metres": travelled[end] - travelled[start],
+        **columns,
+    }
 
 
 def matched_pairs(

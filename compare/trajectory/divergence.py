@@ -1,21 +1,25 @@
 """Error of each pose against a reference, along and across the track, and its growth along the path."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, so3
 
+from ..columns import Columns, to_frame
 from ..statistics.descriptive import summarized
 from .alignment import Align, Alignment, align, align_se3
 from .association import MatchedTrajectories
 from .path import along_track_frame, distance_traveled
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
+
+def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.0, 1.0)) -> "pd.DataFrame":
     """Error of each pose of an estimate against the reference, without alignment (both start at the same pose).
 
     `up` (3,) is the unit vector that points up in the world (`Sequence.up`). For the columns see `pose_errors`.
@@ -25,7 +29,7 @@ def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.
 
 def truth_errors(
     estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool | Align = False
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Error of each pose against ground truth, without alignment, after SE(3) alignment (`True`) or another one.
 
     The alignment is over all frames that both have. NaN in frames without truth and in frames that the estimator did
@@ -49,7 +53,12 @@ def truth_alignment(estimate: Estimate, truth: Truth, kind: Align, up: ArrayLike
     return align(estimate.world_T_imu[both], truth.world_T_imu[both], kind, up=up)
 
 
-def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.DataFrame:
+def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> "pd.DataFrame":
+    """Table of `pose_error_columns`."""
+    return to_frame(pose_error_columns(poses, reference, up), "frame")
+
+
+def pose_error_columns(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> Columns:
     """Errors of poses (T, 4, 4) against reference poses (T, 4, 4), one row per `frame`, with the columns
 
     `position` |p - p_ref|, m; its components `along` track, `across` track (left positive) and `up`, m, of the
@@ -65,21 +74,18 @@ def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> pd.D
     turned = poses[finite, :3, :3] @ np.swapaxes(reference[finite, :3, :3], 1, 2)
     angle[finite] = np.rad2deg(so3.rotation_angle(turned))
     heading[finite] = np.rad2deg(so3.twist_angle(upward, turned))
-    return pd.DataFrame(
-        {
-            "position": np.linalg.norm(difference, axis=1),
-            "along": np.einsum("ti,ti->t", difference, forward),
-            "across": np.einsum("ti,ti->t", difference, left),
-            "up": difference @ upward,
-            "rotation_deg": angle,
-            "heading_deg": heading,
-            "travelled": distance_traveled(reference[:, :3, 3]),
-        },
-        index=pd.RangeIndex(len(poses), name="frame"),
-    )
+    return {
+        "position": np.linalg.norm(difference, axis=1),
+        "along": np.einsum("ti,ti->t", difference, forward),
+        "across": np.einsum("ti,ti->t", difference, left),
+        "up": difference @ upward,
+        "rotation_deg": angle,
+        "heading_deg": heading,
+        "travelled": distance_traveled(reference[:, :3, 3]),
+    }
 
 
-def divergence_summary(table: pd.DataFrame) -> dict[str, float]:
+def divergence_summary(table: "pd.DataFrame") -> dict[str, float]:
     """RMSE, mean, median, p95, maximum and final position error (m); RMSE and final rotation error (deg)."""
     return {
         **summarized(table["position"]),
@@ -92,18 +98,23 @@ def divergence_summary(table: pd.DataFrame) -> dict[str, float]:
 PARTS = 10
 
 
-def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> pd.DataFrame:
-    """Table of `pose_errors` of matched poses, with `t` (s) and `percent_of_path`
+def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> "pd.DataFrame":
+    """Table of `departure_columns`."""
+    return to_frame(departure_columns(matched, up), "frame")
+
+
+def departure_columns(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> Columns:
+    """Columns of `pose_error_columns` of matched poses, with `t` (s) and `percent_of_path`
 
     = position error over distance traveled, %; NaN before the reference moves. The alignment is that of `matched`;
     for growth from a common start use `none` or `first-pose`.
     """
-    table = pose_errors(matched.estimate.world_T_body, matched.reference.world_T_body, up)
-    moved = table["travelled"].where(table["travelled"] > 0)
-    return table.assign(t=matched.reference.t, percent_of_path=100.0 * table["position"] / moved)
+    columns = pose_error_columns(matched.estimate.world_T_body, matched.reference.world_T_body, up)
+    moved = np.where(columns["travelled"] > 0, columns["travelled"], np.nan)
+    return {**columns, "t": matched.reference.t, "percent_of_path": 100.0 * columns["position"] / moved}
 
 
-def divergence_growth(table: pd.DataFrame, parts: int = PARTS) -> pd.DataFrame:
+def divergence_growth(table: "pd.DataFrame", parts: int = PARTS) -> "pd.DataFrame":
     """Growth of the error over `parts` pieces of the path of equal length, from a `divergence_along_path` table.
 
     One row per piece: `from_m`, `to_m`, `frames`, `rmse` of the position error (m), its growth `per_metre` (m/m) and
@@ -122,17 +133,18 @@ def divergence_growth(table: pd.DataFrame, parts: int = PARTS) -> pd.DataFrame:
     end = np.append(first[1:], len(travelled))
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = position[last] - position[first]
-        return pd.DataFrame(
+        return to_frame(
             {
                 "from_m": edges[:-1],
                 "to_m": edges[1:],
                 "frames": frames,
-                "rmse": [summarized(position[a:b])["rmse"] for a, b in zip(first, end, strict=True)],
+                "rmse": np.array([summarized(position[a:b])["rmse"] for a, b in zip(first, end, strict=True)]),
                 "per_metre": grown / (travelled[last] - travelled[first]),
                 "per_frame": grown / (last - first),
                 "heading_deg": table["heading_deg"].to_numpy()[last],
-            }
-        ).rename_axis("part")
+            },
+            "part",
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,10 +159,11 @@ class Exceedance:
     value: float
 
 
-def first_exceedance(table: pd.DataFrame, bound: float, column: str = "position") -> Exceedance | None:
-    """First row of a `divergence_along_path` table whose |column| exceeds a bound; None where there is none."""
-    beyond = np.flatnonzero(np.abs(table[column].to_numpy()) > bound)
+def first_exceedance(table: "pd.DataFrame | Columns", bound: float, column: str = "position") -> Exceedance | None:
+    """First row of a `divergence_along_path` table, or of its columns, where |column| is above a bound."""
+    values, t, travelled = (np.asarray(table[name]) for name in (column, "t", "travelled"))
+    beyond = np.flatnonzero(np.abs(values) > bound)
     if len(beyond) == 0:
         return None
-    row = table.iloc[beyond[0]]
-    return Exceedance(int(table.index[beyond[0]]), float(row["t"]), float(row["travelled"]), float(row[column]))
+    k = int(beyond[0])
+    return Exceedance(k, float(t[k]), float(travelled[k]), float(values[k]))

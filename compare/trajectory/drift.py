@@ -1,21 +1,40 @@
 """Drift rates: error of the motion per meter of path and per second."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
-import pandas as pd
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..statistics.block_bootstrap import CONFIDENCE, REPETITIONS, error_statistics
+from ..statistics.block_bootstrap import REPETITIONS, bootstrapped
+from ..statistics.block_draws import CONFIDENCE
 from .association import MatchedTrajectories
 from .ate_rpe import PoseRelation, relative_pose_error, require_stamps
 from .delta_pairs import nearest_delta_pairs
 from .path import distance_traveled
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 SHARE = 0.1
 """of the path and of its duration: the default interval of drift, or one step where that is longer"""
 TOLERANCE = 0.5
 """of the requested interval: largest deviation of a stretch, since rates divide by the stretch's own length"""
+
+
+class Rate(NamedTuple):
+    """Mean drift with its interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    over: str
+    """the interval"""
+    n: int
+    """number of stretches"""
 
 
 def drift(
@@ -26,12 +45,28 @@ def drift(
     confidence: float = CONFIDENCE,
     repetitions: int = REPETITIONS,
     seed: int = 0,
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
+    """Table of `drift_rates`: one row per rate, indexed by `quantity`."""
+    import pandas as pd
+
+    rates = drift_rates(matched, metres, seconds, confidence=confidence, repetitions=repetitions, seed=seed)
+    return pd.DataFrame(list(rates.values()), index=pd.Index(rates, name="quantity"), columns=list(Rate._fields))
+
+
+def drift_rates(
+    matched: MatchedTrajectories,
+    metres: float | None = None,
+    seconds: float | None = None,
+    *,
+    confidence: float = CONFIDENCE,
+    repetitions: int = REPETITIONS,
+    seed: int = 0,
+) -> Mapping[str, Rate]:
     """Mean error of the motion over `metres` of the reference's path, per meter, and over `seconds`, per second.
 
-    One row per rate, indexed by `quantity`: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over`
-    and the number `n` of overlapping stretches, each from a pose to the later one nearest to that interval.
-    Rows: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
+    By quantity: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over` and the number `n` of
+    overlapping stretches, each from a pose to the later one nearest to that interval.
+    Quantities: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
     stamps), each divided by the stretch's own length; `end translation` (%) and `end rotation` (deg/m): the
     error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
     does not move or no stretch has the requested length.
@@ -65,13 +100,12 @@ def drift(
         ("end rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, whole, path_length, f"{path:.4g} m"),
     ]
     poses, truth = matched.estimate.world_T_body, reference.world_T_body
-    rows = []
+    found = {}
     for quantity, unit, factor, what, stretch, length, base in rates:
         errors = factor * relative_pose_error(poses, truth, stretch, what) / length
-        mean = error_statistics(errors, confidence=confidence, repetitions=repetitions, seed=seed).loc["mean"]
-        rows.append((quantity, *mean, unit, base, len(stretch)))
-    columns = ["quantity", "value", "low", "high", "unit", "over", "n"]
-    return pd.DataFrame(rows, columns=columns).set_index("quantity")
+        mean = bootstrapped(errors, of=("mean",), confidence=confidence, repetitions=repetitions, seed=seed)["mean"]
+        found[quantity] = Rate(*mean, unit, base, len(stretch))
+    return found
 
 
 def _default(along: FloatArray) -> float:

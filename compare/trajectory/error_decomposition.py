@@ -1,24 +1,22 @@
 """Decomposition of the position error into scale, heading and remainder, with bootstrap intervals."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
+from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
 
-from ..statistics.block_bootstrap import (
-    CONFIDENCE,
-    MAX_BLOCKS,
-    MIN_BLOCKS,
-    REPETITIONS,
-    block_length,
-    draw_blocks,
-    percentile_interval,
-)
+from ..statistics.block_bootstrap import MAX_BLOCKS, MIN_BLOCKS, REPETITIONS, Bounded, block_length
+from ..statistics.block_draws import CONFIDENCE, draw_blocks, percentile_interval
 from .alignment import Align
 from .association import MatchedTrajectories
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCALE, WHOLE = 1, 3
 """columns of the basis in each nested fit"""
@@ -94,6 +92,18 @@ def _fit(basis: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
 NAMES = ("scale", "heading", "noise")
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class ShareIntervals(Displayed):
+    """Bootstrap intervals of the shares of an error decomposition."""
+
+    by_name: Mapping[str, Bounded]
+    """scale, heading and noise"""
+    block: int
+    """block length, in poses"""
+    reliable: bool
+    """see `ErrorStatistics.reliable`"""
+
+
 def decomposition_intervals(
     matched: MatchedTrajectories,
     up: ArrayLike = (0.0, 0.0, 1.0),
@@ -101,22 +111,38 @@ def decomposition_intervals(
     confidence: float = CONFIDENCE,
     repetitions: int = REPETITIONS,
     seed: int = 0,
-) -> pd.DataFrame:
-    """Bootstrap intervals of the shares of `error_decomposition`: columns `value`, `low`, `high`.
+) -> "pd.DataFrame":
+    """Table of `share_intervals`: columns `value`, `low`, `high`; `attrs` have `block` and `reliable`."""
+    import pandas as pd
+
+    found = share_intervals(matched, up, confidence=confidence, repetitions=repetitions, seed=seed)
+    rows = pd.Index(found.by_name, name="share")
+    table = pd.DataFrame(list(found.by_name.values()), index=rows, columns=list(Bounded._fields))
+    table.attrs = {"block": found.block, "reliable": found.reliable}
+    return table
+
+
+def share_intervals(
+    matched: MatchedTrajectories,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+    *,
+    confidence: float = CONFIDENCE,
+    repetitions: int = REPETITIONS,
+    seed: int = 0,
+) -> ShareIntervals:
+    """Bootstrap intervals of the shares of `error_decomposition`.
 
     The fits are repeated on blocks of poses drawn with replacement, so an interval is wide where few stretches decide.
-    The block length is Politis and White's for the squared errors; `attrs["reliable"]` is
-    as in `error_statistics`, False for most errors that grow with the path. Shares are not
+    The block length is Politis and White's for the squared errors. Shares are not
     negative, so draws of a small one lie above it: the interval is extended to include it. NaN for zero errors.
     """
     shares = error_decomposition(matched, up)
     value = np.array([getattr(shares, name) for name in NAMES])
-    table = pd.DataFrame({"value": value, "low": np.nan, "high": np.nan}, index=pd.Index(NAMES, name="share"))
+    low, high = np.full((2, len(NAMES)), np.nan)
     d, basis = decomposition_basis(matched, up)
     squared = np.sum(d**2, axis=1)
     found, n = block_length(squared), len(d)
     block = max(found.length, -(-n // MAX_BLOCKS))
-    table.attrs = {"block": block, "reliable": n / block >= MIN_BLOCKS and found.correlation_ends}
     if n > 1 and np.isfinite(value).all():
         size = np.sqrt(np.sum(basis**2, axis=(0, 1)))
         rows = np.concatenate([basis / np.where(size > 0, size, 1.0), d[:, :, None] / np.sqrt(squared.sum())], axis=2)
@@ -125,8 +151,13 @@ def decomposition_intervals(
         drawn = drawn[drawn[:, -1, -1] > 0.0]  # a draw without any difference has no shares
         if len(drawn):
             low, high = percentile_interval(_shares(drawn), confidence)
-            table["low"], table["high"] = np.minimum(low, value), np.maximum(high, value)
-    return table
+            low, high = np.minimum(low, value), np.maximum(high, value)
+    rows = np.stack([value, low, high], axis=1).tolist()
+    return ShareIntervals(
+        by_name={name: Bounded(*row) for name, row in zip(NAMES, rows, strict=True)},
+        block=block,
+        reliable=n / block >= MIN_BLOCKS and found.correlation_ends,
+    )
 
 
 def _shares(products: FloatArray) -> FloatArray:

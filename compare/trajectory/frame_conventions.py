@@ -143,10 +143,12 @@ def length_unit(matched: MatchedTrajectories) -> tuple[str, float] | None:
 
 
 def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> BodyRotation:
+    n = len(estimate)
+    moments = (estimate.reshape(n, 9).T @ reference.reshape(n, 9)).reshape(3, 3, 3, 3)  # all sums over the poses
     W, B = world, np.eye(3)
     for _ in range(ITERATIONS):
-        B = _nearest(np.einsum("tji,jk,tkl->il", estimate, W.T, reference))
-        W = _nearest(np.einsum("tij,jk,tlk->il", reference, B.T, estimate))
+        B = _nearest(np.einsum("jikl,kj->il", moments, W))
+        W = _nearest(np.einsum("lkij,kj->il", moments, B))
     left = np.swapaxes(reference, 1, 2) @ (W @ estimate @ B)
     return BodyRotation(B, float(np.rad2deg(np.median(so3.rotation_angle(left)))))
 

@@ -1,23 +1,29 @@
 """KITTI segment errors: relative motion error over 100, 200, ... 800 m, per meter (Geiger, Lenz and Urtasun, 2012)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..statistics.block_bootstrap import error_statistics
+from ..columns import Columns, to_frame
+from ..statistics.block_bootstrap import Bounded, bootstrapped
 from .association import MatchedTrajectories
 from .ate_rpe import PoseRelation, relative_pose_error
 from .path import distance_traveled
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 OFFICIAL_LENGTHS = tuple(range(100, 900, 100))
 OFFICIAL_STEP = 10
 """poses between the starts of segments: 1 s at KITTI's 10 Hz"""
+ERRORS = ("translation_percent", "rotation_deg_per_m")
 ROUND = np.array([1.0, 2.0, 2.5, 5.0])
 
 
@@ -25,7 +31,7 @@ ROUND = np.array([1.0, 2.0, 2.5, 5.0])
 class SegmentErrors(Displayed):
     """Errors of segments, and the segment lengths."""
 
-    table: pd.DataFrame
+    columns: Columns
     """one row per segment: `start`, `end` (indices of poses), `length` (m, nominal), `translation_percent` (of it),
     `rotation_deg_per_m`, `speed` (m/s; NaN without stamps)"""
     lengths: tuple[float, ...]
@@ -34,28 +40,46 @@ class SegmentErrors(Displayed):
     official: bool
     """whether lengths and step are those of KITTI's devkit, so that results compare with published ones"""
 
+    def __len__(self) -> int:
+        return len(self.columns["start"])
+
     @property
-    def by_length(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
+        """Table of the `columns`."""
+        return to_frame(self.columns)
+
+    @property
+    def by_length(self) -> "pd.DataFrame":
         """Mean of each error and number of segments `n` by segment length."""
-        errors = ["translation_percent", "rotation_deg_per_m"]
-        means = self.table.groupby("length")[errors].mean()
-        return means.assign(n=self.table.groupby("length").size())
+        return to_frame(self.means_by_length).set_index("length")
+
+    @property
+    def means_by_length(self) -> Columns:
+        """Segment lengths `length`, m, rising, and for each the mean of each error and the number `n` of segments."""
+        lengths, place, n = np.unique(self.columns["length"], return_inverse=True, return_counts=True)
+        means = {name: np.bincount(place, self.columns[name]) / n for name in ERRORS}
+        return {"length": lengths, **means, "n": n}
 
     @property
     def translation_percent(self) -> float:
         """Mean translation error over all segments, the ranking criterion of the KITTI benchmark, %."""
-        return float(self.table["translation_percent"].mean())
+        return float(self.columns["translation_percent"].mean())
 
     @property
     def rotation_deg_per_m(self) -> float:
         """Mean rotation error over all segments, deg/m."""
-        return float(self.table["rotation_deg_per_m"].mean())
+        return float(self.columns["rotation_deg_per_m"].mean())
 
-    def intervals(self, seed: int = 0) -> pd.DataFrame:
-        """Columns `value`, `low`, `high` of both means by `error_statistics`, segments in order of their starts."""
-        columns = ["translation_percent", "rotation_deg_per_m"]
-        rows = [error_statistics(self.table[column], seed=seed).loc["mean"] for column in columns]
-        return pd.DataFrame(rows, index=pd.Index(columns))
+    def intervals(self, seed: int = 0) -> "pd.DataFrame":
+        """Table of `means`: columns `value`, `low`, `high`."""
+        import pandas as pd
+
+        means = self.means(seed)
+        return pd.DataFrame(list(means.values()), index=pd.Index(means), columns=list(Bounded._fields))
+
+    def means(self, seed: int = 0) -> Mapping[str, Bounded]:
+        """Mean of each error with its interval by `bootstrapped`, segments in order of their starts."""
+        return {name: bootstrapped(self.columns[name], of=("mean",), seed=seed)["mean"] for name in ERRORS}
 
     @property
     def caption(self) -> str:
@@ -63,9 +87,7 @@ class SegmentErrors(Displayed):
         whose = "KITTI's lengths" if self.official else "lengths fitted to the path, not KITTI's"
         shortest, longest = min(self.lengths), max(self.lengths)
         every = "pose" if self.step == 1 else f"{self.step} poses"
-        return (
-            f"{plural(len(self.table), 'segment')} of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"
-        )
+        return f"{plural(len(self), 'segment')} of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"
 
 
 def segment_errors(
@@ -94,17 +116,15 @@ def segment_errors(
         )
     poses, truth = estimate.world_T_body, reference.world_T_body
     seconds = reference.t[pairs[:, 1]] - reference.t[pairs[:, 0]]
-    table = pd.DataFrame(
-        {
-            "start": pairs[:, 0],
-            "end": pairs[:, 1],
-            "length": length,
-            "translation_percent": 100.0 * relative_pose_error(poses, truth, pairs, PoseRelation.TRANSLATION) / length,
-            "rotation_deg_per_m": relative_pose_error(poses, truth, pairs, PoseRelation.ROTATION_DEG) / length,
-            "speed": length / seconds if reference.stamped else np.full(len(pairs), np.nan),
-        }
-    )
-    return SegmentErrors(table, tuple(lengths), step, official)
+    columns = {
+        "start": pairs[:, 0],
+        "end": pairs[:, 1],
+        "length": length,
+        "translation_percent": 100.0 * relative_pose_error(poses, truth, pairs, PoseRelation.TRANSLATION) / length,
+        "rotation_deg_per_m": relative_pose_error(poses, truth, pairs, PoseRelation.ROTATION_DEG) / length,
+        "speed": length / seconds if reference.stamped else np.full(len(pairs), np.nan),
+    }
+    return SegmentErrors(columns, tuple(lengths), step, official)
 
 
 def fitted_lengths(path: float) -> tuple[float, ...]:

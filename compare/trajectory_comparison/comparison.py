@@ -1,25 +1,30 @@
 """Estimates against a reference as plain data: what tables, sentences, figures and files are made of."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import pandas as pd
-
-from fgbaseline.compare import (
-    ErrorDecomposition,
-    Exceedance,
-    MatchedTrajectories,
-    RmseDifference,
-    SegmentErrors,
-    TimeOffset,
-)
+from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.statistics.block_bootstrap import ErrorStatistics
+from fgbaseline.compare.statistics.paired_bootstrap import RmseDifference
+from fgbaseline.compare.trajectory.association import MatchedTrajectories
+from fgbaseline.compare.trajectory.divergence import Exceedance
+from fgbaseline.compare.trajectory.drift import Rate
+from fgbaseline.compare.trajectory.error_decomposition import ErrorDecomposition, ShareIntervals
+from fgbaseline.compare.trajectory.segments import SegmentErrors
+from fgbaseline.compare.trajectory.time_offset import TimeOffset
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.compare.trajectory_comparison.ranking import Ranking
-from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
-from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.settings import Settings
-from fgbaseline.data import Sequence
 from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
+    from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+    from fgbaseline.data import Sequence
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -31,30 +36,29 @@ class Result(Displayed):
     """the pairs of poses, the estimate's aligned"""
     offset: TimeOffset | None
     """the estimated time offset, where it was searched for"""
-    absolute: pd.DataFrame
+    absolute: Columns
     """see `compare.absolute_errors`"""
-    departure: pd.DataFrame
+    departure: Columns
     """see `compare.divergence_along_path`: along, across, up and heading over the distance travelled"""
-    relative: dict[str, pd.DataFrame]
+    relative: dict[str, Columns]
     """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
     segments: SegmentErrors | None
-    drift: pd.DataFrame | None
+    drift: Mapping[str, Rate] | None
     """see `compare.drift`"""
     shares: ErrorDecomposition
-    share_intervals: pd.DataFrame
-    """see `compare.decomposition_intervals`"""
+    share_intervals: ShareIntervals
     bound: float
     """m: 1 % of the path, at most 5 m"""
     passing: Exceedance | None
     """first pose whose position is farther off than `bound`"""
-    statistics: dict[str, pd.DataFrame]
-    """statistics of the absolute errors `translation`, `rotation_deg` and `pose`: see `compare.error_statistics`"""
-    relative_statistics: dict[str, dict[str, pd.DataFrame]]
+    statistics: dict[str, ErrorStatistics]
+    """of the absolute errors `translation`, `rotation_deg` and `pose`"""
+    relative_statistics: dict[str, dict[str, ErrorStatistics]]
     """statistics by delta, then `translation` and `rotation_deg`"""
-    reported_covariance: ReportedCovariance | None
+    reported_covariance: "ReportedCovariance | None"
     """its covariances beside its errors against the truth"""
-    pixels: Pixels | None
-    map: pd.DataFrame | None
+    pixels: "Pixels | None"
+    map: "pd.DataFrame | None"
     """see `compare.map_difference`; the landmarks are aligned as the path is"""
     resolution: dict[str, float]
     """smallest difference that the files resolve, by its unit, `m` and `°`"""
@@ -69,7 +73,7 @@ class Result(Displayed):
     @property
     def rmse(self) -> float:
         """RMSE of the positions over all paired poses, m."""
-        return float(self.statistics["translation"]["value"]["rmse"])
+        return float(self.statistics["translation"]["rmse"].value)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -77,7 +81,7 @@ class Comparison(Displayed):
     """A reference, and the figures of every estimate against it."""
 
     reference: Entry
-    reference_pixels: Pixels | None
+    reference_pixels: "Pixels | None"
     results: dict[str, Result]
     """by name, in the order of the input"""
     up: FloatArray
@@ -87,9 +91,9 @@ class Comparison(Displayed):
     deltas: tuple[str, ...]
     settings: Settings
     ranking: Ranking
-    held_out: pd.DataFrame | None
+    held_out: "pd.DataFrame | None"
     """see `compare.held_out_ranking`: the reference among them"""
-    sequence: Sequence | None
+    sequence: "Sequence | None"
     """the recording whose observations are reprojected"""
 
     @property
@@ -105,7 +109,7 @@ class Comparison(Displayed):
         return sorted(self.results.values(), key=lambda r: order.index(r.name) if r.name in order else last)
 
     @property
-    def pixels(self) -> dict[str, Pixels]:
+    def pixels(self) -> "dict[str, Pixels]":
         """Reprojection of every trajectory that has one, the reference first."""
         every = {self.reference.name: self.reference_pixels}
         every |= {name: result.pixels for name, result in self.results.items()}

@@ -1,11 +1,15 @@
 """Inputs of a comparison: trajectories with what came with them, and the recording behind them."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from fgbaseline.compare import Trust
-from fgbaseline.data import HeldOut, Landmarks, Problem, Trajectory
+from fgbaseline.data import Trajectory
 from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
+
+if TYPE_CHECKING:
+    from fgbaseline.compare import Trust
+    from fgbaseline.data import HeldOut, Landmarks, Problem
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -13,7 +17,7 @@ class Entry(Displayed):
     """A trajectory with its landmarks, covariances and trust."""
 
     trajectory: Trajectory
-    landmarks: Landmarks | None = None
+    landmarks: "Landmarks | None" = None
     """in the trajectory's own world"""
     covariance: FloatArray | None = None
     """(n, 6, 6) of the right perturbation of each pose"""
@@ -21,7 +25,7 @@ class Entry(Displayed):
     """(3,) what points up in its world, where the format of its file defines it"""
     remarks: tuple[str, ...] = ()
     """findings on its file: each completes a sentence that begins with its name"""
-    trust: Trust | None = None
+    trust: "Trust | None" = None
     """of a run's reference; None for files"""
     by_product: bool = False
     """whether it is a by-product of the reference (isam2-online), near to it by construction"""
@@ -42,9 +46,9 @@ class Entries(Displayed):
 
     reference: Entry
     estimates: tuple[Entry, ...]
-    problem: Problem | None
+    problem: "Problem | None"
     """its observations are reprojected"""
-    held: HeldOut | None
+    held: "HeldOut | None"
     """tracks that are in no problem, to judge all paths by"""
     up: FloatArray | None
     """(3,) up in the reference's world, where it is that of a run"""

@@ -2,28 +2,31 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
+from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.trajectory.ate_rpe import absolute_error_columns, relative_error_columns
+from fgbaseline.compare.trajectory.divergence import departure_columns
+from fgbaseline.compare.trajectory.drift import drift_rates
+from fgbaseline.compare.trajectory.error_decomposition import share_intervals
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.ranking import ranking_of, spread
-from fgbaseline.compare.trajectory_comparison.reported_covariance import reported_covariance
-from fgbaseline.compare.trajectory_comparison.reprojection import (
-    Pixels,
-    held_out_of,
-    map_of,
-    paths_of,
-    pixels_of,
-    up_of_problem,
-)
 from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
+from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
+    from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+    from fgbaseline.data import Problem
 
 Computed = TypeVar("Computed")
 
@@ -46,8 +49,7 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     )
     if settings.align == Align.YAW:
         _require_one_up(entries, up)
-    paths = paths_of(entries.problem, everything, settings.offset)
-    pixels = pixels_of(entries.problem, everything, paths)
+    paths, pixels, held_out = _by_observations(entries, settings)
     results = {e.name: _compared(entries, e, up, settings, paths, pixels.get(e.name)) for e in entries.estimates}
     return Comparison(
         reference=entries.reference,
@@ -63,10 +65,24 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
             tolerance=min(r.matched.tolerance for r in results.values()),
             by_products=frozenset(name for name, r in results.items() if r.entry.by_product),
             seed=settings.seed,
+            statistics={name: r.statistics["translation"] for name, r in results.items()},
         ),
-        held_out=held_out_of(entries.problem, entries.held, paths),
+        held_out=held_out,
         sequence=None if entries.problem is None else entries.problem.sequence,
     )
+
+
+def _by_observations(
+    entries: Entries, settings: Settings
+) -> "tuple[dict[str, FloatArray], dict[str, Pixels], pd.DataFrame | None]":
+    """Poses of a recording's frames, reprojection, and errors on held-out tracks; nothing without a recording."""
+    if entries.problem is None:
+        return {}, {}, None
+    from fgbaseline.compare.trajectory_comparison.reprojection import held_out_of, paths_of, pixels_of
+
+    everything = [entries.reference, *entries.estimates]
+    paths = paths_of(entries.problem, everything, settings.offset)
+    return paths, pixels_of(entries.problem, everything, paths), held_out_of(entries.problem, entries.held, paths)
 
 
 def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
@@ -83,8 +99,16 @@ def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
         return entries.reference.up, "KITTI's camera frame"
     if entries.up is not None:
         return entries.up, "the run"
-    found = None if entries.problem is None else up_of_problem(entries.problem, entries.reference.trajectory)
+    found = _up_by_recording(entries.problem, entries.reference.trajectory)
     return (np.array([0.0, 0.0, 1.0]), "by default") if found is None else (found, "the recording")
+
+
+def _up_by_recording(problem: "Problem | None", path: Trajectory) -> FloatArray | None:
+    if problem is None:
+        return None
+    from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
+
+    return up_of_problem(problem, path)
 
 
 def _require_one_up(entries: Entries, up: FloatArray) -> None:
@@ -92,7 +116,7 @@ def _require_one_up(entries: Entries, up: FloatArray) -> None:
     if entries.problem is None:
         return
     for entry in entries.estimates:
-        there = up_of_problem(entries.problem, entry.trajectory)
+        there = _up_by_recording(entries.problem, entry.trajectory)
         apart = 0.0 if there is None else float(np.rad2deg(np.arccos(np.clip(there @ up, -1.0, 1.0))))
         if apart > TILT:
             raise InputError(
@@ -112,19 +136,19 @@ def _compared(
     up: FloatArray,
     settings: Settings,
     paths: Mapping[str, FloatArray],
-    pixels: Pixels | None,
+    pixels: "Pixels | None",
 ) -> Result:
     reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
     matched, offset = matched_poses(reference, entry, up, settings)
-    absolute = compare.absolute_errors(matched)
-    departure = compare.divergence_along_path(matched, up)
+    absolute, departure = dict(absolute_error_columns(matched)), dict(departure_columns(matched, up))
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:
-        absolute[["rotation_deg", "rotation_chord", "pose"]] = np.nan
-        departure[["rotation_deg", "heading_deg"]] = np.nan
+        unknown = np.full(len(matched), np.nan)
+        absolute |= dict.fromkeys(("rotation_deg", "rotation_chord", "pose"), unknown)
+        departure |= dict.fromkeys(("rotation_deg", "heading_deg"), unknown)
         notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
-    bound = min(FAR, FAR_SHARE * float(departure["travelled"].iloc[-1])) or FAR
+    bound = min(FAR, FAR_SHARE * float(departure["travelled"][-1])) or FAR
     relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
     positions = matched.reference.position, entry.trajectory.position
@@ -136,10 +160,10 @@ def _compared(
         departure=departure,
         relative=tables,
         segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
-        reported_covariance=_or_note("nees", notes, lambda: reported_covariance(reference, entry, _oriented(matched))),
-        drift=_or_note("drift", notes, lambda: compare.drift(_oriented(matched), seed=seed)),
+        reported_covariance=_or_note("nees", notes, lambda: _reported(reference, entry, matched)),
+        drift=_or_note("drift", notes, lambda: drift_rates(_oriented(matched), seed=seed)),
         shares=compare.error_decomposition(matched, up),
-        share_intervals=compare.decomposition_intervals(matched, up, seed=seed),
+        share_intervals=share_intervals(matched, up, seed=seed),
         bound=bound,
         passing=_passing(matched, departure, bound, notes),
         statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
@@ -149,7 +173,7 @@ def _compared(
         },
         pixels=pixels,
         resolution={"m": position_resolution(*positions), "°": rotation_resolution_deg(*positions)},
-        map=_or_note("map", notes, lambda: map_of(entries.problem, paths, reference, entry, matched)),
+        map=_or_note("map", notes, lambda: _map(entries, entry, paths, matched)),
         notes=notes,
     )
 
@@ -162,8 +186,28 @@ def _oriented(matched: MatchedTrajectories) -> MatchedTrajectories:
     return matched
 
 
+def _reported(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> "ReportedCovariance":
+    matched = _oriented(matched)
+    if entry.covariance is None:
+        raise InputError("no covariances came with it")
+    from fgbaseline.compare.trajectory_comparison.reported_covariance import reported_covariance
+
+    return reported_covariance(reference, entry, matched)
+
+
+def _map(
+    entries: Entries, entry: Entry, paths: Mapping[str, FloatArray], matched: MatchedTrajectories
+) -> "pd.DataFrame":
+    lacking = [each.name for each in (entries.reference, entry) if each.landmarks is None]
+    if entries.problem is None or lacking:
+        raise InputError(f"no landmarks came with {' and '.join(lacking)}" if lacking else "there is no recording")
+    from fgbaseline.compare.trajectory_comparison.reprojection import map_of
+
+    return map_of(entries.problem, paths, entries.reference, entry, matched)
+
+
 def _passing(
-    matched: MatchedTrajectories, departure: pd.DataFrame, bound: float, notes: dict[str, str]
+    matched: MatchedTrajectories, departure: Columns, bound: float, notes: dict[str, str]
 ) -> Exceedance | None:
     """First pose beyond the bound; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
@@ -172,13 +216,11 @@ def _passing(
     return None
 
 
-def _relative(
-    matched: MatchedTrajectories, delta: Delta, settings: Settings, notes: dict[str, str]
-) -> pd.DataFrame | None:
+def _relative(matched: MatchedTrajectories, delta: Delta, settings: Settings, notes: dict[str, str]) -> Columns | None:
     return _or_note(
         f"relative.{delta.text}",
         notes,
-        lambda: compare.relative_errors(_oriented(matched), delta.length, delta.unit, all_pairs=settings.all_pairs),
+        lambda: relative_error_columns(_oriented(matched), delta.length, delta.unit, all_pairs=settings.all_pairs),
     )
 
 

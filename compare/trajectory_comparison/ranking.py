@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
-from fgbaseline import compare
-from fgbaseline.compare import RmseDifference
+from fgbaseline.compare.statistics.block_bootstrap import ErrorStatistics, bootstrapped
+from fgbaseline.compare.statistics.paired_bootstrap import RmseDifference, rmse_difference
+from fgbaseline.compare.trajectory.association import common_stamps, rankable
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
+from fgbaseline.geometry import FloatArray
 
 AT_MOST = 100_000_000
 """errors that a bootstrap draws"""
@@ -22,8 +23,8 @@ class Ranking(Displayed):
 
     at: dict[str, IntArray]
     """by name, nearest first: indices of the pairs of poses at these moments"""
-    common: dict[str, pd.DataFrame]
-    """statistics over them, in this order: see `compare.error_statistics`"""
+    common: dict[str, ErrorStatistics]
+    """statistics over them, in this order"""
     behind: dict[str, RmseDifference]
     """RMSE of each rival above that of the nearest, which is missing"""
     rivals: tuple[str, ...]
@@ -38,42 +39,47 @@ class Ranking(Displayed):
 
     def rmse(self, name: str) -> float:
         """RMSE of the positions over the common moments, m."""
-        return float(self.common[name]["value"]["rmse"])
+        return float(self.common[name]["rmse"].value)
 
     def rank(self, name: str) -> int | None:
         """Rank from 1; None for estimates that are not ranked, and for by-products of the reference."""
         return self.rivals.index(name) + 1 if name in self.rivals else None
 
 
-def spread(errors: "pd.Series[float]", seed: int) -> pd.DataFrame:
-    """`compare.error_statistics` of errors (n,), with fewer repetitions for very long paths, at least 100."""
+def spread(errors: FloatArray, seed: int) -> ErrorStatistics:
+    """`bootstrapped` statistics of errors (n,), with fewer repetitions for very long paths, at least 100."""
     repetitions = int(np.clip(AT_MOST // max(len(errors), 1), 100, REPETITIONS))
-    return compare.error_statistics(errors, repetitions=repetitions, seed=seed)
+    return bootstrapped(errors, repetitions=repetitions, seed=seed)
 
 
 def ranking_of(
-    errors: Mapping[str, "pd.Series[float]"],
+    errors: Mapping[str, FloatArray],
     stamps: Mapping[str, np.ndarray],
     tolerance: float,
     by_products: frozenset[str],
     seed: int,
+    statistics: Mapping[str, ErrorStatistics] | None = None,
 ) -> Ranking:
     """Ranking by the RMSE of `errors` (n,) at increasing `stamps` (n,), s, of the reference.
 
-    Stamps within `tolerance`, s, are one moment where the estimates do not have the same ones.
+    Stamps within `tolerance`, s, are one moment where the estimates do not have the same ones. `statistics` are those
+    of all errors, where they are known already.
     """
-    chosen = compare.rankable({name: len(t) for name, t in stamps.items()})
-    at = compare.common_stamps({name: stamps[name] for name in chosen}, tolerance)
+    known = statistics or {}
+    chosen = rankable({name: len(t) for name, t in stamps.items()})
+    at = common_stamps({name: stamps[name] for name in chosen}, tolerance)
     at = {name: index for name, index in at.items() if len(index)}
-    there = {name: errors[name].iloc[index] for name, index in at.items()}
-    common = {name: spread(error, seed) for name, error in there.items()}
-    order = sorted(common, key=lambda name: float(common[name]["value"]["rmse"]))
+    there = {name: errors[name][index] for name, index in at.items()}
+    common = {
+        name: known[name] if name in known and len(error) == len(errors[name]) else spread(error, seed)
+        for name, error in there.items()
+    }
+    order = sorted(common, key=lambda name: common[name]["rmse"].value)
     rivals = [name for name in order if name not in by_products]
-    values = {name: there[name].to_numpy() for name in order}
     return Ranking(
         at={name: at[name] for name in order},
         common={name: common[name] for name in order},
-        behind={name: compare.rmse_difference(values[name], values[rivals[0]], seed=seed) for name in rivals[1:]},
+        behind={name: rmse_difference(there[name], there[rivals[0]], seed=seed) for name in rivals[1:]},
         rivals=tuple(rivals),
         same=all(len(at.get(name, ())) == len(t) for name, t in stamps.items()),
     )

@@ -38,41 +38,37 @@ class Pixels(Displayed):
         return {"reprojection": self.own, "reprojection_common": self.common, "reprojection_along": self.along}
 
 
-def paths_of(problem: Problem | None, entries: Sequence[Entry], offset: float) -> dict[str, FloatArray]:
-    """Poses (T, 4, 4) of the problem's frames by name; empty without a problem.
+def paths_of(problem: Problem, entries: Sequence[Entry], offset: float) -> dict[str, FloatArray]:
+    """Poses (T, 4, 4) of the problem's frames by name.
 
     A frame has the pose nearest in time within half an interval. `offset`, s, is added to the stamps of all entries
     but the first, the reference.
     """
-    if problem is None:
-        return {}
     moved = [e.trajectory.later(offset) if offset and i else e.trajectory for i, e in enumerate(entries)]
     return {e.name: poses_of_frames(problem, path) for e, path in zip(entries, moved, strict=True)}
 
 
-def pixels_of(problem: Problem | None, entries: Sequence[Entry], paths: Mapping[str, FloatArray]) -> dict[str, Pixels]:
-    """Reprojection by name, each trajectory in its own world, without alignment; empty without a problem."""
-    if problem is None:
-        return {}
+def pixels_of(problem: Problem, entries: Sequence[Entry], paths: Mapping[str, FloatArray]) -> dict[str, Pixels]:
+    """Reprojection by name, each trajectory in its own world, without alignment."""
     estimates = {e.name: _estimate(problem, e.name, paths[e.name], e.landmarks) for e in entries}
     own = {name: compare.reprojection(problem.sequence, e) for name, e in estimates.items() if len(e.landmarks)}
     common = _common(problem, own)
     return {name: _pixels(problem, estimate, own.get(name), common) for name, estimate in estimates.items()}
 
 
-def held_out_of(problem: Problem | None, held: HeldOut | None, paths: Mapping[str, FloatArray]) -> pd.DataFrame | None:
+def held_out_of(problem: Problem, held: HeldOut | None, paths: Mapping[str, FloatArray]) -> pd.DataFrame | None:
     """Paths ranked by held-out tracks: see `compare.held_out_ranking`; None without any.
 
     Paths without a pose at any frame are left out: no observation would be common to all.
     """
     known = {name: path for name, path in paths.items() if np.isfinite(path[:, 0, 0]).any()}
-    if problem is None or held is None or not known:
+    if held is None or not known:
         return None
     return compare.held_out_ranking(compare.held_out_errors(problem.sequence, held, known, problem.pixel_variance))
 
 
 def map_of(
-    problem: Problem | None,
+    problem: Problem,
     paths: Mapping[str, FloatArray],
     reference: Entry,
     entry: Entry,
@@ -82,9 +78,8 @@ def map_of(
 
     Raises InputError, saying why, where nothing can be compared.
     """
-    if problem is None or reference.landmarks is None or entry.landmarks is None:
-        lacking = [e.name for e in (reference, entry) if e.landmarks is None]
-        raise InputError(f"no landmarks came with {' and '.join(lacking)}" if lacking else "there is no recording")
+    assert reference.landmarks is not None
+    assert entry.landmarks is not None
     motion = matched.alignment
     aligned = Estimate(
         name=entry.name,

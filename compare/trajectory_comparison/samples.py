@@ -30,10 +30,10 @@ def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float
     found: dict[str, dict[str, float]] = dict.fromkeys(OF_POSES, of(t))
     stretches = {f"relative.{delta}": table for delta, table in result.relative.items()}
     if result.segments is not None:
-        stretches["segments"] = result.segments.table
+        stretches["segments"] = result.segments.columns
     for key, table in stretches.items():
-        start, end = (t[table[column].to_numpy()] for column in ("start", "end"))
-        found[key] = {"n": len(t), "coverage": compare.interval_coverage(start, end, whole), "stretches": len(table)}
+        start, end = (t[table[column]] for column in ("start", "end"))
+        found[key] = {"n": len(t), "coverage": compare.interval_coverage(start, end, whole), "stretches": len(start)}
     if result.reported_covariance is not None:
         found["nees"] = of(t[np.isfinite(result.reported_covariance.nees)])
     if result.name in comparison.ranking.at:

@@ -1,24 +1,48 @@
 """Readers and writers: recordings (course npz, ours, UTIAS .mat), trajectories and truth (TUM, KITTI, EuRoC, npz)."""
 
-from .columns import Order
-from .euroc_writer import write_euroc
-from .ground_truth import BodyFrame, attach_truth
-from .kitti import read_times, write_kitti
-from .landmark_file import read_landmarks
-from .npz_writer import write_npz
-from .parsed_trajectory import ParsedTrajectory
-from .recording import read
-from .trajectory_npz import write_trajectory_npz
-from .trajectory_reader import (
-    TrajectoryFormat,
-    read_euroc,
-    read_kitti,
-    read_pose_covariances,
-    read_trajectory,
-    read_trajectory_file,
-    read_tum,
-)
-from .tum_writer import write_tum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .columns import Order
+    from .euroc_writer import write_euroc
+    from .ground_truth import BodyFrame, attach_truth
+    from .kitti import read_times, write_kitti
+    from .landmark_file import read_landmarks
+    from .npz_writer import write_npz
+    from .parsed_trajectory import ParsedTrajectory
+    from .recording import read
+    from .trajectory_npz import write_trajectory_npz
+    from .trajectory_reader import (
+        read_euroc,
+        read_kitti,
+        read_pose_covariances,
+        read_trajectory,
+        read_trajectory_file,
+        read_tum,
+    )
+    from .trajectory_text import TrajectoryFormat
+    from .tum_writer import write_tum
+else:
+    from fgbaseline.geometry.lazy_names import lazy_names
+
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "columns": "Order",
+            "euroc_writer": "write_euroc",
+            "ground_truth": "BodyFrame attach_truth",
+            "kitti": "read_times write_kitti",
+            "landmark_file": "read_landmarks",
+            "npz_writer": "write_npz",
+            "parsed_trajectory": "ParsedTrajectory",
+            "recording": "read",
+            "trajectory_npz": "write_trajectory_npz",
+            "trajectory_text": "TrajectoryFormat",
+            "trajectory_reader": "read_euroc read_kitti read_pose_covariances read_trajectory "
+            "read_trajectory_file read_tum",
+            "tum_writer": "write_tum",
+        },
+    )
 
 __all__ = [
     "BodyFrame",

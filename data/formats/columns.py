@@ -60,6 +60,17 @@ class Columns:
     remark: str = ""
     """remark on the identification"""
 
+    @property
+    def stamp(self) -> int | None:
+        """The time stamps, or the frame numbers in place of them."""
+        return self.time if self.time is not None else self.number
+
+    @property
+    def read(self) -> list[int]:
+        """The columns whose numbers are read, in order: stamp, matrix, position, quaternion, covariance."""
+        pose = [*self.matrix, *self.position, *self.quaternion, *self.covariance]
+        return pose if self.stamp is None else [self.stamp, *pose]
+
 
 def named_columns(lines: Lines) -> Columns | None:
     """Columns by the names in the header: the line above the data, or a comment there; None without such names.

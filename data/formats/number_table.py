@@ -1,20 +1,30 @@
-"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line."""
+"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line.
 
-import gzip
+In plain Python, so that a fault is reported before numpy is imported; `NumberTable` has arrays.
+"""
+
 import re
-import zlib
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from math import isfinite, isnan
+from operator import itemgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+from fgbaseline.geometry import InputError
 
-from fgbaseline.geometry import FloatArray, InputError
-
-from ..observations import IntArray
 from .foreign_files import require_table
 
+if TYPE_CHECKING:
+    from fgbaseline.geometry import FloatArray
+
+    from ..observations import IntArray
+
 GZIP = b"\x1f\x8b"
+AT_ONCE = 10_000
+"""lines that are split at a time"""
 MOST_BYTES = 2**30
 """of a file once unpacked"""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -29,19 +39,33 @@ DATE = re.compile(r"\d{4}-\d{1,2}-\d{1,2}([T ].*)?")
 class NumberTable:
     """n lines of m numbers, and where in the file each of them stands."""
 
-    values: FloatArray
-    """(n, m)"""
-    line: IntArray
+    numbers: "array[float]"
+    """n times m, line by line"""
+    number: Sequence[int]
     """(n,) line numbers, from 1"""
+
+    @property
+    def values(self) -> "FloatArray":
+        """(n, m)"""
+        import numpy as np
+
+        return np.array(self.numbers).reshape(len(self.number), -1)
+
+    @property
+    def line(self) -> "IntArray":
+        """(n,) line numbers, from 1"""
+        import numpy as np
+
+        return np.array(self.number, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
     """The lines of a text file that hold data, without comments, and what stands above them."""
 
-    number: list[int]
+    number: Sequence[int]
     """where in the file each stands, from 1"""
-    text: list[str]
+    text: Sequence[str]
     separator: str | None
     """a comma, a semicolon, or None for blanks and tabs"""
     title: str | None
@@ -68,7 +92,7 @@ class Lines:
 
     def column(self, k: int) -> list[str]:
         """The k-th word of each line, without blanks or quotes; all lines must be as wide as the first."""
-        return [line.split(self.separator)[k].strip(' \t"') for line in self.text]
+        return [line.split(self.separator, k + 1)[k].strip(' \t"') for line in self.text]
 
 
 def read_lines(file: Path) -> Lines:
@@ -76,29 +100,42 @@ def read_lines(file: Path) -> Lines:
 
     Raises InputError naming the line for what is no text or has decimal commas; OSError as `open` does.
     """
-    numbers: list[int] = []
-    texts: list[str] = []
+    every = _text(file).split("\n")
     comments: list[str] = []
     title, title_line = None, 1
-    for number, line in enumerate(_text(file).split("\n"), start=1):
-        bare, _, comment = line.partition("#")
-        content = bare.strip()
-        if content.startswith("%"):
-            content, comment = "", content
-        if not texts and comment.strip():
+    for first, line in enumerate(every):
+        content, comment = _without_comment(line)
+        if comment.strip():
             comments.append(comment.strip("# \t,;"))
-        content = content.rstrip(" \t")
-        if not content:
-            continue
-        if not texts and title is None and _has_no_number(content):
-            title, title_line = content, number
-            continue
-        numbers.append(number)
-        texts.append(content)
+        if content and title is None and _has_no_number(content):
+            title, title_line = content, first + 1
+        elif content:
+            break
+    else:
+        first = len(every)
+    numbers, texts = _lines_of_data(every, first)
     separator = _separator(texts[0], numbers[0]) if texts else None
     if separator is not None:
         texts = _without_last_separator(texts, separator)
     return Lines(numbers, texts, separator, title, tuple(comments), title_line)
+
+
+def _without_comment(line: str) -> tuple[str, str]:
+    """The data of a line, and its comment."""
+    bare, _, comment = line.partition("#")
+    content = bare.strip()
+    return ("", content) if content.startswith("%") else (content, comment)
+
+
+def _lines_of_data(every: Sequence[str], first: int) -> tuple[Sequence[int], list[str]]:
+    """Line numbers, from 1, and texts of all lines from `first` on, without blank lines and comments."""
+    texts = [line.strip() for line in every[first:]]
+    while texts and not texts[-1]:
+        texts.pop()
+    if all(texts) and not any("#" in text or "%" in text for text in texts):
+        return range(first + 1, first + 1 + len(texts)), texts
+    data = [(number, _without_comment(text)[0]) for number, text in enumerate(texts, start=first + 1)]
+    return [number for number, text in data if text], [text for _, text in data if text]
 
 
 def split(text: str, separator: str | None) -> list[str]:
@@ -124,24 +161,41 @@ def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool 
     """
     lines.require_some()
     width = lines.width
-    for number, text in zip(lines.number, lines.text, strict=True):
-        if (words := _count(text, lines.separator)) != width:
-            raise InputError(f"line {number}: expected {width} numbers, got {words}: {_short(text)}")
     wanted = list(range(width)) if columns is None else list(columns)
-    texts = [WINDOWS_NAN.sub("nan", text) for text in lines.text] if nan else lines.text
     try:
-        values = _loaded(texts, lines.separator, wanted)
-    except ValueError as error:
+        numbers = _floats(lines, width, wanted)
+    except ValueError:
         if not nan:
-            raise _culprit(lines, wanted, nan=nan) from error
-        texts = [(lines.separator or " ").join(map(_nan_if_missing, split(t, lines.separator))) for t in texts]
+            raise _culprit(lines, wanted, nan=nan) from None
         try:
-            values = _loaded(texts, lines.separator, wanted)
+            numbers = _floats(lines, width, wanted, _nan_if_missing)
         except ValueError:
-            raise _culprit(lines, wanted, nan=nan) from error
-    if len(values) != len(texts) or np.isinf(values).any() or (np.isnan(values).any() and not nan):
-        raise _culprit(lines, wanted, nan=nan)
-    return NumberTable(values, np.array(lines.number, dtype=np.int64))
+            raise _culprit(lines, wanted, nan=nan) from None
+    odd = any("_" in text or not text.isascii() for text in lines.text)  # Python's float reads more than others do
+    if odd or not all(map(isfinite, numbers)):
+        _require_numbers(lines, wanted, nan=nan)
+    return NumberTable(numbers, lines.number)
+
+
+def _floats(
+    lines: Lines, width: int, wanted: Sequence[int], replaced: Callable[[str], str] | None = None
+) -> "array[float]":
+    """The numbers in the `wanted` columns. Raises InputError for a line of another width, and ValueError."""
+    numbers = array("d")
+    quoted, in_order = any('"' in text for text in lines.text), list(wanted) == list(range(width))
+    chosen = itemgetter(*wanted) if len(wanted) > 1 else lambda row: (row[wanted[0]],)
+    for k in range(0, len(lines.text), AT_ONCE):
+        rows = [text.split(lines.separator) for text in lines.text[k : k + AT_ONCE]]
+        for i, row in enumerate(rows, start=k):
+            if len(row) != width:
+                raise InputError(
+                    f"line {lines.number[i]}: expected {width} numbers, got {len(row)}: {_short(lines.text[i])}"
+                )
+        words: Iterable[str] = chain.from_iterable(rows if in_order else map(chosen, rows))
+        if quoted or replaced is not None:
+            words = (word.strip(' \t"') for word in words)
+        numbers.extend(map(float, words if replaced is None else map(replaced, words)))
+    return numbers
 
 
 def require_width(lines: Lines, counts: dict[int, str]) -> None:
@@ -177,6 +231,9 @@ def _text(file: Path) -> str:
 
 
 def _unpacked(file: Path) -> bytes:
+    import gzip
+    import zlib
+
     try:
         with gzip.open(file) as packed:
             content = packed.read(MOST_BYTES + 1)
@@ -219,29 +276,33 @@ def _has_no_number(text: str) -> bool:
     return len(words) > 1 and not any(is_number(word) for word in words)
 
 
-def _loaded(texts: list[str], separator: str | None, columns: list[int]) -> FloatArray:
-    return np.loadtxt(texts, np.float64, comments=None, ndmin=2, delimiter=separator, usecols=columns, quotechar='"')
-
-
 def _nan_if_missing(word: str) -> str:
-    return "nan" if word.lower() in MISSING else word
+    return "nan" if word.lower() in MISSING else WINDOWS_NAN.sub("nan", word)
 
 
 def _count(text: str, separator: str | None) -> int:
     return len(text.split()) if separator is None else text.count(separator) + 1
 
 
-def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
-    """The error for the first line whose `columns` are not all numbers."""
+def _require_numbers(lines: Lines, columns: Sequence[int], *, nan: bool) -> None:
+    """Raises InputError for the first line whose `columns` are not all numbers."""
     for i, number in enumerate(lines.number):
         words = lines.words(i)
         for k in columns:
             word = _nan_if_missing(words[k]) if nan else words[k]
-            if is_number(word) and (np.isfinite(float(word)) or (nan and np.isnan(float(word)))):
+            if is_number(word) and (isfinite(float(word)) or (nan and isnan(float(word)))):
                 continue
             if DATE.fullmatch(word):
-                return InputError(f"line {number}: {_short(word)} is a date; write time stamps in seconds since 1970")
-            return InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
+                raise InputError(f"line {number}: {_short(word)} is a date; write time stamps in seconds since 1970")
+            raise InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
+
+
+def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
+    """The error of `_require_numbers`, or of a file in which each word is a number and the whole is no table."""
+    try:
+        _require_numbers(lines, columns, nan=nan)
+    except InputError as error:
+        return error
     return InputError(f"the file is no table of {lines.width} numbers a line; check that it is the right one")
 
 

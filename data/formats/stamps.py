@@ -33,13 +33,15 @@ class Stamps:
     """the same, exactly, where all of them are whole numbers"""
     unit: TimeUnit | None
     """where the header has it"""
-    longest: str
-    """the one with the most digits, as written"""
+    words: Sequence[str] = ()
+    """(n,) as written"""
 
     def at(self, index: IntArray) -> "Stamps":
-        """The stamps of these indices (m,)."""
+        """The stamps of these rising indices (m,)."""
+        if len(index) == len(self.value):
+            return self
         whole = None if self.whole is None else tuple(self.whole[i] for i in index.tolist())
-        return Stamps(self.value[index], whole, self.unit, self.longest)
+        return Stamps(self.value[index], whole, self.unit, [self.words[i] for i in index.tolist()])
 
     def seconds(self, unit: TimeUnit) -> FloatArray:
         """(n,) s; whole numbers are divided exactly, as doubles cannot hold nanoseconds since 1970."""
@@ -82,7 +84,7 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
     elif (value == np.floor(value)).all():
         whole = tuple(_exactly(word, number) for word, number in zip(words, value.tolist(), strict=True))
     known = next((u for u in TimeUnit if u == unit), None)
-    return Stamps(value, whole, known, max(words, key=significant_digits, default=""))
+    return Stamps(value, whole, known, words)
 
 
 def likely_seconds(stamps: Stamps) -> FloatArray:
@@ -127,7 +129,7 @@ def equal_stamps(stamps: Stamps, moved: BoolArray) -> str | None:
     if repeats == 0 or repeats <= REPEATED * (n - 1):
         return None
     share = f"{n} poses share {plural(n - repeats, 'time stamp')}"
-    cause = lost_digits(stamps.value, stamps.longest) or "write them in full"
+    cause = lost_digits(stamps.value, max(stamps.words, key=significant_digits, default="")) or "write them in full"
     return f"its time stamps have lost digits: {share}: {cause}"
 
 

@@ -9,11 +9,12 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..observations import BoolArray, IntArray
 from .columns import METERS, Columns
 from .kitti import kitti_poses
-from .number_table import Lines, NumberTable, numbers_of
+from .number_table import Lines
 from .parsed_trajectory import ParsedTrajectory
 from .quaternion_order import xyzw
 from .stamped_poses import require_rising, rotations_of_quaternions
 from .stamps import equal_stamps, possible_units, stamps_of
+from .trajectory_text import TrajectoryText
 
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
@@ -21,22 +22,19 @@ FORWARD = 0.9
 """the cosine of the angle to the body's x axis: a body that travels so is no camera"""
 
 
-def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> ParsedTrajectory:
-    """Trajectory `empty`, which has name and source, filled from the columns. Raises InputError."""
-    places = [*columns.matrix, *columns.position, *columns.quaternion, *columns.covariance]
-    stamp = columns.time if columns.time is not None else columns.number
-    table = numbers_of(lines, places if stamp is None else [stamp, *places], nan=True)
-    if columns.nanoseconds is not None:
-        numbers_of(lines, [columns.nanoseconds])
-    pose = table.values if stamp is None else table.values[:, 1:]
+def parsed(text: TrajectoryText) -> ParsedTrajectory:
+    """The trajectory in a text. Raises InputError, without the name of the file."""
+    lines, columns, values, numbers = text.lines, text.columns, text.table.values, text.table.line
+    pose = values if columns.stamp is None else values[:, 1:]
     n_pose = len(columns.matrix) or len(columns.position) + len(columns.quaternion)
-    kept, columns, remarks = _known(table, pose[:, :n_pose], columns, stamp is not None)
+    stamp = None if columns.stamp is None else values[:, 0]
+    kept, columns, remarks = _known(numbers, stamp, pose[:, :n_pose], columns)
     if columns.remark:
         remarks.append(columns.remark)
-    line, pose = table.line[kept], pose[kept]
-    file = replace(empty, line=line, remarks=tuple(remarks))
+    line, pose = numbers[kept], pose[kept]
+    file = ParsedTrajectory(text.name, text.source, np.empty((0, 3)), None, line, remarks=tuple(remarks))
     if stamp is not None:
-        file, kept = _with_stamps(file, lines, columns, kept, table.values[kept, 0], pose[:, :n_pose])
+        file, kept = _with_stamps(file, lines, columns, kept, stamp[kept], pose[:, :n_pose])
         pose, line = pose[kept], line[kept]
         file = replace(file, line=line)
     if columns.matrix:
@@ -49,17 +47,17 @@ def read_text(empty: ParsedTrajectory, lines: Lines, columns: Columns) -> Parsed
     file = replace(file, position=pose[:, :3])
     if not columns.quaternion:
         return replace(file, remarks=(*file.remarks, "it has positions and no orientations"))
-    numbers = pose[:, 3:7]
-    if not numbers.any():
+    quaternion = pose[:, 3:7]
+    if not quaternion.any():
         return replace(file, remarks=(*file.remarks, "its quaternions are zero: it has positions and no orientations"))
     order = columns.orders[0]
     shown_order = " ".join(f"q{axis}" for axis in order)
     return replace(
         file,
         rotation=rotations_of_quaternions(
-            xyzw(numbers, order), line, f"{shown_order} of length 1 behind the position (here as x y z w)"
+            xyzw(quaternion, order), line, f"{shown_order} of length 1 behind the position (here as x y z w)"
         ),
-        quaternion=numbers,
+        quaternion=quaternion,
         orders=columns.orders,
         covariance_numbers=pose[:, 7:] if columns.covariance else None,
         remarks=(*file.remarks, *_covariance_remark(columns)),
@@ -79,20 +77,20 @@ def _in_meters(pose: FloatArray, unit: float, columns: Columns) -> FloatArray:
 
 
 def _known(
-    table: NumberTable, pose: FloatArray, columns: Columns, has_stamp: bool
+    line: IntArray, stamp: FloatArray | None, pose: FloatArray, columns: Columns
 ) -> tuple[IntArray, Columns, list[str]]:
-    """The lines (m,) that have a pose, the columns that they have, and what there is to remark."""
+    """Indices (m,) of the lines (n,) that have a pose, the columns that they have, and what there is to remark."""
     if columns.quaternion and np.isnan(pose[:, 3:7]).all() and np.isfinite(pose[:, :3]).any():
         remarks = ["its quaternions are NaN: it has positions and no orientations"]
         columns, pose = replace(columns, quaternion=(), covariance=()), pose[:, :3]
     else:
         remarks = []
     unknown: BoolArray = np.asarray(np.isnan(pose).any(axis=1))
-    if has_stamp and np.isnan(table.values[~unknown, 0]).any():
-        i = int(np.flatnonzero(~unknown & np.isnan(table.values[:, 0]))[0])
-        raise InputError(f"line {table.line[i]}: the time stamp is NaN; remove the line or mend it")
-    if has_stamp:
-        unknown |= np.isnan(table.values[:, 0])
+    if stamp is not None:
+        without_stamp = np.flatnonzero(~unknown & np.isnan(stamp))
+        if len(without_stamp):
+            raise InputError(f"line {line[without_stamp[0]]}: the time stamp is NaN; remove the line or mend it")
+        unknown |= np.isnan(stamp)
     if unknown.all():
         raise InputError("every pose is NaN, so there is no trajectory; check that it is the right file")
     if unknown.any():
@@ -102,15 +100,19 @@ def _known(
     return np.flatnonzero(~unknown), columns, remarks
 
 
+def _chosen(words: list[str], rows: IntArray) -> list[str]:
+    return words if len(rows) == len(words) else [words[i] for i in rows.tolist()]
+
+
 def _with_stamps(
     file: ParsedTrajectory, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
 ) -> tuple[ParsedTrajectory, IntArray]:
     """The file with the stamps or frame numbers of the lines `kept`, and which of these (m,) are left."""
     place = columns.time if columns.time is not None else columns.number
     assert place is not None
-    words = lines.column(place)
-    rest = None if columns.nanoseconds is None else lines.column(columns.nanoseconds)
-    stamps = stamps_of([words[i] for i in kept], value, columns.unit, None if rest is None else [rest[i] for i in kept])
+    words = _chosen(lines.column(place), kept)
+    rest = None if columns.nanoseconds is None else _chosen(lines.column(columns.nanoseconds), kept)
+    stamps = stamps_of(words, value, columns.unit, rest)
     moved: BoolArray = np.asarray((np.diff(pose, axis=0) != 0).any(axis=1))
     reason = equal_stamps(stamps, moved)
     if reason:
@@ -130,7 +132,7 @@ def _with_stamps(
     if stamps.unit == "ns" and stamps.whole is None:
         i = int(np.flatnonzero(stamps.value != np.floor(stamps.value))[0])
         raise InputError(
-            f"line {line[i]}: the time stamp {words[kept[left[i]]]} is no whole number of nanoseconds; write those"
+            f"line {line[i]}: the time stamp {stamps.words[i]} is no whole number of nanoseconds; write those"
         )
     units, is_known = possible_units(stamps)
     return replace(file, stamps=stamps, units=units, unit_known=is_known, remarks=remarks), left

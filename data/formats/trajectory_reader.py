@@ -1,8 +1,6 @@
 """Reader of trajectories in all known formats, detected from the content and never from the file name."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -10,18 +8,21 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
-from .bag_file import split_topic
 from .bag_trajectory import read_bag_trajectory
-from .columns import Columns, Order, counted_columns, named_columns
-from .named_file import FilePath, reading, regular_file, shown
-from .number_table import Lines, read_lines
+from .columns import Order
+from .named_file import FilePath, reading
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
-from .trajectory_from_text import read_text
+from .trajectory_from_text import parsed
 from .trajectory_npz import read_trajectory_npz
-
-TrajectoryFormat = Literal["tum", "kitti", "euroc", "npz"]
-ZIP = (b"PK\x03\x04", b"PK\x05\x06")
+from .trajectory_text import (
+    OpenedTrajectory,
+    TrajectoryArchive,
+    TrajectoryFormat,
+    TrajectoryText,
+    TrajectoryTopic,
+    open_trajectory,
+)
 
 
 def read_trajectory(
@@ -91,37 +92,30 @@ def read_trajectory_file(
     path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None
 ) -> ParsedTrajectory:
     """Parsed file, or topic of a bag (`run.bag:/odom`), with what it leaves open. Raises as `read_trajectory`."""
-    if form is not None and form not in get_args(TrajectoryFormat):
-        raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
-    if (in_bag := split_topic(path)) is not None:
-        return read_bag_trajectory(*in_bag, name)
-    with reading(path), np.errstate(all="ignore"):
-        file = regular_file(path)
-        empty = ParsedTrajectory(name or file.stem.removesuffix(".txt"), shown(path), np.empty((0, 3)), None)
-        if form == "npz" or (form is None and _is_zip(file)):
-            return _of_npz(empty, file)
-        lines = read_lines(file)
-        lines.require_some()
-        columns = named_columns(lines) if form != "kitti" else None
-        named = columns is not None
-        if columns is None:
-            columns = counted_columns(lines, whole=form == "euroc" or _is_whole(lines))
-        _require_form(form, lines, columns)
-        if form == "euroc":
-            columns = replace(columns, unit=columns.unit or "ns")
-        read = read_text(empty, lines, columns)
-        if named or len(read.orders) == 1 or (lines.separator is None and lines.width in (8, 9, 20, 44)):
+    return parsed_file(open_trajectory(path, form, name))
+
+
+def parsed_file(opened: OpenedTrajectory) -> ParsedTrajectory:
+    """The trajectory in an opened file or topic of a bag. Raises as `read_trajectory`."""
+    if isinstance(opened, TrajectoryTopic):
+        return read_bag_trajectory(opened.bag, opened.topic, opened.name)
+    with reading(opened.source), np.errstate(all="ignore"):
+        if not isinstance(opened, TrajectoryText):
+            return _of_npz(opened)
+        read, lines = parsed(opened), opened.lines
+        if opened.named or len(read.orders) == 1 or (lines.separator is None and lines.width in (8, 9, 20, 44)):
             return read
         order = " ".join(read.orders[0])
         return replace(read, remarks=(*read.remarks, f"no header names the order of its quaternions; {order} is usual"))
 
 
-def _of_npz(empty: ParsedTrajectory, file: Path) -> ParsedTrajectory:
-    t, poses, covariance, remarks = read_trajectory_npz(file)
+def _of_npz(file: TrajectoryArchive) -> ParsedTrajectory:
+    t, poses, covariance, remarks = read_trajectory_npz(file.file)
     stamps = stamps_of([repr(stamp) for stamp in t.tolist()], t, None)
     units, is_known = possible_units(stamps)
-    return replace(
-        empty,
+    return ParsedTrajectory(
+        name=file.name,
+        source=file.source,
         position=poses[:, :3, 3],
         rotation=poses[:, :3, :3],
         stamps=stamps,
@@ -130,31 +124,3 @@ def _of_npz(empty: ParsedTrajectory, file: Path) -> ParsedTrajectory:
         covariance_numbers=covariance,
         remarks=tuple(remarks),
     )
-
-
-def _is_whole(lines: Lines) -> bool:
-    """Whether every stamp in the first column is a whole number, with or without zeros behind its point."""
-    parts = [lines.words(i)[0].partition(".") for i in range(len(lines.text))]
-    return all(before.isdecimal() and not behind.strip("0") for before, _, behind in parts)
-
-
-def _require_form(form: TrajectoryFormat | None, lines: Lines, columns: Columns) -> None:
-    """Raises InputError where the columns are not those of the format that is insisted on."""
-    comma = lines.separator is not None
-    wrong = {
-        "tum": comma or bool(columns.matrix) or columns.time != 0,
-        "euroc": not comma or bool(columns.matrix) or columns.time is None,
-        "kitti": not columns.matrix,
-    }
-    expected = {
-        "tum": "8 numbers (TUM) between blanks",
-        "euroc": "8 or 17 numbers (EuRoC) between commas",
-        "kitti": "12 numbers (KITTI)",
-    }
-    if form is not None and wrong.get(form):
-        raise InputError(f"line {lines.number[0]}: expected {expected[form]}, got {lines.text[0][:60]!r}")
-
-
-def _is_zip(file: Path) -> bool:
-    with file.open("rb") as opened:
-        return opened.read(4).startswith(ZIP)

@@ -12,6 +12,7 @@ from fgbaseline.data.toml_file import TomlFile
 from ..formatting import number
 from ..phrases.evidence import reference_sigma_sentence
 from ..results.check import NEW, Checked, Line, Shortage
+from ..results.json_tree import INFINITE
 from ..results.reader import (
     DIGITS,
     NO_SUCH_METRIC,
@@ -25,7 +26,6 @@ from ..results.reader import (
     sample_of,
     value_of,
 )
-from ..results.statistics import INFINITE
 from .baseline import baseline_value, is_timing
 from .limits_file import Limit, Limits, Needed
 

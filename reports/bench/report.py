@@ -16,13 +16,12 @@ from ..figures.saving import encoded
 from ..figures.style import colors
 from ..formatting import counted
 from ..html.environment import picture
-from ..html.page import Grid, Note, Page, Section, render_page
-from ..html.run_page import folded
+from ..html.page import Grid, Note, Page, Section, folded, render_page
 from ..phrases.bench import FIGURES, NEES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
+from ..results.json_tree import INFINITE, at
 from ..results.reader import RunFolder
-from ..results.statistics import INFINITE, at
 from ..tables import latex, markdown
 from ..tables.bench import main_table, ranking_tables, runs_table
 from .job import Planned

@@ -130,17 +130,18 @@ def compare(
     from fgbaseline.data.formats.atomic_folder import require_free
     from fgbaseline.geometry import InputError
 
-    from ..announced import announce
     from ..comparison import compare as compare_files
-    from ..results.comparison import MARK
-    from ..tables import print_table
+    from ..results.documents import COMPARISON
 
     if out is not None:
-        require_free(out, force=force, mark=MARK)
+        require_free(out, force=force, mark=COMPARISON)
     elif force or opened:
         option, what = ("force", "folder to replace") if force else ("open", "page")
         raise InputError(f"{option}: there is no {what}; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
+    from ..announced import announce
+    from ..tables import print_table
+
     page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict
     click.echo(f"{first}\n")
@@ -185,6 +186,12 @@ def check(
     undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
     untrusted, or when there is no baseline to compare with.
     """
+    from fgbaseline.data.toml_text import toml_values
+
+    from ..results.documents import measured_file, read_document
+
+    toml_values(limits)  # faults of the files are reported before their models are imported
+    read_document(measured_file(folder))
     from ..accuracy_check.command import Outputs
     from ..accuracy_check.command import check as check_folder
 
@@ -208,17 +215,19 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     from fgbaseline.data.formats.atomic_folder import atomic_folder
     from fgbaseline.data.plural import plural
 
+    from ..results.documents import COMPARISON, drawn_file, read_document
+
+    file = drawn_file(folder)
+    read_document(file)  # a fault is reported before matplotlib is imported
     from ..figures.comparison import draw_for_paper as draw_comparison
     from ..figures.comparison_data import of_comparison_folder
     from ..figures.run import draw_for_paper as draw_run
     from ..figures.run_data import of_folder
     from ..figures.saving import CAPTIONS, save, save_captions
     from ..figures.style import PAPER
-    from ..results.comparison import MARK as COMPARISON
 
     place = out or folder / "paper"
-    is_comparison = (folder / COMPARISON).is_file()
-    drawn = draw_comparison(of_comparison_folder(folder)) if is_comparison else draw_run(of_folder(folder))
+    drawn = draw_comparison(of_comparison_folder(folder)) if file.name == COMPARISON else draw_run(of_folder(folder))
     with atomic_folder(place, force=force, mark=CAPTIONS) as building:
         save({name: figure for name, (figure, _) in drawn.items()}, building, formats, PAPER)
         save_captions({name: caption for name, (_, caption) in drawn.items()}, building)

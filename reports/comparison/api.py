@@ -1,23 +1,36 @@
-"""`fgbaseline.compare_trajectories`: the command `compare` for Python, with arrays where it has files."""
+"""Comparison in one call: for the command, and as `fgbaseline.compare_trajectories` with arrays in place of files.
 
+All files are opened, and faults in them reported, before anything heavy is imported.
+"""
+
+import os
 from collections.abc import Iterable, Mapping
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data import Landmarks, Problem, Sequence
+from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
 from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.geometry import InputError
 
 from ..keywords import for_python
-from .report import ComparisonReport, compare
-from .sources import ARRAYS, Array, TrajectoryLike, by_name, opened
+from .opening import as_path, with_open_file
 
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Run
+    from fgbaseline.data import Landmarks, Problem, Sequence
+
+    from .inputs import Given, GivenLandmarks
+    from .report import ComparisonReport
+    from .sources import Array, TrajectoryLike
+
+FILES = ("sequence", "extrinsic")
 Triple = tuple[float, float, float]
 
 
 @for_python
 def compare_trajectories(
-    reference: TrajectoryLike | Run,
-    estimates: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike],
+    reference: "TrajectoryLike | Run",
+    estimates: "TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike]",
     *,
     align: Literal["none", "first-pose", "yaw", "se3", "sim3"] | None = None,
     align_first: int | None = None,
@@ -29,20 +42,20 @@ def compare_trajectories(
     deltas: Iterable[str] = (),
     all_pairs: bool = False,
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None,
-    times: FilePath | Array | Iterable[FilePath | Array] = (),
+    times: "FilePath | Array | Iterable[FilePath | Array]" = (),
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     quaternion: Literal["xyzw", "wxyz"] | None = None,
     lever_arm: Triple | None = None,
     align_body: bool = False,
-    sequence: FilePath | Sequence | Problem | None = None,
-    landmarks: Mapping[str, FilePath | Landmarks] | Iterable[FilePath] = (),
+    sequence: "FilePath | Sequence | Problem | None" = None,
+    landmarks: "Mapping[str, FilePath | Landmarks] | Iterable[FilePath]" = (),
     held_out: float = 0.0,
     reference_body: Literal["imu", "camera"] = "imu",
     estimate_body: Literal["imu", "camera"] = "imu",
-    extrinsic: FilePath | Array | None = None,
+    extrinsic: "FilePath | Array | None" = None,
     beside: str = "all",
     seed: int = 0,
-) -> ComparisonReport:
+) -> "ComparisonReport":
     """Compares trajectories with a reference, as `fgbaseline compare` does.
 
         result = fgbaseline.compare_trajectories("truth.tum", {"mine": (t, poses)}, align="yaw")
@@ -83,6 +96,37 @@ def compare_trajectories(
     Raises InputError, in one sentence, for an invalid trajectory or keyword. No argument is changed.
     """
     options = {name: value for name, value in locals().items() if name not in ("reference", "estimates")}
+    from .sources import ARRAYS, by_name, opened
+
     every = [opened(each, form, name) for name, each in by_name(estimates)]
     first = opened(reference, form, "reference") if isinstance(reference, ARRAYS) else reference
     return compare(first, *every, **options)
+
+
+def compare(
+    reference: "Given | Run",
+    *estimates: "Given",
+    landmarks: "GivenLandmarks | Iterable[FilePath]" = (),
+    deltas: Iterable[str] = (),
+    **options: Any,
+) -> "ComparisonReport":
+    """Comparison of estimates with a reference, as the command `compare` and `fgbaseline.compare_trajectories` have it.
+
+    Each is a `[NAME=]FILE` or a trajectory in memory; the reference may be a run or its folder. The options are the
+    fields of `Settings`; `compare_trajectories` describes them. Raises InputError, which names options of the command.
+    """
+    times = options.pop("times", None)
+    if times is None or isinstance(times, str | os.PathLike) or hasattr(times, "shape"):
+        times = () if times is None else (times,)
+    if not isinstance(times, Iterable):
+        raise InputError(f"times: expected files or arrays of stamps, got {type(times).__name__}")
+    options["times"] = tuple(map(as_path, times))
+    options |= {name: as_path(options[name]) for name in FILES if name in options}
+    settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
+    is_folder = isinstance(reference, str | os.PathLike) and Path(reference).is_dir()
+    first = reference if is_folder else with_open_file(reference, settings)
+    others = [with_open_file(each, settings) for each in estimates]
+    of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
+    from .report import report_of
+
+    return report_of(first, others, of_them, settings)

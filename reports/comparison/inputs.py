@@ -4,10 +4,10 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias, cast, get_args
 
 import numpy as np
 
-from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.bodies import (
     moved_body,
     with_body_recognized,
@@ -17,21 +17,31 @@ from fgbaseline.compare.trajectory_comparison.bodies import (
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
-from fgbaseline.data import Landmarks, Problem
-from fgbaseline.data.formats import read_landmarks, read_times
+from fgbaseline.data import Trajectory
+from fgbaseline.data.formats import ParsedTrajectory, read_landmarks, read_times
 from fgbaseline.data.formats.named_file import FilePath
 from fgbaseline.data.formats.trajectory_reader import read_extrinsic
+from fgbaseline.data.formats.trajectory_text import OpenedTrajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..names import names_in
-from .reference_run import ReferenceRun, load_problem, read_reference_run, reference_in_memory
-from .sources import TrajectoryLike, opened, split_name
+from .opening import split_name
+from .sources import TrajectoryLike, opened
 
-Given = TrajectoryLike | Source
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Run
+    from fgbaseline.data import HeldOut, Landmarks, Problem
+
+    from .reference_run import ReferenceRun
+
+Given: TypeAlias = TrajectoryLike | Source | OpenedTrajectory
 """a trajectory; the name of a reference may be that of a run's folder"""
 
-GivenLandmarks = Sequence[FilePath] | Mapping[str, FilePath | Landmarks]
+GivenLandmarks: TypeAlias = "Sequence[FilePath] | Mapping[str, FilePath | Landmarks]"
 """`[NAME=]FILE` each, or landmarks by the name of their trajectory"""
+
+NO_RUN = (*get_args(OpenedTrajectory), ParsedTrajectory, Trajectory)
+"""types of a reference that is known to be no run before the model of runs is imported"""
 
 CUT_OFF = 0.01
 """largest share of a recording's frames that may be missing at the end of a file with a pose per frame"""
@@ -40,21 +50,15 @@ ONLINE = "-online"
 
 
 def read_entries(
-    reference: Given | Run, estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings
+    reference: "Given | Run", estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings
 ) -> Entries:
     """Reads all inputs. Raises InputError with the file and its fault."""
-    if isinstance(reference, Run):
-        run: ReferenceRun | None = reference_in_memory(reference)
-    elif isinstance(reference, str | os.PathLike) and Path(reference).is_dir():
-        run = read_reference_run(Path(reference))
-    else:
-        run = None
-    problem, held = load_problem(settings, run)
+    run, problem, held = _background(reference, settings)
     sources: list[Source] = []
     if run is not None:
         sources.append(run.files.trajectory(run.reference))
-    elif not isinstance(reference, Run):
-        sources.append(opened(reference, settings.form))
+    else:
+        sources.append(opened(cast("Given", reference), settings.form))
     sources += [opened(given, settings.form) for given in estimates]
     first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
     beside = []
@@ -72,8 +76,29 @@ def read_entries(
     return Entries(entries[0], tuple(entries[1:]), problem, held, up, run is not None)
 
 
+def _background(
+    reference: "Given | Run", settings: Settings
+) -> "tuple[ReferenceRun | None, Problem | None, HeldOut | None]":
+    """The run that a reference is, in memory or by its folder, the problem, and the held-out tracks."""
+    if settings.seed < 0:
+        raise InputError(f"seed: expected a whole number from 0 on, got {settings.seed}")
+    if isinstance(reference, NO_RUN) and settings.sequence is None and not settings.held_out:
+        return None, None, None
+    from fgbaseline.compare.estimate_comparison import Run
+
+    from .reference_run import load_problem, read_reference_run, reference_in_memory
+
+    if isinstance(reference, Run):
+        run: ReferenceRun | None = reference_in_memory(reference)
+    elif isinstance(reference, str | os.PathLike) and Path(reference).is_dir():
+        run = read_reference_run(Path(reference))
+    else:
+        run = None
+    return run, *load_problem(settings, run)
+
+
 def in_one_body(
-    every: list[Resolved], settings: Settings, problem: Problem | None, run: ReferenceRun | None
+    every: list[Resolved], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None"
 ) -> list[Entry]:
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
@@ -108,7 +133,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def frame_times(settings: Settings, problem: Problem | None) -> list[FloatArray]:
+def frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         given = settings.times
@@ -119,7 +144,7 @@ def frame_times(settings: Settings, problem: Problem | None) -> list[FloatArray]
     return [t[: len(t) - k] for k in range(int(CUT_OFF * len(t)) + 1)]
 
 
-def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None:
+def _extrinsic(settings: Settings, problem: "Problem | None") -> FloatArray | None:
     if settings.extrinsic is None:
         return None if problem is None else problem.sequence.imu_T_cam
     if isinstance(settings.extrinsic, np.ndarray):
@@ -129,7 +154,7 @@ def _extrinsic(settings: Settings, problem: Problem | None) -> FloatArray | None
     return read_extrinsic(settings.extrinsic)
 
 
-def _beside(run: ReferenceRun, wanted: str) -> list[str]:
+def _beside(run: "ReferenceRun", wanted: str) -> list[str]:
     others = [name for name in run.names if name != run.reference]
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
@@ -165,7 +190,7 @@ def valid_file_name(name: str) -> str:
 
 
 def _with_landmarks(
-    entries: list[Entry], given: GivenLandmarks, own: list[str], problem: Problem | None
+    entries: list[Entry], given: GivenLandmarks, own: list[str], problem: "Problem | None"
 ) -> list[Entry]:
     """The entries with landmarks by name, or of `[NAME=]FILE`; a file without a name belongs to the only estimate."""
     if given and problem is None:
@@ -179,14 +204,14 @@ def _with_landmarks(
             name = own[0]
         if name not in own:
             raise InputError(f"landmarks: there is no estimate '{name}'; there are {', '.join(own)}")
-        found[name] = file if isinstance(file, Landmarks) else read_landmarks(file)
+        found[name] = read_landmarks(file) if isinstance(file, str | os.PathLike) else file
     merged = [replace(e, landmarks=found.get(e.name, e.landmarks)) for e in entries]
     for entry in merged:
         _require_known(entry, problem)
     return merged
 
 
-def _require_known(entry: Entry, problem: Problem | None) -> None:
+def _require_known(entry: Entry, problem: "Problem | None") -> None:
     if problem is None or entry.landmarks is None or not len(entry.landmarks):
         return
     last, n = int(entry.landmarks.index[-1]), problem.sequence.n_landmarks

@@ -12,7 +12,8 @@ from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence,
 from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.geometry import InputError
 
-from ..results.reader import SUMMARY, RunFolder
+from ..results.documents import SUMMARY
+from ..results.reader import RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 
 
@@ -92,8 +93,6 @@ def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem 
     sequence = settings.sequence
     if not (sequence is None or isinstance(sequence, Path | Sequence | Problem)):
         raise InputError(f"sequence: expected a file, a Sequence or a Problem, got {type(sequence).__name__}")
-    if settings.seed < 0:
-        raise InputError(f"seed: expected a whole number from 0 on, got {settings.seed}")
     is_posed = isinstance(sequence, Problem) or (isinstance(sequence, Path) and sequence.is_dir())
     if settings.held_out and (sequence is None or is_posed):
         raise InputError("held-out: the tracks come from a recording; give it with --sequence, not an exported folder")

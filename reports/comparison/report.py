@@ -1,63 +1,67 @@
-"""Comparison in one call, its tables, sentences and figures, and the folder that it writes."""
+"""Comparison as a result: its tables, sentences and figures, and the folder that it writes."""
 
 import json
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
-from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.compare.columns import to_frame
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
-from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
+from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.formats.atomic_folder import atomic_folder
 from fgbaseline.data.formats.named_file import FilePath
-from fgbaseline.geometry import InputError
 
 from ..keywords import for_python
 from ..notebook import NotebookResult
 from ..phrases import comparison as phrases
-from ..results.comparison import MARK, Summary
-from ..results.comparison_summary import summarize
+from ..results.comparison_summary import results_by_name, summarize
+from ..results.documents import COMPARISON
 from ..tables import Table, latex, markdown
 from ..tables.comparison import comparison_table, main_frame, main_table, metrics_table
 from .inputs import Given, GivenLandmarks, read_entries
-from .sources import as_path
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
-FILES = ("sequence", "extrinsic")
+    from fgbaseline.compare.estimate_comparison import Run
+
+    from ..results.comparison import Summary
 
 
 class ComparisonReport(NotebookResult, Comparison):
     """A comparison with pandas tables, sentences, matplotlib figures, and a folder with all of them."""
 
     @cached_property
-    def summary(self) -> Summary:
+    def by_name(self) -> dict[str, dict[str, Any]]:
+        """Figures of the reference and of every estimate, as `comparison.json` has them."""
+        return results_by_name(self)
+
+    @cached_property
+    def summary(self) -> "Summary":
         """All metrics, as in `comparison.json`."""
-        return summarize(self, self.caption)
+        return summarize(self, self.by_name, self.caption)
 
     @property
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """One row per main metric, one column per estimate; see `caption`, and `metrics` for the intervals."""
-        return main_frame(self, self.summary)
+        return main_frame(self, self.by_name)
 
     @property
     def text_table(self) -> Table:
         """The main metrics as text, one column per trajectory, for `tables.markdown`, `latex` and `print_table`."""
-        return comparison_table(self, self.summary)
+        return comparison_table(self, self.by_name, self.caption)
 
     @property
-    def metrics(self) -> pd.DataFrame:
+    def metrics(self) -> "pd.DataFrame":
         """Every metric: estimate, metric, value, and low and high of its 95 % interval."""
-        return metrics_table(self.summary)
+        return metrics_table(self, self.by_name)
 
     @property
     def caption(self) -> str:
@@ -74,7 +78,7 @@ class ComparisonReport(NotebookResult, Comparison):
         """Conclusions in sentences, the trust in the reference first."""
         return phrases.verdict(self)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """The table, as `table`."""
         return self.table
 
@@ -95,12 +99,14 @@ class ComparisonReport(NotebookResult, Comparison):
         Raises InputError where the folder exists without `force` or is not that of a comparison.
         """
         place = Path(path)
-        with atomic_folder(place, force=force, mark=MARK) as building:
+        with atomic_folder(place, force=force, mark=COMPARISON) as building:
             self._fill(building)
         return place / "report.html"
 
     def _fill(self, folder: Path) -> None:
-        from ..figures import save
+        import pandas as pd
+
+        from ..figures.saving import save
         from ..html.comparison_page import render
 
         maps = {name: result.map for name, result in self.results.items() if result.map is not None}
@@ -112,14 +118,16 @@ class ComparisonReport(NotebookResult, Comparison):
             columns = ["landmark", "distance", "seen", "depth", "sigmas"]
             landmarks[columns].to_csv(folder / "maps" / f"{name}.csv", index=False)
         for name, motions in relative.items():
-            joined = pd.concat(motions, names=["delta"]).reset_index(level="delta")
+            joined = pd.concat({delta: to_frame(of) for delta, of in motions.items()}, names=["delta"]).reset_index(
+                level="delta"
+            )
             joined.to_csv(folder / "relative" / f"{name}.csv", index=False, float_format="%.9g")
         for name, result in self.results.items():
             _write_series(result, folder / "series" / f"{name}.csv")
         paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
         for path in paths:
             write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
-        main_table(self, self.summary).to_csv(folder / "table.csv")
+        main_table(self, self.by_name).to_csv(folder / "table.csv")
         self.metrics.to_csv(folder / "metrics.csv", index=False)
         figures = self.figures()
         save(figures, folder / "figures")
@@ -128,42 +136,28 @@ class ComparisonReport(NotebookResult, Comparison):
             "table.md": markdown(self.text_table),
             "table.tex": latex(self.text_table),
             "report.html": render(self, self.summary, figures),
-            MARK: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
+            COMPARISON: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
         }.items():
             (folder / file).write_text(text, encoding="utf-8")
 
 
-def compare(
-    reference: Given | Run,
-    *estimates: Given,
-    landmarks: GivenLandmarks | Iterable[FilePath] = (),
-    deltas: Iterable[str] = (),
-    **options: Any,
+def report_of(
+    reference: "Given | Run", estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings
 ) -> ComparisonReport:
-    """Comparison of estimates with a reference, as the command `compare` and `fgbaseline.compare_trajectories` have it.
-
-    Each is a `[NAME=]FILE` or a trajectory in memory; the reference may be a run or its folder. The options are the
-    fields of `Settings`; `compare_trajectories` describes them. Raises InputError, which names options of the command.
-    """
-    times = options.pop("times", None)
-    if times is None or isinstance(times, str | os.PathLike | np.ndarray):
-        times = () if times is None else (times,)
-    if not isinstance(times, Iterable):
-        raise InputError(f"times: expected files or arrays of stamps, got {type(times).__name__}")
-    options["times"] = tuple(map(as_path, times))
-    options |= {name: as_path(options[name]) for name in FILES if name in options}
-    settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
-    of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
+    """Compares inputs, whose files may be open. Raises InputError."""
     with np.errstate(all="ignore"):
-        entries = read_entries(reference, estimates, of_them, settings)
+        entries = read_entries(reference, estimates, landmarks, settings)
         comparison = compare_entries(entries, settings)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
 
 
 def _write_series(result: Result, path: Path) -> None:
     """One row per pair of poses: stamps of both, and all errors."""
+    import pandas as pd
+
     reference, estimate = result.matched.reference, result.matched.estimate
-    table = result.departure.drop(columns="t").assign(pose=result.absolute["pose"].to_numpy())
+    columns = {name: column for name, column in result.departure.items() if name != "t"}
+    table = pd.DataFrame({**columns, "pose": result.absolute["pose"]})
     if result.reported_covariance is not None:
         table["nees"] = result.reported_covariance.nees
     for column, t in (("t_estimate", estimate.t), ("t", reference.t)):

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -10,9 +9,19 @@ from numpy.typing import NDArray
 
 from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.data import Estimate, Landmarks, Status, Trajectory, Truth
-from fgbaseline.data.formats import ParsedTrajectory, TrajectoryFormat, read_trajectory_file
-from fgbaseline.data.formats.named_file import FilePath, shown
+from fgbaseline.data.formats import ParsedTrajectory, TrajectoryFormat
+from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.trajectory_reader import parsed_file
+from fgbaseline.data.formats.trajectory_text import (
+    OpenedTrajectory,
+    TrajectoryArchive,
+    TrajectoryText,
+    TrajectoryTopic,
+    open_trajectory,
+)
 from fgbaseline.geometry import InputError
+
+from .opening import split_name
 
 Array: TypeAlias = NDArray[Any]
 TrajectoryLike: TypeAlias = FilePath | Trajectory | Estimate | Truth | Array | tuple[Array, Array]
@@ -24,11 +33,6 @@ ONE = (str, os.PathLike, Trajectory, ParsedTrajectory, Estimate, Truth, np.ndarr
 """types of a single trajectory, besides a tuple of stamps and poses"""
 
 
-def as_path(given: Any) -> Any:
-    """A name as a path; anything in memory, and None, as it is."""
-    return Path(given) if isinstance(given, str | os.PathLike) else given
-
-
 def by_name(given: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, TrajectoryLike]) -> list[tuple[str, Any]]:
     """Name and trajectory of each one that is given; the name is empty where it has its own, "estimate" of arrays."""
     if isinstance(given, Mapping):
@@ -37,11 +41,15 @@ def by_name(given: TrajectoryLike | Iterable[TrajectoryLike] | Mapping[str, Traj
     return [("estimate" if isinstance(each, ARRAYS) else "", each) for each in every]
 
 
-def opened(given: TrajectoryLike | Source, form: TrajectoryFormat | None = None, name: str = "") -> Source:
+def opened(
+    given: TrajectoryLike | Source | OpenedTrajectory, form: TrajectoryFormat | None = None, name: str = ""
+) -> Source:
     """Trajectory by a name, by default its own, as far as it is known without the others. Raises InputError."""
     if isinstance(given, str | os.PathLike):
         own, file = (name, os.fspath(given)) if name else split_name(os.fspath(given))
-        return read_trajectory_file(file, form, own)
+        return parsed_file(open_trajectory(file, form, own))
+    if isinstance(given, TrajectoryText | TrajectoryArchive | TrajectoryTopic):
+        return parsed_file(given)
     if isinstance(given, ParsedTrajectory):
         return given
     if isinstance(given, Trajectory):
@@ -58,16 +66,6 @@ def opened(given: TrajectoryLike | Source, form: TrajectoryFormat | None = None,
         f"{name or 'trajectory'}: expected a file, a Trajectory, an Estimate, poses (T, 4, 4), or stamps (n,) with "
         f"poses (n, 4, 4), got {type(given).__name__}"
     )
-
-
-def split_name(given: str) -> tuple[str | None, str]:
-    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
-    name, mark, file = given.partition("=")
-    if not mark or Path(given).exists() or "/" in name:
-        return None, given
-    if not name or not file:
-        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
-    return name, file
 
 
 def _is_stamped(given: object) -> bool:

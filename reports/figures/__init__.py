@@ -1,10 +1,26 @@
 """Figures in matplotlib, in two styles (screen and paper), with one color for an estimator everywhere."""
 
-from .diagnosis import draw_diagnosis
-from .run import draw, draw_and_write, draw_for_paper, drawn_in_background
-from .run_data import RunData, of_folder, of_run
-from .saving import EncodedFigure, encoded, save
-from .style import colors
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .diagnosis import draw_diagnosis
+    from .run import draw, draw_and_write, draw_for_paper, drawn_in_background
+    from .run_data import RunData, of_folder, of_run
+    from .saving import EncodedFigure, encoded, save
+    from .style import colors
+else:
+    from fgbaseline.geometry.lazy_names import lazy_names
+
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "diagnosis": "draw_diagnosis",
+            "run": "draw draw_and_write draw_for_paper drawn_in_background",
+            "run_data": "RunData of_folder of_run",
+            "saving": "EncodedFigure encoded save",
+            "style": "colors",
+        },
+    )
 
 __all__ = [
     "EncodedFigure",

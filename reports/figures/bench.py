@@ -14,7 +14,7 @@ from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from .layout import lay_out
-from .panels import DEGREES_OF_FREEDOM, NEES_BOUNDS, intervals
+from .panels import DEGREES_OF_FREEDOM, intervals, nees_bounds
 from .style import BAND, GRAY, GREEN, SCREEN, in_style, safe_text, stacked_panels, swatch, title_and_legend
 from .style import colors as colors_of
 
@@ -162,8 +162,8 @@ def nees_over_time(results: "Results", case: str) -> Figure | None:
 def _reach(values: list[FloatArray]) -> tuple[float, float]:
     every = np.concatenate(values)
     every = every[np.isfinite(every) & (every > 0.0)]
-    low, high = np.percentile(every, [1.0, 99.5]) if len(every) else NEES_BOUNDS
-    return max(min(float(low), NEES_BOUNDS[0]) * 0.7, 1e-3), max(float(high), NEES_BOUNDS[1]) * 1.4
+    low, high = np.percentile(every, [1.0, 99.5]) if len(every) else nees_bounds()
+    return max(min(float(low), nees_bounds()[0]) * 0.7, 1e-3), max(float(high), nees_bounds()[1]) * 1.4
 
 
 def _colors(results: "Results") -> dict[str, str]:

@@ -11,6 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline.compare import MatchedTrajectories
+from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
@@ -115,7 +117,7 @@ def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
     handles: list[Any] = []
     for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
         for name, table in data.series.items():
-            handles += panel.plot(table["travelled"], table[column].to_numpy(dtype=np.float64), **line(name))
+            handles += panel.plot(table["travelled"], table[column], **line(name))
     axes[0].set_ylabel("distance, m")
     fit_log_or_linear(axes[0], columns(data.series, "position"))
     few_ticks(axes[0], style)
@@ -146,11 +148,11 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
 
 
 def _boxes(
-    panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, pd.DataFrame], column: str
+    panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, Columns], column: str
 ) -> None:
     for name, table in motions.items():
         panel.boxplot(
-            [table[column].dropna().to_numpy()],
+            [without_nan(table[column])],
             positions=[names.index(name)],
             orientation="horizontal",
             widths=0.55,
@@ -169,17 +171,17 @@ def _boxes(
 
 def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     """KITTI's segment errors by the length of the segments; None where none has two lengths."""
-    if not any(len(table) > 1 for table in data.segments.values()):
+    if not any(len(means["n"]) > 1 for means in data.segments.values()):
         return None  # the table says as much
     figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.8))
     panels = figure.subplots(1, 2)
-    line = data.line(style, max(map(len, data.segments.values())))
+    line = data.line(style, max(len(means["n"]) for means in data.segments.values()))
     handles: list[Any] = []
     columns_shown = {"translation_percent": "translation, %", "rotation_deg_per_m": "rotation, °/m"}
     for panel, (column, title) in zip(panels, columns_shown.items(), strict=True):
-        for name, table in data.segments.items():
+        for name, means in data.segments.items():
             look = {"marker": "o", "markersize": 4} if style.titled else {}
-            handles += panel.plot(table.index, table[column], **{**line(name), **look})
+            handles += panel.plot(means["length"], means[column], **{**line(name), **look})
         panel.set_ylabel(title)
         panel.set_xlabel("length of the segments, m")
         panel.set_ylim(bottom=0.0)

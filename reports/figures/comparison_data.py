@@ -11,11 +11,12 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align
+from fgbaseline.compare.columns import Columns, of_frame
 from fgbaseline.data.formats.named_file import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..results.comparison import MARK
+from ..results.documents import COMPARISON
 from ..results.reader import RunFolder
 from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
@@ -49,18 +50,18 @@ class ComparisonData:
     """(n,) s since the reference's first pose, by estimate: its pairs of poses"""
     paths: Mapping[str, FloatArray]
     """(n, 3) by name, aligned; the whole path of the reference, the paired poses of each estimate"""
-    series: Mapping[str, pd.DataFrame]
+    series: Mapping[str, Columns]
     """by estimate, one row per pair: see `compare.divergence_along_path`"""
     rmse: Mapping[str, float]
     """position RMSE over the common moments, m, of the ranked estimates, nearest first"""
-    relative: Mapping[str, Mapping[str, pd.DataFrame]]
+    relative: Mapping[str, Mapping[str, Columns]]
     """by delta, then estimate: `translation`, m, and `rotation_deg` of each motion"""
     all_pairs: bool
-    segments: Mapping[str, pd.DataFrame]
-    """by estimate, KITTI's segment errors by length"""
+    segments: Mapping[str, Columns]
+    """by estimate, KITTI's segment errors: see `SegmentErrors.means_by_length`"""
     official: bool
     """whether these lengths are KITTI's own"""
-    by_depth: Mapping[str, pd.DataFrame]
+    by_depth: "Mapping[str, pd.DataFrame]"
     """by estimate: see `compare.map_by_depth`"""
 
     @property
@@ -121,7 +122,7 @@ def of_comparison(comparison: "Comparison") -> ComparisonData:
         rmse={name: ranking.rmse(name) for name in ranking.rivals or ranking.at},
         relative=_by_delta({name: r.relative for name, r in results.items()}),
         all_pairs=comparison.settings.all_pairs,
-        segments={name: found.by_length for name, found in segments.items()},
+        segments={name: found.means_by_length for name, found in segments.items()},
         official=all(found.official for found in segments.values()),
         by_depth={name: compare.map_by_depth(table) for name, table in maps.items()},
     )
@@ -129,9 +130,9 @@ def of_comparison(comparison: "Comparison") -> ComparisonData:
 
 def of_comparison_folder(folder: Path) -> ComparisonData:
     """Data of the comparison that left a folder. Raises InputError, naming the file, where one is missing or bad."""
-    files = RunFolder(folder, MARK)
+    files = RunFolder(folder, COMPARISON)
     summary = files.summary
-    with reading(folder / MARK):
+    with reading(folder / COMPARISON):
         try:
             return _of_files(files, summary)
         except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
@@ -159,25 +160,25 @@ def _of_files(files: RunFolder, summary: Mapping[str, Any]) -> ComparisonData:
         stamped=reference["duration_s"] is not None,
         t={name: table["t"].to_numpy(dtype=np.float64) - path.t[0] for name, table in series.items()},
         paths={name: view.scene(p - start) for name, p in positions.items()},
-        series=series,
+        series={name: of_frame(table) for name, table in series.items()},
         rmse={name: float(estimates[name]["common"]["rmse"]["value"]) for _, name in ranks},
         relative=_by_delta(
             {
-                name: {str(delta): of for delta, of in table.groupby("delta", sort=False)}
+                name: {str(delta): of_frame(of) for delta, of in table.groupby("delta", sort=False)}
                 for name, table in relative.items()
                 if table is not None
             }
         ),
         all_pairs=bool(summary["settings"]["all_pairs"]),
-        segments={name: pd.DataFrame(found["by_length"]).set_index("length") for name, found in segments.items()},
+        segments={name: of_frame(pd.DataFrame(found["by_length"])) for name, found in segments.items()},
         official=all(found["official"] for found in segments.values()),
         by_depth={name: compare.map_by_depth(table) for name, table in maps.items() if table is not None},
     )
 
 
-def _by_delta(relative: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, dict[str, pd.DataFrame]]:
+def _by_delta(relative: Mapping[str, Mapping[str, Columns]]) -> dict[str, dict[str, Columns]]:
     """Tables by delta, then estimate, of those by estimate, then delta."""
-    found: dict[str, dict[str, pd.DataFrame]] = {}
+    found: dict[str, dict[str, Columns]] = {}
     for name, tables in relative.items():
         for delta, table in tables.items():
             found.setdefault(delta, {})[name] = table

@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fgbaseline.compare.columns import Columns
 from fgbaseline.geometry import FloatArray
 
 from .panels import Line, few_ticks, fit_log, fit_log_or_linear, fit_signed, note_out_of_range, plot_series
@@ -111,7 +112,7 @@ def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
 
 
 def component_panels(
-    tables: Mapping[str, pd.DataFrame], t: Mapping[str, FloatArray], line: Line, style: Style = SCREEN
+    tables: Mapping[str, Columns], t: Mapping[str, FloatArray], line: Line, style: Style = SCREEN
 ) -> tuple[Figure, list[Axes], list[Any]]:
     """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles.
 
@@ -135,9 +136,9 @@ def component_panels(
     return figure, axes, handles
 
 
-def columns(tables: Mapping[str, pd.DataFrame], column: str) -> dict[str, FloatArray]:
+def columns(tables: Mapping[str, Columns], column: str) -> dict[str, FloatArray]:
     """(n,) values of a column of each table."""
-    return {name: table[column].to_numpy(dtype=np.float64) for name, table in tables.items()}
+    return {name: np.asarray(table[column]) for name, table in tables.items()}
 
 
 def height(run: RunData) -> Figure:
@@ -183,13 +184,12 @@ def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
 
 def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals: Sequence[str]) -> Figure:
     """Panels of the components, with notes of what leaves them; the title has the maxima of the rivals."""
-    tables = {n: run.series[n].filter(like=f"{prefix}_").rename(columns=lambda c: c[len(prefix) + 1 :]) for n in names}
+    tables = {n: _with_prefix(run.series[n], f"{prefix}_") for n in names}
     t = dict.fromkeys(names, run.t)
     figure, axes, handles = component_panels(tables, t, run.line())
     travelled = max((float(np.nanmax(v)) for v in columns(tables, "travelled").values()), default=0.0)
-    reach = signed_range(
-        [table[list(SIGNED)].to_numpy(dtype=np.float64).ravel() for table in tables.values()], 0.05 * travelled
-    )
+    signed = [np.concatenate([table[column] for column in SIGNED]) for table in tables.values()]
+    reach = signed_range(signed, 0.05 * travelled)
     for panel, column in zip(axes, COMPONENTS, strict=True):
         if column in SIGNED:
             fit_signed(panel, run.t, columns(tables, column), reach)
@@ -198,9 +198,14 @@ def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals:
     return figure
 
 
-def _maxima(tables: Mapping[str, pd.DataFrame]) -> str:
+def _with_prefix(table: pd.DataFrame, prefix: str) -> Columns:
+    chosen = [column for column in table.columns if column.startswith(prefix)]
+    return {column.removeprefix(prefix): table[column].to_numpy(dtype=np.float64) for column in chosen}
+
+
+def _maxima(tables: Mapping[str, Columns]) -> str:
     """Largest distance of each, nearest first; only the farthest where there is no room for all."""
-    farthest = {name: float(t["position"].max()) for name, t in tables.items() if t["position"].notna().any()}
+    farthest = {n: float(np.nanmax(t["position"])) for n, t in tables.items() if not np.isnan(t["position"]).all()}
     if not farthest:
         return ""
     each = [f"{safe_text(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]

@@ -1,6 +1,7 @@
 """Building blocks of panels: series over time with their axes, chi-square bands, intervals, medians by depth."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -8,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from fgbaseline.compare import chi_square_bounds
+from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
 from .style import BAND, GREEN, Style, note, safe_text
@@ -17,12 +18,17 @@ DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
-NEES_BOUNDS = tuple(float(limit) for limit in chi_square_bounds(float(DEGREES_OF_FREEDOM)))
-"""95 % chi-square bounds of the NEES of a pose"""
 CONSISTENT = "95 % chi-square band of a consistent estimator"
 
 Line = Callable[[str], Mapping[str, Any]]
 """look of the line of an estimator"""
+
+
+@cache
+def nees_bounds() -> tuple[float, float]:
+    """95 % chi-square bounds of the NEES of a pose."""
+    low, high = compare.chi_square_bounds(float(DEGREES_OF_FREEDOM))
+    return float(low), float(high)
 
 
 def plot_series(axes: Axes, t: ArrayLike, series: Mapping[str, FloatArray], line: Line, **look: Any) -> list[Any]:
@@ -99,7 +105,7 @@ def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray
 
 def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
     """Expected value and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
-    low, high = (float(limit) / per for limit in chi_square_bounds(degrees))
+    low, high = (float(limit) / per for limit in compare.chi_square_bounds(degrees))
     axes.axhline(degrees / per, color=GREEN, linewidth=width, zorder=1.5)
     bottom, top = axes.get_ylim()
     axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from fgbaseline.compare import evaluated_rows, track_chi_square
+from fgbaseline import compare
 from fgbaseline.compare.residuals.patterns import COLUMNS, REGION, ROWS
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
@@ -192,7 +192,9 @@ def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
 def _probabilities(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
     """Share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
     for name in observed.classes:
-        tracks = track_chi_square(observed.problem, evaluated_rows(observed.problem, observed.reprojection[name]))
+        tracks = compare.track_chi_square(
+            observed.problem, compare.evaluated_rows(observed.problem, observed.reprojection[name])
+        )
         p = np.sort(tracks["probability"].dropna().to_numpy())
         share = np.arange(1, len(p) + 1) / max(1, len(p))
         panel.plot(p, 100.0 * share, **{**line(name), "label": None})

@@ -14,7 +14,8 @@ from fgbaseline.data.formats.named_file import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..results.reader import SUMMARY, RunFolder
+from ..results.documents import SUMMARY, drawn_file
+from ..results.reader import RunFolder
 from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
 
@@ -159,8 +160,7 @@ def _series(result: "Result", n_frames: int) -> pd.DataFrame:
 def of_folder(folder: Path) -> RunData:
     """Data of the run that left a folder. Raises InputError, naming the file, where it is none or lacks a file."""
     files = RunFolder(folder)
-    if not (folder / SUMMARY).is_file():
-        raise InputError(f"{folder}: it has no {SUMMARY}; give the folder that fgbaseline run or compare wrote")
+    drawn_file(folder)
     summary = files.summary
     with reading(folder / SUMMARY):
         try:

@@ -15,8 +15,7 @@ from ..tables import Row
 from ..tables.comparison import comparison_table
 from .comparison_plots import comparison_plots
 from .environment import picture
-from .page import Folded, Grid, Live, Page, Section, render_page
-from .run_page import figure_blocks, still_figures, trust
+from .page import Folded, Grid, Live, Page, Section, figure_blocks, render_page, still_figures, trust
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
@@ -39,7 +38,7 @@ STILLS = ("paths", "errors")
 def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
     """`report.html` of a comparison."""
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
-    table = comparison_table(comparison, summary, mark_reference=True)
+    table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
     pictures = {name: replace(picture(name, figure), caption=_caption(name)) for name, figure in figures.items()}
     notes = {f"Missing figures of {name}": estimate.notes for name, estimate in estimates.items()}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}

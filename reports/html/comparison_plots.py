@@ -1,4 +1,4 @@
-"""Data of the plots on a comparison's page, in the form of a run's (see `plot_data`)."""
+"""Data of the plots on a comparison's page, in the form of a run's (see `plot_data.page_data`)."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -11,8 +11,8 @@ from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData
-from ..figures.panels import DEGREES_OF_FREEDOM, NEES_BOUNDS
-from .plot_data import chart, floats, integers, median_by_frame, numbered, position_covariances
+from ..figures.panels import DEGREES_OF_FREEDOM, nees_bounds
+from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
 
 MOMENTS = 4000
 """of the slider, at most"""
@@ -117,8 +117,10 @@ def _heights(lines: Mapping[str, FloatArray]) -> Charts:
 def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) -> Charts:
     reported = {n: r.reported_covariance for n, r in comparison.results.items()}
     lines = {n: _at(t, data.t[n], of.nees) for n, of in reported.items() if of is not None}
+    if not lines:
+        return
     hint = "the band holds 95 % of the poses of a consistent estimator"
-    look = {"log": True, "band": NEES_BOUNDS, "middle": float(DEGREES_OF_FREEDOM), "hint": hint}
+    look = {"log": True, "band": nees_bounds(), "middle": float(DEGREES_OF_FREEDOM), "hint": hint}
     yield chart("Consistency", "nees", "NEES", "", numbered((data.reference, *data.names), lines), **look)
 
 
@@ -149,7 +151,7 @@ def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> l
     """Moments of the first poses beyond the threshold, and of the largest errors where there is none."""
     found = []
     for name, result in comparison.results.items():
-        position = result.departure["position"].to_numpy()
+        position = result.departure["position"]
         first = result.passing is not None
         k = result.passing.frame if result.passing is not None else int(np.nanargmax(position))
         far = result.bound if first else position[k]

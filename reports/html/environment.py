@@ -11,7 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fgbaseline.reports.figures import EncodedFigure, encoded
+from fgbaseline.reports.figures.saving import EncodedFigure, encoded
 
 from ..figures.style import dark_matrix
 from ..formatting import counted, number

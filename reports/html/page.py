@@ -1,6 +1,6 @@
 """Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, ClassVar
@@ -13,7 +13,7 @@ from ..results.metric import TERMS
 from ..tables import Table
 from .environment import NO_SCRIPT, Picture, asset, environment
 from .explore import line_rules, policy, script
-from .plot_data import TRUTH_LINE, embedded_json
+from .plot_encoding import TRUTH_LINE, embedded_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class Page:
     colors: Mapping[str, str] = field(default_factory=dict)
     """of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
     plots: Mapping[str, Any] | None = None
-    """see `plot_data`"""
+    """see `plot_data.page_data`"""
     terms: Mapping[str, str] | None = None
     """of the glossary; None for those of every page"""
     still_paths: Picture | None = None
@@ -139,3 +139,25 @@ def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
         "has": {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")},
         "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
     }
+
+
+def trust(name: str, verdict_on_it: str, reasons: Iterable[str], criteria: Table | None = None) -> Folded:
+    """Trust in a reference: its reasons and its criteria, folded away."""
+    blocks: list[Block] = [Sentences(list(reasons), "reasons")]
+    blocks += [Grid(criteria, "plain criteria")] if criteria is not None and criteria.rows else []
+    return Folded(f"Reference: {name}", blocks, f"trust {verdict_on_it}", badge=verdict_on_it)
+
+
+def folded(table: Table, most_open: int = 0) -> Folded:
+    """A table under its title, open where it has at most so many rows."""
+    return Folded(table.title, [Grid(table, "plain")], is_open=len(table.rows) <= most_open)
+
+
+def still_figures(stills: list[Block]) -> Folded:
+    """Figures that the interactive plots stand for on the screen."""
+    return Folded(f"{len(stills)} figures as they stand in the folder figures/", stills, "stills")
+
+
+def figure_blocks(pictures: Mapping[str, Picture], names: Iterable[str]) -> list[Block]:
+    """The figures of these names that were drawn."""
+    return [pictures[name] for name in names if name in pictures]

@@ -1,6 +1,6 @@
 """Page of a run."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -14,11 +14,25 @@ from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
 from ..results.metric import TERMS
-from ..tables import Table
 from ..tables import run as tables
 from .environment import Picture, picture
-from .page import Block, Folded, Grid, Live, Note, Page, Section, Sentences, render_page
-from .plot_data import embedded_json, image_data, page_data
+from .page import (
+    Block,
+    Folded,
+    Grid,
+    Live,
+    Note,
+    Page,
+    Section,
+    Sentences,
+    figure_blocks,
+    folded,
+    render_page,
+    still_figures,
+    trust,
+)
+from .plot_data import image_data, page_data
+from .plot_encoding import embedded_json
 
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
@@ -135,7 +149,8 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     """Trust in the reference with its criteria, the tracks, and the diagnosis with its findings and repairs."""
     blocks: list[Block] = []
     if run.reference is not None:
-        blocks.append(trust(run.reference, run.trust.verdict.name.lower(), run.trust.reasons, run.trust.criteria))
+        criteria = tables.trust_table(run.trust.criteria)
+        blocks.append(trust(run.reference, run.trust.verdict.name.lower(), run.trust.reasons, criteria))
     problem = run.problem
     size = None if plots is None else (plots["camera"]["width"], plots["camera"]["height"])
     if size is not None and (tracks := track_sentences(problem.sequence, size)):
@@ -150,26 +165,3 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
         inner += [Note("Repairs, the same for all estimators", is_heading=True), Sentences(repairs, "repairs")]
     title = f"The recording: {found if problem.diagnosed or findings.rows else 'it could not be diagnosed'}"
     return [*blocks, Folded(title, inner, "diagnosis", is_open=bool(findings.rows))]
-
-
-def trust(name: str, verdict_on_it: str, reasons: Iterable[str], criteria: Iterable[Any] = ()) -> Folded:
-    """Trust in a reference: its reasons and its criteria, folded away."""
-    limits = tables.trust_table(criteria)
-    blocks: list[Block] = [Sentences(list(reasons), "reasons")]
-    blocks += [Grid(limits, "plain criteria")] if limits.rows else []
-    return Folded(f"Reference: {name}", blocks, f"trust {verdict_on_it}", badge=verdict_on_it)
-
-
-def folded(table: Table, most_open: int = 0) -> Folded:
-    """A table under its title, open where it has at most so many rows."""
-    return Folded(table.title, [Grid(table, "plain")], is_open=len(table.rows) <= most_open)
-
-
-def still_figures(stills: list[Block]) -> Folded:
-    """Figures that the interactive plots stand for on the screen."""
-    return Folded(f"{len(stills)} figures as they stand in the folder figures/", stills, "stills")
-
-
-def figure_blocks(pictures: Mapping[str, Picture], names: Iterable[str]) -> list[Block]:
-    """The figures of these names that were drawn."""
-    return [pictures[name] for name in names if name in pictures]

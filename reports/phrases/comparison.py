@@ -9,7 +9,13 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 from fgbaseline.compare.trajectory_comparison.samples import samples
 
 from ..formatting import counted, listed, number, per_cent
-from .evidence import BEYOND, DEGREES_OF_FREEDOM, held_out_sentences, reference_sentence, sample_requirement
+from .evidence import (
+    DEGREES_OF_FREEDOM,
+    held_out_sentences,
+    overconfidence_bound,
+    reference_sentence,
+    sample_requirement,
+)
 from .position_errors import error_decompositions, file_resolution, maximum_errors, path_lengths, position_rmse
 
 
@@ -123,7 +129,7 @@ def _undetermined_alignments(comparison: Comparison) -> list[str]:
 
 def _rough_intervals(comparison: Comparison) -> list[str]:
     """Estimates with fewer than ten independent blocks."""
-    names = [r.name for r in comparison.results.values() if not r.statistics["translation"].attrs["reliable"]]
+    names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
     if not names:
         return []
     return [f"The intervals of {listed(names)} are rough: fewer than 10 independent blocks fit the path."]
@@ -149,8 +155,8 @@ def _reported_covariances(comparison: Comparison) -> list[str]:
             n = number(reported.not_positive_definite)
             bad.append(f"{n} of the {counted(len(reported.nees), 'covariance')} of {result.name}")
     for word, those in (
-        ("Overconfident", [name for name, mean in measured.items() if mean > BEYOND]),
-        ("Not overconfident", [name for name, mean in measured.items() if mean <= BEYOND]),
+        ("Overconfident", [name for name, mean in measured.items() if mean > overconfidence_bound()]),
+        ("Not overconfident", [name for name, mean in measured.items() if mean <= overconfidence_bound()]),
     ):
         each = listed(
             f"{name} {number(float(np.sqrt(measured[name] / DEGREES_OF_FREEDOM)))} (NEES {number(measured[name])} "

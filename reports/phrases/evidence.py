@@ -1,20 +1,23 @@
 """Sentences that a run and a comparison share: trust in the reference, sample size, held-out tracks, thresholds."""
 
 from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING
 
-import pandas as pd
-
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, Trust, Verdict, chi_square_bounds
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 
 from ..formatting import listed, number, per_cent
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fgbaseline.compare import Trust
 
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
 FIRST = 6
 """sentences of a verdict that stand above the table"""
-BEYOND = float(chi_square_bounds(DEGREES_OF_FREEDOM)[1])
-"""NEES that a single pose of a consistent estimator exceeds with 2.5 %"""
 MEANING: Mapping[str, str] = {
     "doubtful": "a small divergence from it counts, a large one may be its own error",
     "untrusted": "divergence from it does not measure accuracy",
@@ -23,10 +26,18 @@ MEANING: Mapping[str, str] = {
 ROUGH = "The interval is rough: fewer than 10 independent blocks fit the path."
 
 
-def reference_sentence(name: str, trust: Trust, *, is_compared: bool = True) -> str:
+@cache
+def overconfidence_bound() -> float:
+    """Upper bound of the NEES of a single pose, 95 %: a larger mean or median is that of an overconfident estimate."""
+    from fgbaseline.compare import chi_square_bounds
+
+    return float(chi_square_bounds(DEGREES_OF_FREEDOM)[1])
+
+
+def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
     """Trust in a reference, with its first three reasons and what it means for divergence from it."""
     word, reasons = trust.verdict.name.lower(), "; ".join(trust.reasons[:3])
-    if trust.verdict is Verdict.TRUSTED or not is_compared:
+    if word == "trusted" or not is_compared:
         return f"The reference, {name}, is {word}: {reasons}."
     return f"The reference, {name}, is {word}: {reasons}; {MEANING[word]}."
 
@@ -73,7 +84,7 @@ def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> st
     )
 
 
-def held_out_sentences(ranking: pd.DataFrame, sample: str) -> list[str]:
+def held_out_sentences(ranking: "pd.DataFrame", sample: str) -> list[str]:
     """Median held-out errors in a sentence, and the paths without a significant difference from the first in another.
 
     `ranking` has a row for each path, best first, with `median` and `behind_low`; `sample` names what it is taken over.

@@ -6,7 +6,7 @@ from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import listed, number
-from .evidence import BEYOND
+from .evidence import overconfidence_bound
 
 IN_FULL = 3
 """estimators with their figures; of the others only the names"""
@@ -33,8 +33,10 @@ def is_overconfident(run: Run, result: Result) -> bool:
     if not 0.0 < _claimed(result) < _actual(run, result)[0]:
         return False
     difference = None if result.name in run.unranked else result.evidence.difference
-    beside = difference is not None and (difference.is_overconfident or _median(difference.nees) > BEYOND)
-    return beside or (result.nees is not None and _median(result.nees) > BEYOND)
+    beside = difference is not None and (
+        difference.is_overconfident or _median(difference.nees) > overconfidence_bound()
+    )
+    return beside or (result.nees is not None and _median(result.nees) > overconfidence_bound())
 
 
 def _claim(run: Run, result: Result) -> str:
@@ -53,7 +55,7 @@ def _claim(run: Run, result: Result) -> str:
 
 def _actual(run: Run, result: Result) -> tuple[float, str]:
     """RMSE of the positions, m, unaligned, and what it is measured from: ground truth where NEES rests on it."""
-    by_truth = result.nees is not None and _median(result.nees) > BEYOND
+    by_truth = result.nees is not None and _median(result.nees) > overconfidence_bound()
     table = result.truth if by_truth or result.name == run.reference else result.divergence
     distance = float("nan") if table is None else float(np.sqrt(np.nanmean(table["position"].to_numpy() ** 2)))
     return distance, "ground truth" if table is result.truth else str(run.reference)

@@ -24,7 +24,7 @@ def position_rmse(comparison: Comparison) -> list[str]:
     if not others:
         return by_products
     if comparison.ranking.same:
-        path = float(others[0].departure["travelled"].iloc[-1])
+        path = float(others[0].departure["travelled"][-1])
         share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
@@ -76,8 +76,7 @@ def _rmse(result: Result) -> str:
     """Position RMSE with its interval, `0.52 m [0.41, 0.66]`; 0 below the resolution of the files."""
     if _is_unresolved(result):
         return f"{resolved(result.rmse, result.resolution['m'])} m"
-    low, high = (float(result.statistics["translation"][bound]["rmse"]) for bound in ("low", "high"))
-    value, mark, bounds = interval(result.rmse, low, high).partition(" [")
+    value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
     return f"{value} m{mark}{bounds}"
 
 
@@ -89,9 +88,8 @@ def maximum_errors(comparison: Comparison) -> list[str]:
             t = result.passing.t - float(result.matched.reference.t[0])
             when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
             onset[result.name] = f"{when}, {number(result.passing.travelled)} m along the path"
-    most = {
-        r.name: (r.bound, resolved(float(r.departure["position"].max()), r.resolution["m"])) for r in comparison.ranked
-    }
+    largest = {r.name: float(np.nanmax(r.departure["position"])) for r in comparison.ranked}
+    most = {r.name: (r.bound, resolved(largest[r.name], r.resolution["m"])) for r in comparison.ranked}
     return threshold_sentences("position error", most, onset)
 
 
@@ -121,7 +119,7 @@ def error_decompositions(comparison: Comparison) -> list[str]:
 
 
 def _share(result: Result, name: str) -> str:
-    value, low, high = (float(x) for x in result.share_intervals.loc[name, ["value", "low", "high"]].to_numpy())
+    value, low, high = result.share_intervals.by_name[name]
     if not np.isfinite(low):
         return per_cent(max(value, 0.0))
     return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"

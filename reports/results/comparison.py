@@ -7,8 +7,6 @@ from pydantic import Field
 
 from fgbaseline.reports.results.statistics import Nees, Number, Part, Reprojection
 
-MARK = "comparison.json"
-"""the file by which a comparison's folder is known"""
 SCHEMA: Final = "fgbaseline/comparison/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
 

@@ -1,35 +1,50 @@
 """Figures of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors, distance_traveled
+from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.statistics.block_bootstrap import Bounded, ErrorStatistics
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
-from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
-from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
 from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
-from .comparison import Summary
-from .provenance import versions
-from .statistics import INFINITE, finite, nulls
+from .json_tree import INFINITE, finite, nulls
 
-INTERVAL = ["value", "low", "high"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from fgbaseline.compare.trajectory_comparison.reported_covariance import ReportedCovariance
+    from fgbaseline.compare.trajectory_comparison.reprojection import Pixels
+
+    from .comparison import Summary
+
 WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 
 
-def summarize(comparison: Comparison, caption: str) -> Summary:
-    """The summary; figures that are not finite are None, and `notes` has the reasons for missing parts."""
+def results_by_name(comparison: Comparison) -> dict[str, dict[str, Any]]:
+    """Figures of the reference and of every estimate, as JSON has them: None for what is not finite."""
+    estimates = {name: _estimate(comparison, result) for name, result in comparison.results.items()}
+    return {name: finite(of) for name, of in {comparison.reference.name: _reference(comparison), **estimates}.items()}
+
+
+def summarize(comparison: Comparison, results: dict[str, dict[str, Any]], caption: str) -> "Summary":
+    """The summary of `results_by_name`; `notes` has the reasons for missing parts."""
+    from .comparison import Summary
+    from .provenance import versions
+
+    reference, estimates = results[comparison.reference.name], {name: results[name] for name in comparison.results}
     return Summary.model_validate(
         finite(
             {
                 "caption": caption,
-                "reference": _reference(comparison),
-                "estimates": {name: _estimate(comparison, result) for name, result in comparison.results.items()},
+                "reference": reference,
+                "estimates": estimates,
                 "up": {"direction": comparison.up.tolist(), "source": comparison.up_from},
                 "sequence": None if comparison.sequence is None else comparison.sequence.name,
                 "settings": comparison.settings.record(),
@@ -89,18 +104,16 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
             for delta, tables in result.relative_statistics.items()
         },
         "segments": None if result.segments is None else _segments(result.segments, comparison.settings.seed),
-        "drift": None if result.drift is None else result.drift.to_dict(orient="index"),
+        "drift": None if result.drift is None else {name: rate._asdict() for name, rate in result.drift.items()},
         "nees": None if reported is None else _nees(reported),
         "shares": {
             **{name: share for name, share in asdict(result.shares).items() if name != "rms"},
-            "intervals": result.share_intervals.to_dict(orient="index"),
-            "reliable": bool(result.share_intervals.attrs["reliable"]),
+            "intervals": _bounded(result.share_intervals.by_name),
+            "reliable": result.share_intervals.reliable,
         },
-        "common": None
-        if common is None
-        else {"moments": comparison.ranking.moments, "rmse": common.loc["rmse", INTERVAL].to_dict()},
+        "common": None if common is None else {"moments": comparison.ranking.moments, "rmse": common["rmse"]._asdict()},
         "behind": None if behind is None else asdict(behind),
-        "final_m": float(result.departure["position"].iloc[-1]),
+        "final_m": float(result.departure["position"][-1]),
         "passing": {
             "bound_m": result.bound,
             "t": None if result.passing is None else result.passing.t,
@@ -116,25 +129,35 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
     return {**values, "notes": result.notes | infinite}
 
 
-def _statistics(table: pd.DataFrame) -> dict[str, Any]:
+def _statistics(of: ErrorStatistics) -> dict[str, Any]:
     return {
-        **{name: table.loc[name, INTERVAL].to_dict() for name in WITH_INTERVAL},
-        **{name: float(table["value"][name]) for name in ("min", "max", "sse", "n")},
-        **{key: table.attrs[key] for key in ("missing", "block", "reliable")},
+        **{name: of[name]._asdict() for name in WITH_INTERVAL},
+        **{name: of[name].value for name in ("min", "max", "sse")},
+        **{"n": int(of["n"].value), "missing": of.missing, "block": of.block, "reliable": of.reliable},
     }
+
+
+def _bounded(figures: Mapping[str, Bounded]) -> dict[str, dict[str, float]]:
+    return {name: figure._asdict() for name, figure in figures.items()}
+
+
+def _records(columns: Columns) -> list[dict[str, Any]]:
+    """A mapping for each row."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def _segments(segments: SegmentErrors, seed: int) -> dict[str, Any]:
     return {
         "translation_percent": segments.translation_percent,
         "rotation_deg_per_m": segments.rotation_deg_per_m,
-        "intervals": segments.intervals(seed).to_dict(orient="index"),
+        "intervals": _bounded(segments.means(seed)),
         "official": segments.official,
-        "by_length": segments.by_length.reset_index().to_dict(orient="records"),
+        "by_length": _records(segments.means_by_length),
     }
 
 
-def _map(table: pd.DataFrame) -> dict[str, Any]:
+def _map(table: "pd.DataFrame") -> dict[str, Any]:
     by_depth = compare.map_by_depth(table)[["n", "distance", "seen"]]
     return {
         "n": len(table),
@@ -145,7 +168,7 @@ def _map(table: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _nees(reported: ReportedCovariance) -> dict[str, float | int]:
+def _nees(reported: "ReportedCovariance") -> dict[str, float | int]:
     known = reported.nees[~np.isnan(reported.nees)]
     mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
     return {
@@ -168,7 +191,7 @@ def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:
     }
 
 
-def _pixels(pixels: Pixels | None) -> dict[str, Any]:
+def _pixels(pixels: "Pixels | None") -> dict[str, Any]:
     if pixels is None:
         return dict.fromkeys(("reprojection", "reprojection_common", "reprojection_along"))
     return {key: None if t is None else compare.reprojection_summary(t) for key, t in pixels.tables.items()}

@@ -4,11 +4,11 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
+from pydantic import Field, create_model
 
 from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Result, Run
@@ -28,8 +28,10 @@ from .evidence import (
     summarize_evidence,
 )
 from .inertial import QuantityDivergence, QuantityError, StateNees, inertial_notes, summarize_inertial
-from .metrics import MEASURED, NOT_MEASURED, measured, with_measured
-from .statistics import INFINITE, Divergence, Number, Part, PoseSigma, Reprojection, Spread, nulls
+from .json_tree import INFINITE, nulls
+from .metric import TERMS, Metric
+from .metrics import MEASURED, NOT_MEASURED, measured
+from .statistics import Divergence, Number, Part, PoseSigma, Reprojection, Spread
 
 
 class Component(Part):
@@ -59,6 +61,19 @@ class CommonRmse(Part):
 
     rmse: Number
     frames: int
+
+
+Model = TypeVar("Model", bound=Part)
+
+
+def with_measured(model: type[Model]) -> type[Model]:
+    """The model of an estimator's results with a key for each metric that has its own `measure`."""
+    fields: dict[str, Any] = {metric.path[0]: (Number, Field(description=_description(metric))) for metric in MEASURED}
+    return create_model(model.__name__, __base__=model, __module__=model.__module__, __doc__=model.__doc__, **fields)
+
+
+def _description(metric: Metric) -> str:
+    return TERMS.get(metric.term or metric.group, f"{metric.title}, {metric.unit}")
 
 
 @with_measured

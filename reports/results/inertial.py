@@ -7,8 +7,9 @@ import pandas as pd
 from pydantic import Field
 
 from fgbaseline import compare
-from fgbaseline.compare.consistency.state import BLOCKS, QUANTITIES
+from fgbaseline.compare.consistency.state import QUANTITIES
 from fgbaseline.compare.estimate_comparison import InertialEvidence, Result, Run
+from fgbaseline.geometry.strapdown import BLOCKS
 
 from .evidence import REFERENCE, statistics_of
 from .statistics import Number, Part, Spread

@@ -1,7 +1,7 @@
 """Metrics of runs on raw inertial data: velocity, biases and the NEES of the state. Other runs have none of them."""
 
-from fgbaseline.compare.consistency.state import BLOCKS
 from fgbaseline.compare.limits import Better
+from fgbaseline.geometry.strapdown import BLOCKS
 
 from .metric import (
     ACCELEROMETER_BIAS,

@@ -4,13 +4,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Flag, auto
 from math import isfinite, nan
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.limits import Better
 
 from ..formatting import RESOLUTION, interval, number, resolved
-from .statistics import at
+from .json_tree import at
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Result, Run
 
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
 REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
@@ -127,7 +129,7 @@ class Metric:
     """whether it is a whole number"""
     absent: str = ""
     """why it may be missing, where the results do not say"""
-    measure: Callable[[Run, Result], float] | None = None
+    measure: "Callable[[Run, Result], float] | None" = None
     """its figure, where no model of the results has it"""
 
     @property

@@ -7,13 +7,11 @@ estimator in `summary.json` or `comparison.json` as well. The glossary's terms s
 from collections.abc import Iterable
 from dataclasses import replace
 from math import nan
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field, create_model
 
 from fgbaseline.compare import time_coverage
-from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.limits import Better
 
 from .inertial_metrics import BLOCK_NEES, MAIN_STATE_NEES, VELOCITY_AND_BIASES
@@ -37,11 +35,12 @@ from .metric import (
     SEGMENTS,
     SIGMA,
     TERMINAL,
-    TERMS,
     Metric,
     Tables,
 )
-from .statistics import Number, Part
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Result, Run
 
 LOWER, HIGHER, PERCENT = Better.LOWER, Better.HIGHER, 100.0
 COMMON = "RMSE over common frames"
@@ -50,12 +49,12 @@ NO_LANDMARK = "no observed landmark was estimated"
 NOT_MEASURED = "not measured"
 
 
-def _coverage(run: Run, result: Result) -> float:
+def _coverage(run: "Run", result: "Result") -> float:
     t = run.problem.sequence.t
     return time_coverage(t[np.isfinite(result.estimate.world_T_imu[:, 0, 0])], t)
 
 
-def _frames_per_second(run: Run, result: Result) -> float:
+def _frames_per_second(run: "Run", result: "Result") -> float:
     seconds = result.estimate.seconds_total
     return run.problem.n_frames / seconds if seconds > 0 else nan
 
@@ -260,19 +259,8 @@ def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric
 
 
 MEASURED = tuple(metric for metric in METRICS if metric.measure is not None)
-Model = TypeVar("Model", bound=Part)
 
 
-def with_measured(model: type[Model]) -> type[Model]:
-    """The model of an estimator's results with a key for each metric that has its own `measure`."""
-    fields: dict[str, Any] = {metric.path[0]: (Number, Field(description=_description(metric))) for metric in MEASURED}
-    return create_model(model.__name__, __base__=model, __module__=model.__module__, __doc__=model.__doc__, **fields)
-
-
-def _description(metric: Metric) -> str:
-    return TERMS.get(metric.term or metric.group, f"{metric.title}, {metric.unit}")
-
-
-def measured(run: Run, result: Result) -> dict[str, float]:
+def measured(run: "Run", result: "Result") -> dict[str, float]:
     """Figures of the metrics that have their own `measure`, by key."""
     return {metric.path[0]: metric.measure(run, result) for metric in MEASURED if metric.measure is not None}

@@ -1,7 +1,6 @@
 """The reader of summary.json (run, bench), comparison.json and baselines, and of the other files of a run's folder."""
 
 import difflib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,17 +12,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from fgbaseline.data import Landmarks, Trajectory
 from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.formats import read_landmarks, read_trajectory
-from fgbaseline.data.formats.named_file import reading, regular_file, shown
+from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
-from .statistics import INFINITE, leaves
+from .documents import SUMMARY, measured_file, read_document
+from .json_tree import INFINITE, leaves
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SUMMARY = "summary.json"
-COMPARISON = "comparison.json"
 TRUTH = "truth.tum"
 BASELINE = "fgbaseline/baseline/1"
 NO_SUCH_METRIC = "it has no such metric"
@@ -143,9 +141,7 @@ class RunFolder:
     @property
     def summary(self) -> dict[str, Any]:
         """`summary.json` or `comparison.json` as it is."""
-        path = self.folder / self.mark
-        with reading(path):
-            return _document(path)
+        return read_document(self.folder / self.mark)
 
     def trajectory(self, name: str) -> Trajectory:
         """The path of an estimator."""
@@ -188,19 +184,13 @@ def _csv(path: Path) -> "pd.DataFrame | None":
 
 def read_folder(folder: Path) -> Measured:
     """The content of a folder's summary.json or comparison.json. Raises InputError."""
-    wanted = "give one that fgbaseline run, compare or bench wrote"
-    if not folder.is_dir():
-        raise InputError(f"{shown(folder)}: there is no such folder; {wanted}")
-    found = [folder / name for name in (SUMMARY, COMPARISON) if (folder / name).is_file()]
-    if not found:
-        raise InputError(f"{shown(folder)}: it holds no {SUMMARY}; {wanted}")
-    return read_measured(found[0])
+    return read_measured(measured_file(folder))
 
 
 def read_measured(path: Path) -> Measured:
     """The content of a summary.json, a comparison.json or a baseline. Raises InputError naming file and place."""
+    document = read_document(path)
     with reading(path):
-        document = _document(path)
         try:
             if "runs" in document:
                 runs = dict(_SuiteSummary.model_validate(document).runs)
@@ -212,19 +202,6 @@ def read_measured(path: Path) -> Measured:
             where = ".".join(map(str, first["loc"]))
             raise InputError(f"{where}: {first['msg'][:1].lower()}{first['msg'][1:]}; write the file anew") from None
     return Measured(path, runs, str(document["schema"]))
-
-
-def _document(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(regular_file(path).read_bytes())
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"this is not JSON ({error}); give a {SUMMARY} or a baseline") from None
-    if not isinstance(document, dict) or not str(document.get("schema", "")).startswith("fgbaseline/"):
-        raise InputError(
-            f"it is not the summary of a run, comparison or bench (no schema of fgbaseline's); give a {SUMMARY} or a "
-            "baseline"
-        )
-    return document
 
 
 def failure(estimator: Mapping[str, Any]) -> str | None:

@@ -15,8 +15,9 @@ from fgbaseline.geometry import FloatArray
 
 from .estimator import EstimatorSummary, InertialEstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
+from .json_tree import finite
 from .provenance import machine, versions
-from .statistics import Number, Part, PoseSigma, finite
+from .statistics import Number, Part, PoseSigma
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""

@@ -23,7 +23,8 @@ from fgbaseline.data.solving import Watch, no_progress
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
-from ..comparison.sources import Array, TrajectoryLike, as_path, by_name, opened
+from ..comparison.opening import as_path
+from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..keywords import for_python
 from ..names import names_in
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS

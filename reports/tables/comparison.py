@@ -2,24 +2,28 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..formatting import resolved
-from ..results.comparison import Summary
 from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
 from ..results.metrics import over_deltas, shown_in
 from .table import Cell, Column, Row, Table, compared
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def comparison_table(comparison: Comparison, summary: Summary, *, mark_reference: bool = False) -> Table:
+Results = Mapping[str, Mapping[str, Any]]
+"""figures of the reference and of every estimate, as JSON has them: see `comparison_summary.results_by_name`"""
+
+
+def comparison_table(comparison: Comparison, results: Results, caption: str, *, mark_reference: bool = False) -> Table:
     """A row for each figure, a column for each trajectory: the reference is one of them where it has a figure."""
-    results, reference = summary.by_name, comparison.reference.name
+    reference = comparison.reference.name
     metrics = _metrics(comparison, results)
     rivals = [name for name, result in comparison.results.items() if not result.entry.by_product]
     names = list(comparison.results)
@@ -33,7 +37,7 @@ def comparison_table(comparison: Comparison, summary: Summary, *, mark_reference
     rows = tuple(
         Row(name, tuple(of[name] for of in cells), reference=mark_reference and name == reference) for name in names
     )
-    return Table(tuple(map(Column.of, metrics)), rows, caption=summary.caption).transposed()
+    return Table(tuple(map(Column.of, metrics)), rows, caption=caption).transposed()
 
 
 def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Value]) -> dict[str, Cell]:
@@ -46,9 +50,10 @@ def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Val
     return found
 
 
-def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
+def main_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
     """One row per estimate: the figures, and behind each that has an interval its `low` and `high`."""
-    results = summary.by_name
+    import pandas as pd
+
     table: dict[str, list[float]] = {}
     for m in _metrics(comparison, results):
         values = [m.value(results[name]) for name in comparison.results]
@@ -59,17 +64,20 @@ def main_table(comparison: Comparison, summary: Summary) -> pd.DataFrame:
     return pd.DataFrame(table, index=pd.Index(comparison.results, name="estimate"))
 
 
-def main_frame(comparison: Comparison, summary: Summary) -> pd.DataFrame:
+def main_frame(comparison: Comparison, results: Results) -> "pd.DataFrame":
     """The figures of `main_table` without their intervals: one metric a row, one estimate a column."""
-    results, metrics = summary.by_name, _metrics(comparison, summary.by_name)
+    import pandas as pd
+
+    metrics = _metrics(comparison, results)
     rows = [[m.value(results[name]).value for name in comparison.results] for m in metrics]
     return pd.DataFrame(rows, pd.Index([m.full_title for m in metrics], name="metric"), list(comparison.results))
 
 
-def metrics_table(summary: Summary) -> pd.DataFrame:
+def metrics_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
     """`metrics.csv`: estimate, metric (its path in comparison.json), value, low, high."""
-    results = summary.by_name
-    rows = [(name, metric, *value) for name in summary.estimates for metric, value in _figures(results[name])]
+    import pandas as pd
+
+    rows = [(name, metric, *value) for name in comparison.results for metric, value in _figures(results[name])]
     return pd.DataFrame(rows, columns=["estimate", "metric", *Value._fields])
 
 

@@ -15,11 +15,11 @@ from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
+from ..results.json_tree import INFINITE, at, leaves
 from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import shown_in
 from ..results.reader import DIVERGENCES, INERTIAL
 from ..results.run import Summary
-from ..results.statistics import INFINITE, at, leaves
 from .table import Cell, Column, Row, Table, best
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")

@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from fgbaseline import compare
-from fgbaseline.compare.statistics.block_bootstrap import (
+from fgbaseline.compare.statistics.block_bootstrap import autocovariance, block_length
+from fgbaseline.compare.statistics.block_draws import (
     BlockDraws,
-    autocovariance,
-    block_length,
     draw_blocks,
     percentile_interval,
 )
@@ -280,3 +279,28 @@ def test_looking_at_a_few_draws_at_a_time_changes_nothing() -> None:
     short = draw_blocks(2000, 1, 600, seed=3)  # 250 at a time
     sums = short.sums(x[:2000, None])
     np.testing.assert_allclose(sums[:, 0], x[short.start].sum(axis=1), atol=1e-9)
+
+
+@given(
+    values=st.lists(st.sampled_from([0.0, 1.0, 1.5, 4.0, 9.0]) | st.floats(-1e3, 1e3), min_size=2, max_size=60),
+    block=st.integers(1, 60),
+    draws=st.sampled_from([1, 2, 9, 50, 200]),
+    at=st.sampled_from([0.0, 0.3, 0.5, 0.95, 1.0]),
+    confidence=st.sampled_from([0.5, 0.95, 0.999]),
+)
+def test_the_interval_of_a_quantile_is_that_of_all_its_draws(
+    values: list[float], block: int, draws: int, at: float, confidence: float
+) -> None:
+    x = np.array(values)
+    drawn = draw_blocks(len(x), min(block, len(x)), draws, seed=5)
+    all_of_them = percentile_interval(drawn.quantiles(x, (at,)), confidence)[:, 0]
+    np.testing.assert_allclose(drawn.quantile_interval(x, at, confidence), all_of_them, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "block"), [(5000, 200), (5000, 1), (20_000, 4)])
+def test_the_interval_of_a_quantile_of_long_series(n: int, block: int) -> None:
+    for x in (autoregressive(n, 0.9, 1), np.abs(autoregressive(n, 0.5, 2).cumsum()), np.arange(n) // 100.0):
+        drawn = draw_blocks(n, block, 300, seed=1)
+        for at in (0.5, 0.95):
+            every = percentile_interval(drawn.quantiles(x, (at,)))[:, 0]
+            np.testing.assert_allclose(drawn.quantile_interval(x, at), every, rtol=1e-12)

@@ -48,7 +48,7 @@ def triples(draw: st.DrawFn) -> dict[str, tuple[FloatArray, FloatArray]]:
 def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
     drawn: dict[str, tuple[FloatArray, FloatArray]],
 ) -> None:
-    errors = {name: pd.Series(e) for name, (_, e) in drawn.items()}
+    errors = {name: e for name, (_, e) in drawn.items()}
     stamps = {name: t for name, (t, _) in drawn.items()}
     ranking = ranking_of(errors, stamps, tolerance=0.01, by_products=frozenset(), seed=0)
     taking_part = figures.rankable({name: len(t) for name, t in stamps.items()})

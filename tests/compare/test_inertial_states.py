@@ -8,10 +8,11 @@ from scipy.optimize import minimize_scalar
 
 from fgbaseline import compare, ekf
 from fgbaseline.compare.consistency.anees import average_nees
-from fgbaseline.compare.consistency.state import BLOCKS, QUANTITIES
+from fgbaseline.compare.consistency.state import QUANTITIES
 from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3, so3
+from fgbaseline.geometry.strapdown import BLOCKS
 
 from ..builders.inertial import inertial_problem
 from ..builders.synthetic import Scene, plain_problem

@@ -9,9 +9,9 @@ import pytest
 
 from fgbaseline import compare, data, diagnosis, ekf, smoother
 from fgbaseline.compare import Verdict
+from fgbaseline.compare.reference_trust import TrustLimits, _above, _below, expected_observations
 from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
-from fgbaseline.compare.trust import TrustLimits, _above, _below, expected_observations
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.triangulated import landmarks_along

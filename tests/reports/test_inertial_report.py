@@ -13,10 +13,11 @@ import pandas as pd
 import pytest
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.consistency.state import BLOCKS, QUANTITIES
+from fgbaseline.compare.consistency.state import QUANTITIES
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import Truth
 from fgbaseline.geometry import InputError
+from fgbaseline.geometry.strapdown import BLOCKS
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits_file import read_limits
 from fgbaseline.reports.figures.evidence import velocity_and_biases

@@ -274,7 +274,7 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     assert opened.count("#path-view svg .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
     opened.page.click("summary:has-text('in numbers')")
     row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
-    at_ten = six().results["steady"].departure["position"].iloc[10]
+    at_ten = six().results["steady"].departure["position"][10]
     assert row[2] == f"{at_ten:#.3g}"
     assert (opened.said, opened.asked) == ([], [compared])
     opened.page.context.close()

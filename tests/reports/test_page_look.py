@@ -23,7 +23,7 @@ from fgbaseline.reports.figures.style import (
     on_dark,
 )
 from fgbaseline.reports.html.explore import policy
-from fgbaseline.reports.html.plot_data import embedded_json, floats
+from fgbaseline.reports.html.plot_encoding import embedded_json, floats
 from fgbaseline.reports.html.run_page import render
 
 from ..builders.browser import Opened

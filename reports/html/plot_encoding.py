@@ -1,0 +1,107 @@
+"""Numbers of plots as a page has them, packed as base64, and the charts made of them."""
+
+from base64 import b64encode
+from collections.abc import Iterable, Mapping
+from json import dumps
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import ArrayLike
+
+from fgbaseline import compare
+from fgbaseline.geometry import FloatArray
+
+FINEST = 16
+"""parts of a pixel that observations are rounded to, unless the image is too large for that"""
+
+
+def floats(values: ArrayLike) -> str:
+    """Single precision; NaN for what is not finite."""
+    array = np.asarray(values, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        single = np.where(np.isfinite(array), array, np.nan).astype("<f4")
+    return _text(np.where(np.isfinite(single), single, np.nan).astype("<f4"))
+
+
+def integers(values: ArrayLike) -> str:
+    """Unsigned, 32 bits."""
+    return _text(np.asarray(values).astype("<u4"))
+
+
+def small_integers(values: ArrayLike) -> str:
+    """Unsigned, 8 bits."""
+    return _text(np.asarray(values).astype("u1"))
+
+
+def flags(values: ArrayLike) -> str:
+    """One bit each, the lowest first."""
+    return _text(np.packbits(np.asarray(values, dtype=np.bool_), bitorder="little"))
+
+
+def pixels(values: ArrayLike) -> tuple[str, int]:
+    """Signed 16 bit integers, and how many of them make a pixel: a power of two, at most `FINEST`."""
+    array = np.asarray(values, dtype=np.float64)
+    largest = float(np.abs(array).max()) if array.size else 0.0
+    parts = FINEST
+    while parts > 1 and largest * parts > 32000.0:
+        parts //= 2
+    return _text(np.clip(np.rint(array * parts), -32768, 32767).astype("<i2")), parts
+
+
+def embedded_json(value: Any) -> Markup:
+    """JSON that cannot end the element it stands in, whatever its texts are."""
+    text = dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)  # nosec: no markup can be left in it
+
+
+def _text(array: np.ndarray) -> str:
+    return b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+TRUTH_LINE = "truth"
+"""key of ground truth among the lines of a chart; those of estimators are numbers"""
+OUTLIER = 10.0
+"""times farther than every other line: then one line alone would flatten all others on a linear axis"""
+
+Lines = Mapping[str, FloatArray]
+
+
+def chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
+    """A chart; None where no line has a value."""
+    known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
+    if not known:
+        return None
+    settings = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "hint": "", **more}
+    packed = {key: floats(values) for key, values in known.items()}
+    return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **settings}
+
+
+def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
+    """Whether a logarithmic axis is needed to see more than one of lines that are nowhere negative."""
+    series = [values[np.isfinite(values)] for values in lines]
+    if any(values.min() < 0.0 for values in series):
+        return False
+    largest = sorted((float(values.max()) for values in series), reverse=True)
+    return len(largest) > 1 and largest[0] > OUTLIER * largest[1] > 0.0
+
+
+def numbered(names: Iterable[str], lines: Lines) -> Lines:
+    """Lines by the number of their name among `names`, as text."""
+    number = {name: str(i) for i, name in enumerate(names)}
+    return {number[name]: np.asarray(values, dtype=np.float64) for name, values in lines.items()}
+
+
+def median_by_frame(reprojection: Any, n_frames: int) -> FloatArray:
+    """Median error (T,) of each frame, px, from a table of `compare.reprojection`; NaN without an observation."""
+    median = compare.reprojection_by(reprojection, "frame")["median"]
+    return np.asarray(median.reindex(range(n_frames)).to_numpy(dtype=np.float64))
+
+
+def position_covariances(view_R_body: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(n, 6) m^2: xx, xy, xz, yy, yz, zz in the view, of pose covariances (n, 6, 6) in the axes of their body."""
+    P = view_R_body @ covariance[:, :3, :3] @ np.swapaxes(view_R_body, 1, 2)
+    row, column = np.triu_indices(3)
+    return np.asarray(P[:, row, column])
