@@ -30,7 +30,11 @@ def zero_order_hold(sequence: Sequence, shift: float = Shift.AFTER) -> FloatArra
     Sample k is held for one interval, from `shift` intervals after its stamp. A fractional shift weights two
     neighbors in proportion. The first and last samples extend beyond the ends.
     """
-    u = np.concatenate([sequence.linear_velocity, sequence.angular_velocity], axis=1)
+    return held_samples(np.concatenate([sequence.linear_velocity, sequence.angular_velocity], axis=1), shift)
+
+
+def held_samples(u: FloatArray, shift: float) -> FloatArray:
+    """Samples (T, c) by zero-order hold over each of the intervals (T-1, c), as `zero_order_hold`."""
     last = len(u) - 1
     whole, part = divmod(-float(shift), 1.0)
     first = np.clip(np.arange(last) + int(whole), 0, last)

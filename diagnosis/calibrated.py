@@ -102,7 +102,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
         repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks
     )
     return replace(
-        inflate_gap_covariance(_bridged(problem, diagnosis, noise)),
+        inflate_gap_covariance(_with_outlier_noise(_bridged(problem, diagnosis, noise), diagnosis)),
         pixel_inflation=1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel,
         diagnosed=not found.cannot_tell,
         findings=findings_of(found, track_statistics(found, repaired if repairs == Repairs() else None)),
@@ -138,6 +138,15 @@ def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Pr
         increment_covariance=(dt * found.deviation)[:, :, None] ** 2 * np.eye(6),
         remarks=(*problem.remarks, remark),
     )
+
+
+def _with_outlier_noise(problem: Problem, diagnosis: Diagnosis) -> Problem:
+    """The problem with the error of the velocities that are interpolated in place of outliers."""
+    if diagnosis.outliers is None:
+        return problem
+    deviation = diagnosis.outliers.of_intervals(diagnosis.shift, diagnosis.linear.matrix, diagnosis.angular.matrix)
+    added = (deviation * problem.sequence.dt[:, None]) ** 2
+    return replace(problem, increment_covariance=problem.increment_covariance + added[:, :, None] * np.eye(6))
 
 
 def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration) -> Problem:

@@ -10,7 +10,7 @@ from .atomic_write import atomic_write
 from .named_file import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
 from .stamped_poses import require_rising, writable
-from .stamps import possible_units, stamps_of
+from .stamps import no_unit, possible_units, stamps_of
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
@@ -54,7 +54,8 @@ def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
         if unit is not None and not settled:
             return stamps.seconds(unit)
         if TimeUnit.S not in units and len(units) != 1:
-            raise InputError("its time stamps may be in several units; give --time-unit")
+            cause = "its time stamps may be in several units" if units else no_unit(stamps)
+            raise InputError(f"{cause}; give --time-unit")
         return stamps.seconds(units[0])
 
 

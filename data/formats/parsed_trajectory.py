@@ -14,7 +14,7 @@ from ..trajectory import Trajectory
 from .columns import Order
 from .pose_covariances import pose_covariances
 from .quaternion_order import xyzw
-from .stamps import Stamps
+from .stamps import Stamps, no_unit
 
 STRAIGHT = 1e-3
 """of a path's extent: one that leaves a straight line by less does not bend"""
@@ -143,10 +143,7 @@ def unit_ambiguity(file: ParsedTrajectory, units: Sequence[TimeUnit] | None = No
     assert file.stamps is not None
     possible = file.units if units is None else units
     if not possible:
-        return (
-            f"{file.source}: its poses are {file.stamps.interval:.3g} apart in time, which is none of a recorder in "
-            "seconds, milliseconds, microseconds or nanoseconds; give --time-unit"
-        )
+        return f"{file.source}: {no_unit(file.stamps)}; give --time-unit"
     names = " or ".join(unit.noun for unit in possible)
     return (
         f"{file.source}: its time stamps, {file.stamps.interval:.3g} apart, may be in {names}; give --time-unit "

@@ -9,7 +9,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
 from ..plural import plural
-from ..time_unit import TimeUnit, lost_digits, significant_digits, since_1970
+from ..time_unit import SAMPLE_PERIODS, TimeUnit, lost_digits, significant_digits, since_1970
 
 FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
 """s between two poses: of no recorder, of a recorder, of keyframes at most"""
@@ -88,15 +88,32 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
 
 
 def likely_seconds(stamps: Stamps) -> FloatArray:
-    """The stamps in s, in the likeliest of their `possible_units`; a single one is in s."""
-    return stamps.seconds(possible_units(stamps)[0][0] if len(stamps.value) > 1 else TimeUnit.S)
+    """The stamps of velocities or inertial samples in s, in the likeliest of their `possible_units`; a single one is in
+    s.
+
+    Raises InputError where none of the units fits.
+    """
+    if len(stamps.value) < 2:
+        return stamps.seconds(TimeUnit.S)
+    units, _ = possible_units(stamps, SAMPLE_PERIODS[0])
+    if not units:
+        raise InputError(f"{no_unit(stamps)}; write seconds")
+    return stamps.seconds(units[0])
 
 
-def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
+def no_unit(stamps: Stamps) -> str:
+    """Why none of the units fits, in words."""
+    return (
+        f"its time stamps are {stamps.interval:.3g} apart, which is no interval of a recorder in seconds, "
+        "milliseconds, microseconds or nanoseconds"
+    )
+
+
+def possible_units(stamps: Stamps, fastest: float = FASTEST) -> tuple[tuple[TimeUnit, ...], bool]:
     """Possible units of the stamps, likeliest first, and True if header or size determine the unit.
 
-    Seconds since 1970 have their size in each unit; otherwise the interval between poses decides. Empty if no unit
-    gives the rate of a recorder; both units if header and size contradict each other.
+    Seconds since 1970 have their size in each unit; otherwise the interval between stamps decides. Empty if no unit
+    gives a recorder's interval, at least `fastest` s; both units if header and size contradict each other.
     """
     interval = stamps.interval
     by_size = since_1970(float(np.median(np.abs(stamps.value))), interval or 0.0, EPOCH_INTERVAL)
@@ -106,10 +123,10 @@ def possible_units(stamps: Stamps) -> tuple[tuple[TimeUnit, ...], bool]:
         return (stamps.unit,), True
     if by_size is not None:
         return (by_size,), True
-    if interval is None or (FASTEST <= interval < CERTAIN_BELOW):
+    if interval is None or (fastest <= interval < CERTAIN_BELOW):
         return (TimeUnit.S,), False
-    units = [TimeUnit.S] if interval <= SLOWEST and interval >= FASTEST else []
-    units += [u for u in TimeUnit if u is not TimeUnit.S and FASTEST <= interval / u.per_second <= USUAL]
+    units = [TimeUnit.S] if interval <= SLOWEST and interval >= fastest else []
+    units += [u for u in TimeUnit if u is not TimeUnit.S and fastest <= interval / u.per_second <= USUAL]
     return tuple(units), False
 
 

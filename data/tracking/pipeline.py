@@ -190,7 +190,8 @@ def _require_size(left: Image, right: Image, recording: ImageRecording, name: st
 
 
 def _of_frames(recording: ImageRecording, kept: BoolArray) -> ImageRecording:
-    truth = recording.truth
+    """The recording of the frames that are kept; the first of them takes the place of frame 0."""
+    truth, up = recording.truth, recording.up_imu
     if isinstance(truth, Truth) and not kept.all():
         truth = truth.of_frames(kept)
         if recording.imu is None and truth.known[0]:
@@ -198,4 +199,7 @@ def _of_frames(recording: ImageRecording, kept: BoolArray) -> ImageRecording:
     velocities = recording.velocities
     if velocities is not None:
         velocities = velocities[0][kept], velocities[1][kept]
-    return replace(recording, t=recording.t[kept], velocities=velocities, truth=truth)
+    turn = rotation_between(recording, np.eye(3), 0, int(np.argmax(kept)))
+    if up is not None and turn is not None:
+        up = turn @ up
+    return replace(recording, t=recording.t[kept], velocities=velocities, truth=truth, up_imu=up)

@@ -18,12 +18,17 @@ ENOUGH = 25.0
 """log-likelihood lead over all other shifts; high, since time-correlated pixel errors exaggerate it"""
 INFLATION = 3.0
 """of the standard error, for the same reason"""
+HELD = 0.5
+"""share of the cost's fall that the parabola predicts, from which on it describes the cost"""
+ROUNDING = 1.0 / np.sqrt(12.0)
+"""intervals, the standard error of an integer"""
 
 
 def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None:
     """The delay by a parabola through half the cost (negative log-likelihood) at the best shift and its neighbors.
 
-    None where no shift leads, or where the best one is at the edge of the range.
+    None where no shift leads, or where the best one is at the edge of the range. Where motion changes too much from
+    frame to frame, the cost is no parabola and does not fall between the shifts: the best integer remains.
     """
     tried = np.array(SHIFTS)
     costs = np.array([cost(shift) for shift in SHIFTS])
@@ -33,7 +38,10 @@ def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None
     before, at, after = costs[best - 1 : best + 2]
     curvature = before - 2.0 * at + after
     shift = tried[best] + 0.5 * (before - after) / curvature
-    return TimeDelay(float(shift) * dt, INFLATION / float(np.sqrt(curvature)) * dt, True, tried, _relative(costs))
+    deviation = INFLATION / float(np.sqrt(curvature))
+    if at - cost(float(shift)) < HELD * 0.5 * curvature * (shift - tried[best]) ** 2:
+        shift, deviation = tried[best], max(deviation, float(ROUNDING))
+    return TimeDelay(float(shift) * dt, deviation * dt, True, tried, _relative(costs))
 
 
 def _relative(costs: FloatArray) -> FloatArray:

@@ -32,6 +32,16 @@ class ScaleRatio(NamedTuple):
     """NaN without a sample"""
     known: bool
     """whether both correlate, so that it is more than the ratio of two noises"""
+    correlation: float = 0.0
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between which the factor of the motion lies: the slopes of the two regressions of one on the other.
+
+        The noise of its regressor attenuates each of them (Frisch 1934).
+        """
+        c = max(self.correlation, np.finfo(np.float64).tiny)
+        return self.ratio * c, self.ratio / c
 
 
 def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, centered: bool) -> ScaleRatio:
@@ -54,7 +64,7 @@ def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, cen
             correlation = float(np.einsum("cij,ij->c", MATRICES, cross).max())
             sure = bool(correlation > max(MIN_CORRELATION, CHANCE / np.sqrt(3 * len(y))))
             if np.isnan(best.ratio) or (sure and correlation > most):
-                best = ScaleRatio(size_y / size_x, known=sure)
+                best = ScaleRatio(size_y / size_x, sure, correlation)
                 most = correlation if sure else 0.0
     return best
 
@@ -77,5 +87,5 @@ def _clipped(signal: FloatArray) -> FloatArray:
     """Samples (m, 3), those that are larger than nearly all others shortened to the size of these."""
     size = np.linalg.norm(signal, axis=1)
     most = np.quantile(size, OUTER)
-    shorter = np.minimum(1.0, most / np.maximum(size, np.finfo(np.float64).tiny))
+    shorter = np.divide(most, size, out=np.ones_like(size), where=size > most)
     return np.asarray(signal * shorter[:, None], dtype=np.float64)

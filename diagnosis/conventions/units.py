@@ -20,12 +20,14 @@ from fgbaseline.data.finding import AS_GIVEN, Finding
 from fgbaseline.data.motion import zero_order_hold
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.time_unit import TimeUnit, rescaled_time, usual
+from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
+from .jumps import FAR_BLIND, among_neighbors
+from .rate_units import DEGREE, doubt_of_rate_unit
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
-DEGREE = float(np.pi / 180.0)
 TOLERANCE = 0.45
 """of the decadic logarithm of a ratio; the nearest two factors, degrees and thousandths, are 1.24 apart"""
 BASELINES = (0.01, 5.0)
@@ -116,14 +118,14 @@ def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mappin
     doubt = (
         _doubt(sequence, scale_ratios, [best, *others])
         if others
-        else _unfollowed(sequence, best, scale_ratios[0], given)
+        else _unfollowed(sequence, best, scale_ratios[0], given) or _counted(best, scale_ratios[0], given)
     )
     return replace(next(_hypotheses(given)) if doubt else best, doubt=doubt, scale_ratios=scale_ratios)
 
 
 def _unfollowed(sequence: Sequence, units: Units, seen: ScaleRatio, given: Mapping[str, float]) -> str:
     """Doubt about rates that are far larger than those seen and no noise of a gyroscope."""
-    rate = sequence.angular_velocity * units.angular
+    rate = _without_jumps(sequence.angular_velocity) * units.angular
     scatter = float(np.sqrt(np.mean((rate - np.median(rate, axis=0)) ** 2)))
     excess = units.time * units.angular / seen.ratio if seen.ratio > 0.0 else 0.0
     if seen.known or "angular" in given or scatter < LARGE_RATE or excess < OVERSHOOT:
@@ -135,15 +137,33 @@ def _unfollowed(sequence: Sequence, units: Units, seen: ScaleRatio, given: Mappi
     )
 
 
+def _counted(units: Units, seen: ScaleRatio, given: Mapping[str, float]) -> str:
+    """Doubt about rates whose factor is known too well to be that of a unit."""
+    if "angular" in given:
+        return ""
+    turns = seen._replace(ratio=seen.ratio / units.time)
+    doubt = doubt_of_rate_unit(turns, units.angular, _named("angular", units.angular))
+    return doubt and f"{doubt}; write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
+
+
 def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleRatio, ScaleRatio]:
     unknown = ScaleRatio(np.nan, known=False)
     if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
         return unknown, unknown
-    seen, recorded = seen_by_cameras.twist(sequence.dt), zero_order_hold(sequence)
+    seen, recorded = seen_by_cameras.twist(sequence.dt), _without_jumps(zero_order_hold(sequence))
     scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
     angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
     linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
     return angular, linear._replace(ratio=linear.ratio * scale)
+
+
+def _without_jumps(recorded: FloatArray) -> FloatArray:
+    """Velocities (n, c), those of single samples far from all around them replaced: a few would hide the unit."""
+    parts = []
+    for part in np.split(recorded, recorded.shape[1] // 3, axis=1):
+        usual, far = among_neighbors(part)
+        parts.append(np.where((far > FAR_BLIND)[:, None], usual, part))
+    return np.hstack(parts)
 
 
 def _explicable(angular: ScaleRatio, linear: ScaleRatio) -> tuple[float | None, float | None]:

@@ -28,15 +28,18 @@ def diagnose(
     processes: int = 1,
     units: Mapping[str, float] | None = None,
     inverted: bool | None = None,
+    *,
+    replace_outliers: bool = True,
 ) -> Diagnosis:
     """Estimates units, axes, bias, scale, delay, misalignment and noise from the recording alone, without its truth.
 
     `processes` is the number of processes for the windows, forks of this one. `units` are known factors, by the names
-    of `Units`; `inverted`, where known, whether imu_T_cam was recorded as its inverse.
+    of `Units`; `inverted`, where known, whether imu_T_cam was recorded as its inverse. With `replace_outliers`,
+    velocity samples that contradict the cameras and their neighbors are interpolated.
     """
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            return _diagnose(sequence, processes, units, inverted)
+            return _diagnose(sequence, processes, units, inverted, replace_outliers)
     except (np.linalg.LinAlgError, ValueError, FloatingPointError) as error:
         return Diagnosis(sequence, f"its computation failed ({type(error).__name__}: {error})", recorded=sequence)
 
@@ -52,7 +55,11 @@ def _seen(sequence: Sequence) -> Odometry | None:
 
 
 def _diagnose(
-    recorded: Sequence, processes: int, given: Mapping[str, float] | None, inverted: bool | None
+    recorded: Sequence,
+    processes: int,
+    given: Mapping[str, float] | None,
+    inverted: bool | None,
+    replace_outliers: bool,
 ) -> Diagnosis:
     usual = usual_baseline(recorded)
     seen_by_cameras = _seen(usual)
@@ -65,10 +72,10 @@ def _diagnose(
         return Diagnosis(sequence, reason, units=units, recorded=recorded)
     if sequence.camera != usual.camera or not np.array_equal(sequence.imu_T_cam, usual.imu_T_cam):
         seen_by_cameras = odometry(sequence)
-    found = calibrate_velocities(sequence, seen_by_cameras, processes)
+    found = calibrate_velocities(sequence, seen_by_cameras, processes, replace_outliers=replace_outliers)
     if inverted or (inverted is None and _may_be_inverse(found)):
         turned = replace(sequence, imu_T_cam=se3.inverse(sequence.imu_T_cam))
-        inverse = calibrate_velocities(turned, odometry(turned), processes)
+        inverse = calibrate_velocities(turned, odometry(turned), processes, replace_outliers=replace_outliers)
         if inverted or _leads(inverse, found):
             found = replace(inverse, inversion=(found.angular.before, inverse.angular.after))
     return replace(found, units=units, recorded=recorded)

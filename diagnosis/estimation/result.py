@@ -18,6 +18,7 @@ from ..conventions.units import Units
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
 from ..windows.residuals import OFFSET, TURN
+from .velocity_outliers import VelocityOutliers
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -41,7 +42,10 @@ class Diagnosis(Displayed):
     units: Units = field(default_factory=Units)
     """factors by which the recorded values were multiplied"""
     recorded: Sequence | None = None
-    """the sequence as recorded; `sequence` is in SI units and has the extrinsic in the right direction"""
+    """the sequence as recorded; `sequence` is in SI units, has the extrinsic in the right direction and no outliers
+    among its velocities"""
+    outliers: VelocityOutliers | None = None
+    """velocity samples that are replaced in `sequence`; None without any"""
     inversion: tuple[float, float] | None = None
     """rad/s, median error of the rates before and after inverting imu_T_cam; None where it is not inverted"""
 

@@ -7,21 +7,20 @@ import numpy as np
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift, zero_order_hold
-from fgbaseline.data.plural import percent
+from fgbaseline.data.plural import noun, percent, plural
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
 from ..conventions.units import LABELS, NAMES, unit_findings
 from ..estimation.result import Diagnosis
-from ..repairs.significance import SIGNIFICANT, significant_bias, significant_misalignment, significant_offset
-from .phrases import listed, vector
+from ..noise.calibration_fit import SIGNIFICANT
+from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
+from .phrases import listed, spans, vector
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
 
 MIN_SCALE = 0.02
 """share by which velocities and stereo must disagree"""
-SURE_SHIFT = 2.0
-"""standard errors from both usual shifts; `time_delay.INFLATION` is in the standard error already"""
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
 """intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
@@ -35,6 +34,7 @@ def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> 
         findings += unit_findings(diagnosis.units, diagnosis.recorded)
     if diagnosis.inversion is not None:
         findings.append(_extrinsic_inverse(*diagnosis.inversion))
+    findings += _outliers(diagnosis)
     if diagnosis.fit is not None:
         parts: tuple[Callable[[Diagnosis], Finding | None], ...] = (
             _angular_axes,
@@ -47,6 +47,26 @@ def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> 
         )
         findings += [finding for part in parts if (finding := part(diagnosis)) is not None]
     return (*findings, *track_findings(diagnosis.sequence, diagnosis.repeated, tracks or track_statistics(diagnosis)))
+
+
+def _outliers(diagnosis: Diagnosis) -> list[Finding]:
+    """A finding for each velocity with replaced samples."""
+    outliers, found = diagnosis.outliers, []
+    if outliers is None:
+        return []
+    kinds = (("linear", outliers.linear, "m/s"), ("angular", outliers.angular, "rad/s"))
+    for (name, mask, unit), size in zip(kinds, outliers.size, strict=True):
+        frames = np.flatnonzero(mask)
+        if len(frames) == 0:
+            continue
+        count = plural(len(frames), f"{name} velocity", f"{name} velocities")
+        text = (
+            f"{count} of {len(mask):,} contradict{'s' if len(frames) == 1 else ''} the cameras and the samples around "
+            f"({noun(len(frames), 'frame')} {spans(frames)}, by up to {size:.3g} {unit}): replaced by an interpolation "
+            "of the samples around."
+        )
+        found.append(Finding(f"{name}_velocity_outliers", text, len(frames), 0, "samples", "counted"))
+    return found
 
 
 def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -146,8 +166,7 @@ def _gyro_bias(diagnosis: Diagnosis) -> Finding | None:
 def _time_offset(diagnosis: Diagnosis) -> Finding | None:
     timing, dt = diagnosis.timing, float(np.median(diagnosis.sequence.dt))
     shift = timing.shift / dt
-    far = all(abs(shift - usual) > SURE_SHIFT * timing.deviation / dt for usual in USUAL)
-    if not timing.identifiable or diagnosis.shift in USUAL or not far:
+    if not timing.identifiable or diagnosis.shift in USUAL:
         return None
     when = f"{abs(timing.shift):.3f} s {'before' if timing.shift < 0 else 'after'} their stamps"
     text = f"Velocities describe the interval that begins {when} ({shift:+.2f} intervals)"

@@ -15,15 +15,16 @@ from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
 from ..conventions.units import usual_baseline
 from ..inertial_start.start import Start
-from ..odometry.stereo_odometry import odometry
+from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, choose_features, exclusions
-from .baseline import baseline_findings, baseline_unit
+from .baseline import BaselineUnit, baseline_findings, baseline_unit
 from .findings import inertial_findings, inertial_repairs
 from .pipeline import found_start
 from .result import InertialDiagnosis
+from .sensor_axes import in_imu_axes, sensor_axes
 from .truth_tie import path_from, tied_truth
-from .units import imu_unit_findings, imu_units, require_si
+from .units import imu_unit_findings, imu_units, require_si, rescaled_samples
 
 
 def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
@@ -66,7 +67,10 @@ def as_recorded_inertial(
     with threadpool_limits(limits=1, user_api="blas"):
         seen = odometry(usual) if len(sequence.observations) else None
     units = imu_units(sequence, seen)
-    require_si(sequence, (*baseline_findings(baseline_unit(sequence, seen), sequence), *imu_unit_findings(units)))
+    baseline = _baseline_unit(rescaled_samples(sequence, units), seen)
+    require_si(sequence, (*baseline_findings(baseline, sequence), *imu_unit_findings(units)))
+    if baseline.doubt:
+        raise InputError(f"{_source(sequence)}: {baseline.doubt}")
     try:
         start, path = found_start(sequence, pixel, seen if usual is sequence else None)
     except ValueError as error:
@@ -77,6 +81,11 @@ def as_recorded_inertial(
         *_imu_remarks(sequence),
     )
     return _with_features(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
+
+
+def _baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
+    """The unit of the baseline, with the samples (in SI units) turned to the axes that the cameras show."""
+    return baseline_unit(sequence if seen is None else in_imu_axes(sequence, sensor_axes(sequence, seen)), seen)
 
 
 def _source(sequence: Sequence) -> str:

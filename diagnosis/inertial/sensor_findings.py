@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.data.finding import Finding
 
 from ..findings.phrases import vector
-from ..repairs.significance import SIGNIFICANT
+from ..noise.calibration_fit import SIGNIFICANT
 from .sensors import SensorChecks
 
 MIN_BIAS, MIN_ANGLE, MIN_OFFSET, MIN_SCALE = 0.005, np.deg2rad(0.5), 0.003, 0.02

@@ -9,14 +9,18 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..conventions.scale_ratio import scale_ratio
+from ..conventions.rate_units import DEGREE, doubt_of_rate_unit
+from ..conventions.scale_ratio import ScaleRatio, scale_ratio
 from ..odometry.stereo_odometry import Odometry
 
-DEGREE = float(np.pi / 180.0)
 RATES = {DEGREE: "°/s", 1e-3: "mrad/s", 1e-3 * DEGREE: "m°/s"}
 FORCES = {9.80665: "g", 9.80665e-3: "mg", 1e-3: "mm/s^2"}
 RATE_TOLERANCE, FORCE_TOLERANCE = 0.45, 0.18
 """of the decadic logarithm of a ratio: factors of 2.8 and 1.5"""
+LEAST_GRAVITY = 0.93
+"""share of gravity: the median magnitude is no less, except by the error of an accelerometer"""
+COUNTS_PER_G = (16384, 8192, 4096, 2048)
+"""of the ranges of usual accelerometers"""
 MIN_KNOWN = 20
 """intervals whose rotation the cameras show"""
 MAX_RATE = 60.0
@@ -59,22 +63,24 @@ def imu_units(sequence: Sequence, seen: Odometry | None) -> ImuUnits:
     assert imu is not None
     magnitude = float(np.median(np.linalg.norm(imu.specific_force, axis=1)))
     force = _unit(magnitude / imu.gravity, (1.0, *FORCES), FORCE_TOLERANCE)
-    if force is None:
+    if force is None or (force != 1.0 and magnitude * force < LEAST_GRAVITY * imu.gravity):
+        counts = next((n for n in COUNTS_PER_G if LEAST_GRAVITY <= magnitude / n < 10.0**FORCE_TOLERANCE), None)
+        raw = "" if counts is None else f" (raw counts, {counts} per g?)"
         raise InputError(
-            f"imu_linear_acceleration: its median magnitude is {magnitude:.3g}, which is gravity ({imu.gravity:g} "
-            "m/s^2) in none of m/s^2, g, mg and mm/s^2; write the specific force as measured, +9.8 upward at rest"
+            f"imu_linear_acceleration: its median magnitude is {magnitude:.4g}{raw}, which is gravity "
+            f"({imu.gravity:g} m/s^2) in none of m/s^2, g, mg and mm/s^2; write the specific force as measured, +9.8 "
+            "upward at rest"
         )
-    ratio = np.nan
+    found = ScaleRatio(np.nan, known=False)
     if seen is not None and int(seen.known.sum()) >= MIN_KNOWN:
         found = scale_ratio(seen.twist(sequence.dt)[:, 3:], mean_rates(sequence), seen.known, centered=True)
-        ratio = found.ratio if found.known else np.nan
+    ratio = found.ratio if found.known else np.nan
     rate = None if np.isnan(ratio) else _unit(1.0 / ratio, (1.0, *RATES), RATE_TOLERANCE)
+    if found.known:
+        doubt = doubt_of_rate_unit(found, rate or np.nan, RATES.get(rate or 1.0, ""))
+        if doubt:
+            raise InputError(f"imu_angular_velocity: {doubt}; write rad/s")
     median = float(np.median(np.linalg.norm(imu.angular_velocity, axis=1)))
-    if rate is None and not np.isnan(ratio):
-        raise InputError(
-            f"imu_angular_velocity: the cameras see rotations {ratio:.3g} times as large as those of the samples, "
-            f"which is none of the units rad/s, {', '.join(RATES.values())}; write rad/s"
-        )
     if rate is None and median > MAX_RATE:
         rate = next((unit for unit in RATES if median * unit <= MAX_RATE), None)
     return ImuUnits(1.0 if rate is None else rate, force, ratio, magnitude)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
@@ -21,6 +22,10 @@ FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
 """px, baselines/s and rad/s: no noise is less"""
 CHI_SQUARE_MEDIAN = 0.4549
 """of one degree of freedom"""
+EFFICIENCY = 0.37
+"""of a variance from a median, in degrees of freedom of one from all residuals"""
+SIGNIFICANT = 4.0
+"""standard errors, from which on an estimate is significant"""
 MIN_REDUNDANCY = 0.05
 """of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
 its residual is no evidence of noise"""
@@ -35,7 +40,11 @@ class CalibrationFit:
     shared: FloatArray
     """(8,) see `residuals.SHARED`"""
     deviation: FloatArray
-    """(8,) standard errors, from the spread between windows where that is larger than the formal ones"""
+    """(8,) standard errors, from the spread between windows where that is larger than the formal ones
+
+    They are widened for the few residuals from which short recordings estimate the noise (Student's t): SIGNIFICANT of
+    them are as improbable as in a long recording.
+    """
     windows: int
     inflation: Inflation
     white: NoiseSettings
@@ -45,13 +54,20 @@ class CalibrationFit:
     unit normal distribution where the noise is as found; NaN where the cameras determine nothing"""
 
 
-def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, processes: int = 1) -> CalibrationFit | None:
+def fit_windows(
+    sequence: Sequence,
+    odometry: Odometry,
+    twist: FloatArray,
+    processes: int = 1,
+    deviation: FloatArray | None = None,
+) -> CalibrationFit | None:
     """The fit of windows spread over the recording; None where no window has enough observations.
 
-    `twist` (T-1, 6) is the recorded velocity of each interval in the axes of imu_T_cam. The sigmas are the variance
+    `twist` (T-1, 6) is the recorded velocity of each interval in the axes of imu_T_cam, `deviation` (T-1, 6) that of
+    interpolated ones. The sigmas are the variance
     components at which squared residuals match their degrees of freedom, as medians over axes and windows.
     """
-    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames))
+    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
     if not windows:
         return None
     baseline = sequence.camera.baseline
@@ -63,8 +79,8 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, proce
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas, baseline)
-    shared_mean, deviation = _agreed(fits)
-    unbroken = windows_of(sequence, odometry, twist, unbroken_spans(odometry))
+    shared_mean, error = _agreed(fits)
+    unbroken = windows_of(sequence, odometry, twist, unbroken_spans(odometry), deviation)
     inflation = inflation_of(sequence, unbroken, shared_mean, sigmas, processes)
     believed = NoiseSettings(
         sigmas.pixel * inflation.pixel,
@@ -72,17 +88,30 @@ def fit_windows(sequence: Sequence, odometry: Odometry, twist: FloatArray, proce
         sigmas.angular_velocity * inflation.velocity,
     )
     residual, redundancy = _redundant_residuals(fits)
+    if sigmas.angular_velocity > FLOOR.angular_velocity:
+        error = error * _widening(np.where(np.isnan(residual), 0.0, redundancy))
     motion = residual / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3) / np.sqrt(redundancy)
-    return CalibrationFit(believed, shared_mean, deviation, len(fits), inflation, sigmas, motion)
+    return CalibrationFit(believed, shared_mean, error, len(fits), inflation, sigmas, motion)
+
+
+def _widening(redundancy: FloatArray) -> float:
+    """Factor of standard errors by the redundancies (n, 6) of the velocities from which the noise is estimated."""
+    freedom = EFFICIENCY * min(float(redundancy[:, :3].sum()), float(redundancy[:, 3:].sum()))
+    return float(-stdtrit(max(freedom, 1.0), float(ndtr(-SIGNIFICANT))) / SIGNIFICANT)
 
 
 def half_cost(
-    sequence: Sequence, odometry: Odometry, twist: FloatArray, sigmas: NoiseSettings, processes: int = 1
+    sequence: Sequence,
+    odometry: Odometry,
+    twist: FloatArray,
+    sigmas: NoiseSettings,
+    processes: int = 1,
+    deviation: FloatArray | None = None,
 ) -> float:
     """Half the sum of squares, in `sigmas`, that remains when windows are fitted to these velocities (T-1, 6)."""
     whiten = np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
     total = 0.0
-    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames))
+    windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
     start = [np.zeros(SHARED)] * len(windows)
     for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))

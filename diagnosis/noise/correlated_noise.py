@@ -6,7 +6,7 @@ Windows of the recording give the excess of the difference between both over whi
 halves of the tracks attributes it to the cameras.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def _half(window: Window, parity: int) -> Window:
     """Half of the window's landmarks, even or odd."""
     data, poses, points = window
     chosen = data.row % 2 == parity
-    half = WindowData(data.frame[chosen], data.row[chosen] // 2, data.pixel[chosen], data.twist, data.dt)
+    half = replace(data, frame=data.frame[chosen], row=data.row[chosen] // 2, pixel=data.pixel[chosen])
     return half, poses, points[parity::2]
 
 
@@ -95,10 +95,8 @@ def _driven(data: WindowData, shared: FloatArray, sigmas: NoiseSettings) -> tupl
     back = so3.exp_so3(shared[TURN])
     velocity, rate = data.twist[:, :3] / (1.0 + shared[SCALE]), data.twist[:, 3:] - shared[:3]
     path = se3.compose(se3.exp(np.concatenate([velocity @ back, rate @ back], axis=1) * data.dt[:, None]))
-    J = se3.adjoint(se3.inverse(path[-1]) @ path[1:]) * (
-        np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
-    )
-    J = J * data.dt[:, None, None]
+    sigma = np.hypot(np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3), data.deviation)
+    J = se3.adjoint(se3.inverse(path[-1]) @ path[1:]) * sigma[:, None] * data.dt[:, None, None]
     return path[-1], np.einsum("kij,klj->il", J, J)
 
 

@@ -30,7 +30,7 @@ def with_overrides(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     could be estimated, the rest is the default `NoiseSettings` and no fault. Raises InputError for a shift beyond the
     recording.
     """
-    apart = ("sigma", "mask", "units", "extrinsic_inverted")
+    apart = ("sigma", "mask", "units", "extrinsic_inverted", "replace_outliers")
     given = frozenset(name for name, value in repairs if name not in apart and value is not None)
     if not given and repairs.sigma == type(repairs.sigma)():
         return diagnosis
@@ -40,7 +40,15 @@ def with_overrides(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
     changed = (angular.name, linear.name) != (diagnosis.angular.name, diagnosis.linear.name)
     changed |= shift is not None and abs(shift - diagnosis.shift) > SAME
     if changed and diagnosis.fit is not None and diagnosis.odometry is not None:
-        found = calibrate_with_axes(diagnosis.sequence, diagnosis.odometry, angular, linear, diagnosis.repeated, shift)
+        found = calibrate_with_axes(
+            diagnosis.sequence,
+            diagnosis.odometry,
+            angular,
+            linear,
+            diagnosis.repeated,
+            shift,
+            outliers=diagnosis.outliers,
+        )
         found = replace(found, units=diagnosis.units, recorded=diagnosis.recorded, inversion=diagnosis.inversion)
     else:
         shift = diagnosis.shift if shift is None else shift
@@ -49,11 +57,14 @@ def with_overrides(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
 
 
 def with_given_units(diagnosis: Diagnosis, repairs: Repairs) -> Diagnosis:
-    """The diagnosis with the units and the direction of the extrinsic of `repairs`, computed anew where they differ."""
-    units, inverted = repairs.units.given(), repairs.extrinsic_inverted
+    """The diagnosis with units, direction of the extrinsic and treatment of outliers of `repairs`, computed anew where
+    they differ."""
+    units, inverted, replaced = repairs.units.given(), repairs.extrinsic_inverted, repairs.replace_outliers is not False
     same = not diagnosis.units.doubt and all(getattr(diagnosis.units, name) == units[name] for name in units)
-    if not (same and inverted in (None, diagnosis.inverted)):
-        diagnosis = diagnose(diagnosis.recorded or diagnosis.sequence, units=units, inverted=inverted)
+    same &= inverted in (None, diagnosis.inverted) and (replaced or diagnosis.outliers is None)
+    if not same:
+        recorded = diagnosis.recorded or diagnosis.sequence
+        diagnosis = diagnose(recorded, units=units, inverted=inverted, replace_outliers=replaced)
     return replace(diagnosis, units=replace(diagnosis.units, given=frozenset(units)))
 
 

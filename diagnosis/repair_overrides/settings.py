@@ -137,6 +137,8 @@ class Repairs(_Overrides):
     """rotation vector by which imu_T_cam is turned against the velocities, in its own axes; undone"""
     extrinsic_inverted: bool | None = None
     """whether imu_T_cam was recorded as its inverse; inverted before anything else is found"""
+    replace_outliers: bool | None = None
+    """false: velocity samples that contradict the cameras and their neighbors are used as recorded"""
     disparity_offset_px: Annotated[float, PlainValidator(_between(-100.0, 100.0, 0.0))] | None = None
     """px by which every recorded uR is too large, and every disparity too small; taken off"""
     units: UnitOverrides = UnitOverrides()

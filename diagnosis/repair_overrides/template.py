@@ -27,6 +27,7 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"# Nothing could be found out: {' '.join(diagnosis.cannot_tell.split())}."
     yield ""
     yield f"extrinsic_inverted = {str(diagnosis.inverted).lower()}  # of imu_T_cam, before anything else"
+    yield "replace_outliers = true  # velocity samples that contradict cameras and neighbors; false: as recorded"
     yield f'angular_axes = "{diagnosis.angular.name}"  # {_seen(diagnosis.angular)}'
     yield f'linear_axes = "{diagnosis.linear.name}"  # {_seen(diagnosis.linear)}'
     bias, deviation = significant_bias(diagnosis), diagnosis.gyro_bias_deviation

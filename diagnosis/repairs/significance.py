@@ -5,9 +5,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from ..estimation.result import Diagnosis
+from ..noise.calibration_fit import SIGNIFICANT
 
-SIGNIFICANT = 4.0
-"""standard errors, from which on an estimate is significant"""
 MIN_BIAS = 0.002
 """rad/s"""
 MIN_MISALIGNMENT = np.deg2rad(0.25)

@@ -35,7 +35,7 @@ class WindowFit:
     shared_information: FloatArray
     """(8, 8) information about `shared`, marginal over poses and landmarks, without the prior"""
     motion_residual: FloatArray
-    """(W-1, 6) velocity residuals, m/s and rad/s"""
+    """(W-1, 6) velocity residuals, m/s and rad/s; those of interpolated velocities are scaled down to the noise"""
     motion_redundancy: FloatArray
     """(W-1, 6) share of each residual's variance that the fit did not absorb"""
     pixel_squared: FloatArray

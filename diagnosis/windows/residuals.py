@@ -36,6 +36,8 @@ class WindowData:
     """(W-1, 6) recorded [v, w] of each interval, in the axes of imu_T_cam"""
     dt: FloatArray
     """(W-1,) s"""
+    deviation: FloatArray
+    """(W-1, 6) standard deviation of what is not recorded but interpolated, besides the noise; zero elsewhere"""
 
 
 Window = tuple[WindowData, FloatArray, FloatArray]
@@ -53,6 +55,8 @@ class Joined:
     pixel: FloatArray
     """(n, 3)"""
     twist: FloatArray
+    """(k, 6)"""
+    deviation: FloatArray
     """(k, 6)"""
     dt: FloatArray
     """(k,)"""
@@ -88,6 +92,7 @@ def joined(windows: Sequence[Window]) -> Joined:
         row=np.concatenate([d.row + at.start for d, at in zip(data, points, strict=True)]),
         pixel=np.concatenate([d.pixel for d in data]),
         twist=np.concatenate([d.twist for d in data]),
+        deviation=np.concatenate([d.deviation for d in data]),
         dt=np.concatenate([d.dt for d in data]),
         interval=np.concatenate([np.arange(at.start, at.stop - 1) for at in frames]),
         observations=observations,
@@ -161,7 +166,7 @@ def pixel_terms(
 
 def motion_terms(data: Joined, poses: FloatArray, sigmas: NoiseSettings, shared: FloatArray) -> MotionTerms:
     """Velocity terms at poses (F, 4, 4) and each window's `shared` parameters (w, 8)."""
-    whiten = 1.0 / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
+    whiten = 1.0 / np.hypot(np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3), data.deviation)
     shared = np.repeat(shared, [f.stop - f.start - 1 for f in data.frames], axis=0)
     back = se3.inverse(poses[data.interval])
     relative = back @ poses[data.interval + 1]
@@ -182,4 +187,4 @@ def motion_terms(data: Joined, poses: FloatArray, sigmas: NoiseSettings, shared:
     J_shared[:, :3, TURN] = -along
     J_shared[:, 3:, TURN] = -turning
     residual = (data.twist - predicted) * whiten
-    return MotionTerms(residual, *(J * whiten[:, None] for J in (J_before, J_after, J_shared)))
+    return MotionTerms(residual, *(J * whiten[:, :, None] for J in (J_before, J_after, J_shared)))

@@ -1,5 +1,7 @@
 """Windows of a recording for bundle adjustment: which frames, and their tracks, initial poses and points."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from fgbaseline.data.sequence import Sequence
@@ -26,10 +28,17 @@ Span = tuple[int, int]
 
 
 def spread_spans(n_frames: int) -> list[Span]:
-    """Windows spread evenly over the recording; neighbors share a frame, so that no interval is left out."""
-    size = min(FRAMES, n_frames)
-    count = max(1, min(MAX_WINDOWS, -(-(n_frames - 1) // (size - 1))))
-    return [(int(start), size) for start in np.unique(np.linspace(0, n_frames - size, count).astype(int))]
+    """Windows spread evenly over the recording, of at most FRAMES frames.
+
+    Neighbors share a frame where all intervals fit into MAX_WINDOWS, and never more: an interval in two windows would
+    count twice.
+    """
+    intervals, longest = n_frames - 1, FRAMES - 1
+    count = max(1, min(MAX_WINDOWS, -(-intervals // longest)))
+    if count * longest >= intervals:
+        edges = np.round(np.linspace(0, intervals, count + 1)).astype(int)
+        return [(int(a), int(b - a) + 1) for a, b in pairwise(edges)]
+    return [(int(start), FRAMES) for start in np.linspace(0, n_frames - FRAMES, count).astype(int)]
 
 
 def unbroken_spans(odometry: Odometry) -> list[Span]:
@@ -43,8 +52,14 @@ def unbroken_spans(odometry: Odometry) -> list[Span]:
     return spans[:MAX_UNBROKEN]
 
 
-def windows_of(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span]) -> list[Window]:
-    """Data, initial poses and initial points of each window that has enough observations."""
+def windows_of(
+    sequence: Sequence, odometry: Odometry, twist: FloatArray, spans: list[Span], deviation: FloatArray | None = None
+) -> list[Window]:
+    """Data, initial poses and initial points of each window that has enough observations.
+
+    `twist` (T-1, 6) is the velocity of each interval, and `deviation` that of interpolated ones.
+    """
+    deviation = np.zeros_like(twist) if deviation is None else deviation
     o, dt = sequence.observations, sequence.dt
     chain = track_chains(odometry.links.before, odometry.links.after, odometry.inlier, o)
     known = odometry.known[:, None, None]
@@ -63,7 +78,8 @@ def windows_of(sequence: Sequence, odometry: Odometry, twist: FloatArray, spans:
         poses = se3.compose(step[intervals])
         row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
-        data = WindowData(frame, row, measured_rows(o.pixel[chosen]), twist[intervals], dt[intervals])
+        rows_of_pixels = measured_rows(o.pixel[chosen])
+        data = WindowData(frame, row, rows_of_pixels, twist[intervals], dt[intervals], deviation[intervals])
         parts.append((data, poses))
         sights.append(chosen)
         views.append((poses @ sequence.imu_T_cam)[frame])

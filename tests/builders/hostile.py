@@ -219,8 +219,7 @@ RECORDINGS = (
     Hostile(
         "one velocity sample of 500 m/s",
         velocity_jump,
-        overconfident=ESTIMATORS,
-        note="the diagnosis takes it for noise and a rotated camera; the reference is untrusted",
+        note="the diagnosis finds the sample and interpolates its neighbors",
     ),
     Hostile("one landmark only", one_landmark, overconfident=()),
     Hostile(

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from click.testing import CliRunner
 from fgbaseline.data import Sequence, read
 from fgbaseline.data.formats import write_npz
 from fgbaseline.data.tracking import ImageOptions, track
+from fgbaseline.data.tracking.pipeline import opened_images, track_images
+from fgbaseline.data.tracking.settings import TrackerSettings
 from fgbaseline.data.tracking.sources import ImageRecording, open_recording
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.cli.main import group
@@ -206,6 +209,18 @@ def test_damaged_and_missing_images_are_counted_and_named(euroc: Path, room: Roo
     truth = found.sequence().truth
     assert truth is not None
     np.testing.assert_allclose(truth.world_T_imu, room.world_T_imu[kept], atol=1e-12)
+
+
+def test_up_is_that_of_the_first_frame_that_can_be_read(euroc: Path, room: Room) -> None:
+    for k, left in enumerate(sorted((euroc / "mav0" / "cam0" / "data").iterdir())[:3]):
+        left.write_bytes(b"") if k != 1 else left.unlink()
+    up = np.array([0.6, 0.0, 0.8])
+    found = track_images(replace(opened_images(euroc, ImageOptions()), up_imu=up), TrackerSettings(), None, None)
+    first = int(np.argmin(np.abs(np.array(room.stamps) / 1e9 - found.recording.t[0])))
+    assert first == 3
+    turn = room.world_T_imu[first, :3, :3].T @ room.world_T_imu[0, :3, :3]
+    assert np.linalg.norm(turn @ up - up) > 0.01
+    np.testing.assert_allclose(found.sequence().up_imu, turn @ up, atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from fgbaseline import data
 from fgbaseline.data.formats.imu_csv import read_imu_csv
 from fgbaseline.data.formats.imu_yaml import read_imu_calibration
+from fgbaseline.data.formats.velocity_csv import read_velocity_csv
 from fgbaseline.data.imu import ASSUMED_NOISE, ImuNoise
 from fgbaseline.data.problem.imu_gaps import interval_densities, sample_gaps
 from fgbaseline.data.problem.inertial import imu_intervals
@@ -24,6 +25,7 @@ HEADER = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],"
     "a_RS_S_z [m s^-2]"
 )
+PLAIN = "t,wx,wy,wz,ax,ay,az"
 YAML = """%YAML:1.0
 sensor_type: imu
 T_BS:
@@ -71,6 +73,29 @@ def test_an_export_of_ros_is_read_by_the_stamp_of_its_header(tmp_path: Path) -> 
     samples = read_imu_csv(written(tmp_path / "ros.csv", lines, header), NOISE, 9.81).samples
     expected = read_imu_csv(written(tmp_path / "euroc.csv", rows()), NOISE, 9.81).samples
     assert_equal(expected, samples, "imu")
+
+
+@pytest.mark.parametrize("interval", [10.0**exponent for exponent in range(-9, 10)])
+def test_stamps_of_any_interval_are_read_or_refused_in_one_sentence(interval: float, tmp_path: Path) -> None:
+    t = 7.0 + interval * np.arange(40)
+    stamped = [[f"{s:.17g}", *line[1:]] for s, line in zip(t, rows(), strict=True)]
+    samples = written(tmp_path / "imu.csv", stamped, PLAIN)
+    velocities = tmp_path / "velocities.csv"
+    velocities.write_text("\n".join(f"{s:.17g} 1 0 0 0 0 0.1" for s in t))
+
+    def read_samples() -> None:
+        assert 5e-5 <= float(np.median(np.diff(read_imu_csv(samples, NOISE, 9.81).samples.t))) <= 1e4
+
+    def read_velocities() -> None:
+        factor = next(f for f in (1.0, 1e-3, 1e-6, 1e-9) if interval * f < 20.0)
+        read_velocity_csv(velocities, t * factor)
+
+    for read in (read_samples, read_velocities):
+        if interval < 5e-5:
+            with pytest.raises(InputError, match=r"csv: its time stamps are 1e-0\d apart, .* write seconds$"):
+                read()
+        else:
+            read()
 
 
 def test_units_of_a_header_are_converted(tmp_path: Path) -> None:

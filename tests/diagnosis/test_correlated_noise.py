@@ -128,6 +128,20 @@ def test_an_integer_delay_is_the_minimum_of_the_fit_or_undetermined() -> None:
     assert parabola(100.0, -2.4) is None
 
 
+def test_a_cost_that_is_no_parabola_determines_whole_intervals_alone() -> None:
+    """As where motion changes too much between frames: away from the true shift, any cost is as bad as any other."""
+    dt = 0.1
+    for floor, before, after in ((100.0, 4e5, 1e5), (100.0, 5e3, 4e5)):
+
+        def cost(shift: float, floor: float = floor, before: float = before, after: float = after) -> float:
+            return floor if shift == 0.0 else before if shift < 0.0 else after
+
+        found = integer_delay(cost, dt)
+        assert found is not None
+        assert found.shift == 0.0
+        assert found.deviation > 0.2 * dt
+
+
 def test_braking_determines_the_interval_of_a_velocity() -> None:
     still = town(2)
     n, t = still.n_frames, still.t

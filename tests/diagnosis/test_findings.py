@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Excluded, Observations, Sequence, Truth
+from fgbaseline.data.finding import UNITS
 from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import AXIS_CONVENTIONS, Simulation, simulate
 from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of, not_identifiable, repair, to_json
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
+from fgbaseline.diagnosis.windows.selection import spread_spans
 from fgbaseline.geometry import FloatArray
 
 
@@ -28,6 +30,40 @@ def codes(diagnosis: Diagnosis) -> list[str]:
 def test_nothing_is_found_in_clean_recordings(path: str, seed: int) -> None:
     found = findings_of(diagnosed(path=path, duration=20.0, seed=seed))
     assert not found, found
+
+
+CHANGES = UNITS | {
+    "angular_axes",
+    "linear_axes",
+    "gyro_bias",
+    "time_offset",
+    "extrinsic",
+    "disparity_offset",
+    "linear_velocity_outliers",
+    "angular_velocity_outliers",
+}
+"""codes of findings that change a recording"""
+SHORT = {
+    (path, seed): {"duration": (3.2, 4.0, 5.0)[seed % 3], "features_per_frame": (15.0, 70.0)[seed % 2]}
+    for path in ("town", "loop", "highway", "handheld", "drone")
+    for seed in (0, 3, 5, 6, 10, 14)
+} | {("handheld", 32): {"duration": 8.0}, ("drone", 94): {"duration": 3.2}, ("loop", 11): {"duration": 5.0}}
+
+
+@pytest.mark.parametrize(("path", "seed"), SHORT)
+def test_no_finding_changes_a_clean_short_recording(path: str, seed: int) -> None:
+    d = diagnosed(path=path, seed=seed, wrong_share=0.0, **SHORT[path, seed])
+    assert not CHANGES & set(codes(d)), findings_of(d)
+    assert d.shift == 0.0
+
+
+def test_windows_share_no_interval_and_leave_none_out() -> None:
+    for n in (2, 3, 25, 26, 32, 49, 50, 120, 1153):
+        intervals = [k for first, size in spread_spans(n) for k in range(first, first + size - 1)]
+        assert intervals == list(range(n - 1))
+        assert all(size <= 25 for _, size in spread_spans(n))
+    long = [k for first, size in spread_spans(5000) for k in range(first, first + size - 1)]
+    assert len(long) == len(set(long)) == 48 * 24
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -1,6 +1,7 @@
 """The calibrated problem of raw inertial data: start, noise, mask, truth in its world; units, and what is refused."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from fgbaseline import data, diagnosis
 from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.imu import ImuSamples
 from fgbaseline.data.problem import Problem
+from fgbaseline.diagnosis.conventions.rate_units import DEGREE
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
 from ..builders.commands import fgbaseline
@@ -172,16 +174,42 @@ def test_a_baseline_that_neither_unit_explains_is_refused(recording: data.Sequen
     wrong = replace(recording, camera=replace(recording.camera, baseline=100.0 * recording.camera.baseline))
     with pytest.raises(InputError, match=r"the stereo baseline, 30 m, is in doubt.*0\.03 m; write b in m"):
         diagnosis.calibrated(wrong)
+    with pytest.raises(InputError, match=r"the stereo baseline, 30 m, is in doubt.*0\.03 m; write b in m"):
+        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
 
 
-@pytest.mark.parametrize(("factor", "said"), [(1e3 * 180.0 / np.pi, "in m°/s"), (131.0 * 180.0 / np.pi, "")])
-def test_other_rates_than_those_of_a_unit_are_refused(factor: float, said: str, recording: data.Sequence) -> None:
+def test_rates_in_thousandths_of_degrees_are_found(recording: data.Sequence) -> None:
     assert recording.imu is not None
-    wrong = replace(recording, imu=in_units(recording.imu, 1.0 / factor, 1.0))
-    if said:
-        assert said in diagnosis.calibrated(wrong).findings[0].sentence
-        return
-    with pytest.raises(InputError, match=r"imu_angular_velocity: the cameras see rotations .* none of the units"):
+    found = diagnosis.calibrated(replace(recording, imu=in_units(recording.imu, 1e-3 * DEGREE, 1.0)))
+    assert "in m°/s" in found.findings[0].sentence
+
+
+@pytest.mark.parametrize("counts", [131.0, 65.5, 32.8, 16.4, 14.3])
+def test_raw_counts_of_a_gyroscope_are_refused_by_their_factor(counts: float, recording: data.Sequence) -> None:
+    """16.4 per °/s are 940 per rad/s, and no mrad/s."""
+    assert recording.imu is not None
+    wrong = replace(recording, imu=in_units(recording.imu, DEGREE / counts, 1.0))
+    for settings in (None, diagnosis.Calibration()):
+        with pytest.raises(InputError, match=rf"raw counts of a gyroscope, .*{counts:.3g} per °/s; write rad/s$") as e:
+            diagnosis.calibrated(wrong, settings=settings)
+        measured = re.search(r"are ([\d.e+]+) times those that the cameras see", str(e.value))
+        assert measured is not None
+        assert float(measured.group(1)) == pytest.approx(counts / DEGREE, rel=0.03)
+
+
+def test_a_factor_of_no_unit_and_no_gyroscope_is_refused(recording: data.Sequence) -> None:
+    assert recording.imu is not None
+    wrong = replace(recording, imu=in_units(recording.imu, 1.0 / 300.0, 1.0))
+    with pytest.raises(InputError, match=r"are [\d.]+ times those that .* the factor of no unit; write rad/s$"):
+        diagnosis.calibrated(wrong)
+
+
+@pytest.mark.parametrize("counts", [16384, 8192, 4096, 2048])
+def test_raw_counts_of_an_accelerometer_are_refused(counts: int, recording: data.Sequence) -> None:
+    """8192 per g are no mm/s^2, in which gravity is 9807."""
+    assert recording.imu is not None
+    wrong = replace(recording, imu=in_units(recording.imu, 1.0, 9.80665 / counts))
+    with pytest.raises(InputError, match=rf"imu_linear_acceleration: .*\(raw counts, {counts} per g\?\)"):
         diagnosis.calibrated(wrong)
 
 

@@ -37,7 +37,8 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
     o, truth = sequence.observations, sequence.truth
     assert truth is not None
     assert truth.landmarks is not None
-    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), zero_order_hold(sequence), sequence.dt)
+    twist = zero_order_hold(sequence)
+    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), twist, sequence.dt, np.zeros_like(twist))
     random = np.random.default_rng(seed)
     off = 0.01 * random.normal(size=(frames, 6))
     off[0] = 0.0

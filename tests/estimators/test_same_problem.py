@@ -71,7 +71,8 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     np.testing.assert_allclose(pixel_squares(problem, four), (white**2).sum(axis=1), rtol=1e-8)
     # The diagnosis: its rows are whitened, its point moves against the pose.
     frames = np.zeros(len(points), dtype=np.int64)
-    data = WindowData(frames, np.arange(len(points)), measured_rows(pixel), np.zeros((1, 6)), np.ones(1))
+    still = np.zeros((1, 6))
+    data = WindowData(frames, np.arange(len(points)), measured_rows(pixel), still, np.ones(1), still)
     one = joined([(data, np.stack([pose, pose]), points)])
     window = pixel_terms(model, s.imu_T_cam, one, np.stack([pose, pose]), points, np.zeros((1, 8)))
     np.testing.assert_allclose(window.residual.T, white, rtol=1e-7, atol=1e-9)
@@ -115,7 +116,8 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     joint = gate_observations(innovation.nis_per_observation(model.row_variance), model, JointSettings()).weight
     np.testing.assert_allclose(joint, expected, rtol=1e-9)
     # The diagnosis.
-    data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), measured_rows(pixel), np.zeros((1, 6)), np.ones(1))
+    still = np.zeros((1, 6))
+    data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), measured_rows(pixel), still, np.ones(1), still)
     two = np.stack([pose, pose])
     terms = pixel_terms(model, s.imu_T_cam, joined([(data, two, points)]), two, points, np.zeros((1, 8)))
     np.testing.assert_allclose(terms.weight, expected, rtol=1e-9)
