@@ -113,7 +113,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
 def _origin(found: Diagnosis, repairs: Repairs) -> str:
     given = len(repairs.sigma.model_dump(exclude_none=True))
     rest = "found in the recording" if found.sigmas is not None else "assumed, not estimated from the recording"
-    return rest if given == 0 else "set by hand" if given == 3 else f"set by hand in part, the rest {rest}"
+    return rest if given == 0 else "user-specified" if given == 3 else f"user-specified in part, the rest {rest}"
 
 
 def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Problem:

@@ -118,7 +118,7 @@ def override_sentences(repairs: Repairs) -> tuple[str, ...]:
     values = repairs.model_dump(exclude_none=True)
     flat = {name: value for name, value in values.items() if not isinstance(value, dict)}
     flat |= {f"{table}.{name}": value for table in ("units", "sigma", "mask") for name, value in values[table].items()}
-    return tuple(f"set by hand: {name} = {_text(value)}" for name, value in flat.items())
+    return tuple(f"user-specified: {name} = {_text(value)}" for name, value in flat.items())
 
 
 def _text(value: object) -> str:

@@ -32,7 +32,7 @@ def significant_misalignment(diagnosis: Diagnosis) -> FloatArray:
 
 
 def significant_scale(diagnosis: Diagnosis) -> float:
-    """By which velocities are divided: 1 unless set by hand, since it could as well be the stereo's that is wrong."""
+    """By which velocities are divided: 1 unless user-specified, since the stereo baseline may be wrong instead."""
     return diagnosis.velocity_scale[0] if "velocity_scale" in diagnosis.overrides else 1.0
 
 

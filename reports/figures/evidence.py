@@ -46,13 +46,13 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
         panels = [
             Panel("NEES", "nees", 0.95, 5.0, pose),
             Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),
-            Panel("NIS per row", "nis_per_row", 0.95, 5.0, innovation),
+            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, innovation),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
         return time_panels(run, panels, "", style)
     panels = [
         Panel("reference NEES", "nees_reference", 1.95, 5.0, _pose_band(CONSISTENT), OVER_BAND),
-        Panel("NIS per row", "nis_per_row", 1.95, 5.0, _innovation_band(CONSISTENT), OVER_BAND),
+        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, _innovation_band(CONSISTENT), OVER_BAND),
         Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, _one, BELOW_ONE),
         Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, _one, BELOW_ONE),
     ]

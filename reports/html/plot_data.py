@@ -108,7 +108,7 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     yield chart(group, "nees-state", "NEES of the state", "", _numbered(run, whole), **state)
     band = _innovation_band(run)
     nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
-    innovations = "NIS per row"
+    innovations = "NIS per degree of freedom"
     yield chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
     for part in ("position", "rotation"):
         tables = {r.name: r.evidence.sigma_ratio for r in run.answered}

@@ -153,7 +153,7 @@ def test_an_extrinsic_recorded_as_its_inverse_is_inverted() -> None:
     assert codes(found) == {"extrinsic_inverse"}
     np.testing.assert_allclose(found.sequence.imu_T_cam, expected.imu_T_cam, atol=1e-12)
     kept = calibrated(found.sequence, diagnosis=found, repairs=Repairs(extrinsic_inverted=False))
-    assert not any("inverted" in sentence for sentence in kept.repairs if "set by hand" not in sentence)
+    assert not any("inverted" in sentence for sentence in kept.repairs if "user-specified" not in sentence)
 
 
 def test_a_zero_in_all_four_rows_is_unobserved(tmp_path: Path) -> None:

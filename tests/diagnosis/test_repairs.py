@@ -1,4 +1,4 @@
-"""Repairs set by hand: what the file may say, what becomes of it, and the file that a diagnosis writes."""
+"""User-specified repairs: what the file may contain, what is done with it, and the file that a diagnosis writes."""
 
 import json
 from dataclasses import replace
@@ -88,7 +88,7 @@ def test_the_problem_has_the_user_specified_repairs() -> None:
     sigma = np.sqrt(np.diagonal(problem.increment_covariance, axis1=1, axis2=2)) / recorded.dt[:, None]
     np.testing.assert_allclose(sigma[:, :3], 0.7)
     assert np.ptp(sigma[:, 3:]) < 1e-12
-    by_hand = [sentence for sentence in problem.repairs if sentence.startswith("set by hand: ")]
+    by_hand = [sentence for sentence in problem.repairs if sentence.startswith("user-specified: ")]
     assert [sentence.split()[3] for sentence in by_hand] == [
         "angular_axes",
         "linear_axes",
@@ -99,7 +99,7 @@ def test_the_problem_has_the_user_specified_repairs() -> None:
         "sigma.linear_velocity",
         "sigma.pixel",
     ]
-    assert "set by hand in part" in problem.remarks[0]
+    assert "user-specified in part" in problem.remarks[0]
 
 
 def test_as_recorded_turns_one_repair_off_and_leaves_the_others(tmp_path: Path) -> None:
@@ -200,9 +200,9 @@ def test_from_the_diagnosis_to_a_file_to_a_run(tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["settings"]["repairs"] == "found.toml"
-    assert "set by hand: velocity_scale = 1.5" in summary["problem"]["repairs"]
+    assert "user-specified: velocity_scale = 1.5" in summary["problem"]["repairs"]
     codes = [finding["code"] for finding in summary["problem"]["findings"]]
     assert codes == ["angular_axes", "gyro_bias", "time_offset"]
     page = (tmp_path / "out/report.html").read_text()
-    assert "Set by hand: velocity_scale = 1.5." in page
+    assert "User-specified: velocity_scale = 1.5." in page
     assert "w_y and w_z are recorded with the opposite sign" in page

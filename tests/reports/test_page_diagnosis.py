@@ -25,7 +25,7 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
         Finding("copied_frames", "Tracks are copies.", 6562, 0, "observations", "counted"),
         Finding("bursts", "Bursts.", 0.412, 0.002, "share of the matches", "counted"),
     )
-    problem = replace(run.problem, diagnosed=True, findings=found, repairs=("set by hand: velocity_scale = 1.5",))
+    problem = replace(run.problem, diagnosed=True, findings=found, repairs=("user-specified: velocity_scale = 1.5",))
     html = rendered(replace(run, problem=problem))
     assert "The recording: 3 faults detected" in html
     assert "It &lt;drifts&gt;." in html
@@ -34,7 +34,7 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     assert "<td>41.2 %</td><td>0.2 %</td>" in html
     assert "standard error 0.001 rad/s" in html
     assert "counted" not in html
-    assert "<li>Set by hand: velocity_scale = 1.5.</li>" in html
+    assert "<li>User-specified: velocity_scale = 1.5.</li>" in html
 
 
 def test_a_clean_recording_is_reported_as_such_and_an_undiagnosed_one_is_not() -> None:
