@@ -88,8 +88,8 @@ def test_the_problem_has_the_user_specified_repairs() -> None:
     sigma = np.sqrt(np.diagonal(problem.increment_covariance, axis1=1, axis2=2)) / recorded.dt[:, None]
     np.testing.assert_allclose(sigma[:, :3], 0.7)
     assert np.ptp(sigma[:, 3:]) < 1e-12
-    by_hand = [sentence for sentence in problem.repairs if sentence.startswith("user-specified: ")]
-    assert [sentence.split()[3] for sentence in by_hand] == [
+    specified = [sentence for sentence in problem.repairs if sentence.startswith("user-specified: ")]
+    assert [sentence.split()[1] for sentence in specified] == [
         "angular_axes",
         "linear_axes",
         "gyro_bias",
@@ -137,12 +137,12 @@ def test_a_shift_beyond_the_recording_is_refused() -> None:
 def test_the_written_repairs_give_the_problem_of_the_diagnosis(tmp_path: Path) -> None:
     found = faulty()
     repairs = read_repairs(file_with(tmp_path, repairs_text(found)))
-    by_hand, by_itself = (calibrated(found.sequence, diagnosis=found, repairs=r) for r in (repairs, None))
-    np.testing.assert_allclose(by_hand.increment, by_itself.increment, atol=1e-6)
-    np.testing.assert_allclose(by_hand.increment_covariance, by_itself.increment_covariance, rtol=1e-4)
-    np.testing.assert_allclose(by_hand.sequence.imu_T_cam, by_itself.sequence.imu_T_cam, atol=1e-6)
-    np.testing.assert_array_equal(by_hand.excluded, by_itself.excluded)
-    assert by_hand.pixel_variance == pytest.approx(by_itself.pixel_variance, rel=1e-4)
+    specified, by_itself = (calibrated(found.sequence, diagnosis=found, repairs=r) for r in (repairs, None))
+    np.testing.assert_allclose(specified.increment, by_itself.increment, atol=1e-6)
+    np.testing.assert_allclose(specified.increment_covariance, by_itself.increment_covariance, rtol=1e-4)
+    np.testing.assert_allclose(specified.sequence.imu_T_cam, by_itself.sequence.imu_T_cam, atol=1e-6)
+    np.testing.assert_array_equal(specified.excluded, by_itself.excluded)
+    assert specified.pixel_variance == pytest.approx(by_itself.pixel_variance, rel=1e-4)
 
 
 def test_a_user_specified_mask_is_the_mask() -> None:
