@@ -51,7 +51,7 @@ TERMS: Mapping[str, str] = {
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "
     "in the median. Frames where P − P_ref is not positive definite are left out. An estimator is overconfident where "
     "its P is smaller than P_ref in a direction, in most frames.",
-    "NIS per degree of freedom": "Squared innovations of a filter over their covariance, per degree of freedom: 1 is expected.",
+    "NIS per degree of freedom": "Squared innovations of a filter over their covariance: 1 is expected.",
     "sigma ratio": "Sigma of an estimator over that of the reference, median of the frames: a filter's is above 1.",
     RESIDUALS: "Squared residuals of a track over the noise assumed, per degree of freedom: 1 is expected. A point is "
     "dynamic where a constant velocity explains its residuals: it moved, or its track slid.",

@@ -218,7 +218,13 @@ METRICS = (
     *BLOCK_NEES,
     Metric(("nees_reference", "mean"), REFERENCE_NEES, "mean", tables=EVIDENCE),
     Metric(("nees_reference", "left_out"), REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
-    Metric(("nis", "per_degree"), CONSISTENCY, "NIS per degree of freedom", tables=EVIDENCE, term="NIS per degree of freedom"),
+    Metric(
+        ("nis", "per_degree"),
+        CONSISTENCY,
+        "NIS per degree of freedom",
+        tables=EVIDENCE,
+        term="NIS per degree of freedom",
+    ),
     Metric(("sigma_ratio", "rotation"), CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"),
     Metric(
         ("covariance", "not_positive_definite"),
