@@ -68,7 +68,7 @@ class EventKind(StrEnum):
     """observations rejected by a chi-square gate"""
     FRAME_DISAGREES = "frame disagrees"
     """all observations of a frame rejected, because most of them exceed a chi-square quantile"""
-    INITIALIZATION_DEFERRED = "entry put off"
+    INITIALIZATION_DEFERRED = "initialization deferred"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
     STATE_FULL = "state full"
     """observations of landmarks that the state has no room for"""

@@ -25,9 +25,10 @@ ROTATION_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Truth(Displayed):
-    """Known poses (and landmarks) in the world frame: the IMU's frame at frame 0.
+    """Ground truth: poses, landmarks and inertial states.
 
-    With raw inertial samples it is any world with its origin near frame 0; a problem brings it to its own.
+    The world is the IMU frame of image 0. With raw inertial samples it is any world with its origin near the first
+    pose; a problem transforms it to its own.
     """
 
     world_T_imu: FloatArray
@@ -89,7 +90,7 @@ class Truth(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Sequence(Displayed):
-    """A recording of T frames, as the recorder wrote it: stereo tracks with body velocities or raw inertial samples."""
+    """Recording of T frames, as read or repaired: stereo tracks with body velocities or raw inertial samples."""
 
     name: str
     t: FloatArray
@@ -100,7 +101,7 @@ class Sequence(Displayed):
     """(T, 3) rad/s in the IMU's frame; (0, 3) with raw inertial samples"""
     camera: StereoCamera
     imu_T_cam: FloatArray
-    """(4, 4) extrinsic of the left camera"""
+    """(4, 4) pose of the left camera in the IMU frame"""
     observations: Observations
     n_landmarks: int
     imu: ImuSamples | None = None
@@ -146,7 +147,7 @@ class Sequence(Displayed):
 
     @property
     def up(self) -> FloatArray:
-        """(3,) the unit vector that points up in the world: the IMU's frame at frame 0, or z up with raw samples."""
+        """Unit vector (3,) that points up in the world: z with raw inertial samples, else `up_imu`."""
         if self.imu is not None:
             return np.array([0.0, 0.0, 1.0])
         assert self.up_imu is not None
@@ -220,10 +221,13 @@ def check_sequence(s: Sequence) -> None:
     if not np.all(step > 0):
         k = int(np.argmin(step > 0))
         raise InputError(
-            f"time_stamps: stamps must rise, but frame {k + 1} ({s.t[k + 1]!r} s) is not after frame {k} ({s.t[k]!r} s)"
+            f"time_stamps: stamps must rise, but frame {k + 1} ({float(s.t[k + 1])!r} s) is not after "
+            f"frame {k} ({float(s.t[k])!r} s)"
         )
-    defect = float(so3.orthogonality_error(s.imu_T_cam[:3, :3])) if s.imu_T_cam.shape == (4, 4) else np.inf
-    if not (defect <= ROTATION_TOLERANCE and measurable(s.imu_T_cam).all()):
+    if s.imu_T_cam.shape != (4, 4) or not measurable(s.imu_T_cam).all():
+        raise InputError(f"imu_T_cam: expected finite numbers of shape (4, 4), got {s.imu_T_cam.tolist()}")
+    defect = float(so3.orthogonality_error(s.imu_T_cam[:3, :3]))
+    if not defect <= ROTATION_TOLERANCE:
         raise InputError(
             f"imu_T_cam: its upper left 3x3 is no rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
             "write the extrinsic as a rigid motion"
@@ -233,7 +237,7 @@ def check_sequence(s: Sequence) -> None:
     camera = s.camera
     for name, value in (("K[0, 0]", camera.fu), ("K[1, 1]", camera.fv), ("b", camera.baseline)):
         if not 0 < value <= LARGEST:
-            raise InputError(f"{name}: expected a positive number, got {value!r}")
+            raise InputError(f"{name}: expected a number above 0 and at most {LARGEST:g}, got {float(value)!r}")
     _require_finite("features", s.observations.pixel)
     if len(s.observations) and (
         s.observations.frame.max() >= T

@@ -6,7 +6,8 @@ residuals is smaller by (vL - vR)^2 / (2 V), which does not depend on the state.
 
 All estimators, the diagnosis and the comparison use the three rows. The four rows are used only by the documented
 filter without a kernel. A kernel is a function of the whitened norm of the three rows. The whitening covariance is that
-of the residual: V in smoother, triangulation and diagnosis, the innovation covariance H Sigma H^T + V in a filter.
+of the residual: R = diag(V, V, V/2) in smoother, triangulation and diagnosis, and H Sigma H^T + R, the covariance of
+the innovation, in a filter.
 """
 
 from dataclasses import dataclass, replace

@@ -64,10 +64,10 @@ class StereoTracker:
         self._cv2.setRNGSeed(SEED)
 
     def step(self, left: Image, right: Image, rotation: FloatArray | None = None) -> Tracks:
-        """Points of the next rectified pair of grey images (height, width).
+        """Tracks in the next rectified pair of gray images (height, width).
 
-        `rotation` (3, 3), new_R_previous of the left camera, predicts where points move, with the translation of the
-        step before; without it both are those of the step before.
+        `rotation` (3, 3), new_R_previous of the left camera, predicts the pixels with the translation of the last
+        estimated motion; without it the rotation is that of this motion too.
         """
         even_left, even_right = equalized(left), equalized(right)
         if self._left is not None and len(self.tracks.number):
@@ -92,7 +92,10 @@ class StereoTracker:
         return tracks.select(self._consistent(points[matched], tracks.pixel))
 
     def _consistent(self, points: FloatArray, pixel: FloatArray) -> BoolArray:
-        """Points (n, 3) of the previous frame whose new pixels (n, 4) agree with one motion of the rig (RANSAC)."""
+        """Mask (n,) of the points that agree with one motion of the rig (RANSAC), which is kept; all if none is found.
+
+        `points` (n, 3), m, are in the previous left camera frame; `pixel` (n, 4), px, are in this pair.
+        """
         everything = np.ones(len(points), dtype=np.bool_)
         if len(points) < MIN_POINTS:
             return everything

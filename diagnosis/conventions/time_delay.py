@@ -1,4 +1,4 @@
-"""Time delay between velocities and images, by cross-correlation of angular velocities."""
+"""Time shift between velocities and images, by cross-correlation of angular velocities."""
 
 from dataclasses import dataclass, field
 
@@ -14,18 +14,18 @@ MAX_SHIFT = 3.0
 ENOUGH = 5.0
 """log-likelihood by which the shift must lead those more than an interval away"""
 LONGEST_GAP = 2
-"""intervals without a motion that may be interpolated"""
+"""intervals; longer gaps in the odometry are not interpolated"""
 GRID = 0.02
 """frames"""
 NOT_KNOWN = 0.2
 """frames: a standard error beyond which the shift is not identifiable"""
 INFLATION = 2.0
-"""of the standard error: residuals of neighboring frames are correlated"""
+"""factor on the standard error, since residuals of neighboring frames are correlated"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimeDelay:
-    """The estimated delay of the velocities."""
+    """Estimated time shift of the velocities; negative where they lag the images."""
 
     shift: float
     """s: sample k, held for one interval, describes the motion from t_k + shift on; 0 is 'the interval after'"""
@@ -35,11 +35,11 @@ class TimeDelay:
     shifts: FloatArray = field(default_factory=lambda: np.empty(0))
     """(m,) intervals: those tried"""
     agreement: FloatArray = field(default_factory=lambda: np.empty(0))
-    """(m,) share of the variance of what the cameras see that the recorded rates explain at each"""
+    """(m,) score at each, 1 at most: of cross-correlation and energy, or the relative likelihood of windows"""
 
 
 def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) -> TimeDelay:
-    """The delay at which `recorded` samples (T-1, c) correlate best with odometry `seen` (T-1, c).
+    """Time shift that maximizes the likelihood of samples `recorded` (T-1, c) given odometry `seen` (T-1, c), rad/s.
 
     Meant for angular rates, since speed changes too slowly. The peak of the cross-correlation is unbiased by noise; a
     least-squares fit at a fractional shift would prefer the shift that averages most noise. Channels are weighted by
@@ -65,8 +65,8 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     slope = spline(k[inside] + shifts[peak], 1)
     residual = x[inside] - spline(k[inside] + shifts[peak])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
-    # From each sample's pull on the shift, outliers included (White 1980). The slope squared of a noisy signal is too
-    # large as an information; its curvature against the other signal is not.
+    # Sandwich standard error (White 1980), outliers included, with the observed curvature as the information. The
+    # squared slope of a noisy signal overestimates it.
     pull = (residual - np.median(residual, axis=0)) * slope / sigma**2
     curvature = -float(np.sum(clipped * spline(k[inside] + shifts[peak], 2) / sigma**2))
     deviation = INFLATION * float(np.sqrt(np.sum(pull**2))) / curvature if curvature > 0 else np.inf

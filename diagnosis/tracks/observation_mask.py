@@ -1,4 +1,4 @@
-"""The mask of observations that are consistent along their tracks, computed once and before any estimator."""
+"""Mask of the observations that are consistent along their tracks, computed once and before any estimator."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class MaskSettings:
 
 
 def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings) -> NDArray[np.uint8]:
-    """An `Excluded` (n,) for each observation, from the tracks and the dead-reckoned path (T, 4, 4) alone.
+    """`Excluded` (n,) of each observation, from the tracks and the dead-reckoned path (T, 4, 4) alone.
 
     Every observation of a track is predicted from the one before by stereo triangulation and the relative motion of the
     path. Consistent observations form runs. A single outlier between two consistent observations is excluded and the
@@ -53,7 +53,10 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
 def choose_features(
     sequence: Sequence, excluded: NDArray[np.uint8], features: int | None
 ) -> tuple[IntArray, NDArray[np.uint8]]:
-    """The landmarks observed most often after masking, at most `features`; and the mask without those left out."""
+    """Landmarks observed most often after masking, at most `features`, and `excluded` (n,) for them.
+
+    Observations of the other landmarks are `Excluded.FEATURE_NOT_CHOSEN`.
+    """
     usable = sequence.observations.select(excluded == Excluded.NO)
     chosen = most_observed(usable, sequence.n_landmarks, features)
     left_out = (excluded == Excluded.NO) & ~np.isin(sequence.observations.landmark, chosen)
@@ -65,14 +68,14 @@ class SplitTracks:
     """Tracks split where they jump to another point."""
 
     landmark: IntArray
-    """(n,) the landmark of each observation; pieces after a cut have new numbers from n_landmarks of the sequence on"""
+    """(n,) landmark of each observation; the longest run of a track keeps its number, other runs have new ones"""
     n_landmarks: int
     excluded: NDArray[np.uint8]
     """(n,) an `Excluded` each"""
 
 
 def split_tracks(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
-    """The mask of `exclusions`, but every run that is long enough is used, as a landmark of its own.
+    """Tracks split at jumps: every run of at least `min_track` observations is a landmark of its own.
 
     `copied` (n,) marks observations that repeat the frame before. The longest run of a track keeps its number.
     """
@@ -116,13 +119,13 @@ def _runs(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, c
 
 
 def prediction_gate(errors: FloatArray) -> float:
-    """The gate in px: `GATE` times the median of prediction errors (n,), within `GATE_RANGE`."""
+    """Gate in px: `GATE` times the median of prediction errors (n,), within `GATE_RANGE`."""
     typical = float(np.median(errors)) if len(errors) else GATE_RANGE[1]
     return float(np.clip(GATE * typical, *GATE_RANGE))
 
 
 class TrackConsistency:
-    """The test whether two observations of a track agree on one static point, given the motion between them."""
+    """Test whether two observations of a track agree on one static point, given the motion between them."""
 
     def __init__(self, sequence: Sequence, world_T_imu: FloatArray, gate: float) -> None:
         self.sequence = sequence

@@ -113,7 +113,7 @@ def delay(diagnosis: Diagnosis) -> Figure:
     timing = diagnosis.timing
     dt = float(np.median(diagnosis.sequence.dt))
     figure, (axes,) = stacked_panels(3.6)
-    axes.plot(timing.shifts, 100.0 * timing.agreement, color=REPAIRED, linewidth=1.8)
+    axes.plot(timing.shifts, timing.agreement, color=REPAIRED, linewidth=1.8)
     best = timing.shift / dt
     handles: list[Any] = []
     if timing.identifiable:
@@ -135,9 +135,9 @@ def delay(diagnosis: Diagnosis) -> Figure:
             color=GRAY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )
-    axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 100.0])
+    axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 1.0])
     axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
-    axes.set_ylabel("agreement, % of the variance")
+    axes.set_ylabel("agreement (1: equal rates)")
     title = "Agreement of the recorded rates with visual odometry"
     title_and_legend(figure, title if timing.identifiable else f"{title}: no shift is identifiable", handles)
     return figure

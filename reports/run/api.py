@@ -40,7 +40,7 @@ from .report import RunReport
 from .solution import read_added, solve
 
 Solver: TypeAlias = Callable[..., object]
-"""`solve(problem, progress=None) -> Estimate`; an answer that is none becomes a row with the reason"""
+"""`solve(problem, progress=None) -> Estimate`; another return value becomes a row that failed, with the reason"""
 
 
 @for_python
@@ -122,7 +122,7 @@ def run(
         batch_up_to=BATCH_OBSERVATIONS if is_default else 0,
         features=features,
         landmarks=LandmarkMode(landmarks),
-        truth=_in_memory(truth),
+        truth=_truth_source(truth),
         truth_frame=truth_frame,
         seed=seed,
         as_recorded=as_recorded,
@@ -157,9 +157,10 @@ def run(
 def named_estimators(
     given: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver],
 ) -> tuple[tuple[str, ...], dict[str, Solver]]:
-    """All names in order, and the functions among them that are not registered.
+    """Names of all estimators in order, and the unregistered functions by name.
 
-    Raises InputError for a function without a name of its own.
+    Raises InputError for what is neither name nor function, for a function without a name, and for the name of another
+    registered estimator.
     """
     if isinstance(given, Mapping):
         each = list(given.items())
@@ -197,10 +198,10 @@ def _name_of(function: Solver) -> str:
     return name
 
 
-def _in_memory(
+def _truth_source(
     truth: FilePath | Trajectory | Truth | Array | tuple[Array, Array] | None,
 ) -> Path | Source | Truth | None:
-    """The truth as the settings of a run have it."""
+    """Ground truth as `RunSettings` has it: a path that is not read yet, a `Source` or a `Truth`."""
     if isinstance(truth, str | os.PathLike):
         return Path(truth)
     return truth if truth is None or isinstance(truth, Truth) else opened(truth, name="truth")

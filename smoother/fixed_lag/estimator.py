@@ -73,7 +73,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         landmarks=window.landmarks(),
         used=problem.scatter_mask(window.used),
         status=Status.RECOVERED if trouble else Status.OK,
-        reason=f"the system was indeterminate on the way: {', '.join(trouble)}" if trouble else "",
+        reason=f"finished with events: {', '.join(trouble)}" if trouble else "",
         seconds=seconds,
         seconds_total=time.perf_counter() - start,
         events=tuple(events),

@@ -140,4 +140,4 @@ def _status(events: tuple[Event, ...]) -> tuple[Status, str]:
     if not trouble:
         return Status.OK, ""
     counts = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
-    return Status.RECOVERED, f"the system was indeterminate on the way: {counts}"
+    return Status.RECOVERED, f"finished with events: {counts}"

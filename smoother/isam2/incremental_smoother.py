@@ -1,4 +1,4 @@
-"""Incremental smoother: iSAM2 over the whole graph, frame by frame."""
+"""Incremental smoother: iSAM2 frame by frame over the recent frames, older ones in a linear prior."""
 
 import time
 from collections.abc import Collection
@@ -25,7 +25,7 @@ from .settings import ISAM2Settings
 PRIOR = -1
 """Index in place of an observation for the factor of a landmark's prior."""
 SETTLING_FRAMES = 4
-"""Consecutive updates that relinearize after one with new landmarks only: they and the last poses start far off."""
+"""Consecutive updates that relinearize, from one with new landmarks only on: they and the last poses start far off."""
 SETTLING_UPDATES = 8
 """Largest number of updates after the last frame; three to five are usual."""
 
@@ -49,19 +49,19 @@ class IncrementalSmoother:
         self.builder = GraphBuilder(problem, settings.initialization)
         self._inertial = problem.imu is not None
         self.key: dict[int, int] = {}
-        """of each landmark in the graph"""
+        """key of each landmark in the graph"""
         self._slots: dict[int, dict[int, int]] = {}
         """landmark -> {observation, or PRIOR: slot of its factor in the graph}"""
         self._dropped: set[int] = set()
         self.n_frames = 0
-        """in the graph"""
+        """number of frames in the graph"""
         self._settling_frames = 0
         """frames for which every update relinearizes"""
         self._ordering = EliminationOrdering(self._inertial)
         self._first = 0
-        """frame in the tree"""
+        """first frame in the tree"""
         self._marginalize_at = settings.tree_frames
-        """frame"""
+        """next frame after which to marginalize"""
         self.events: list[Event] = []
 
     def run(self, seconds: FloatArray, progress: Progress | None) -> None:
@@ -131,7 +131,13 @@ class IncrementalSmoother:
             )  # so that all of these together cost no more than one
             return update
         self.events += [
-            Event(k, EventKind.LANDMARK_DROPPED, "it came back, and the tree cannot go back", j) for j in sorted(new)
+            Event(
+                k,
+                EventKind.LANDMARK_DROPPED,
+                "observed again after marginalization; GTSAM could not restore the tree",
+                j,
+            )
+            for j in sorted(new)
         ]
         self._dropped |= new
         return update.without(back)
