@@ -65,6 +65,11 @@ def undrawn(*commands: Sequence[str], cwd: Path, **env: str) -> subprocess.Compl
     return _ended([sys.executable, "-c", UNDRAWN, ROOT, json.dumps(commands)], cwd, environment(**env))
 
 
+def undrawn_command() -> str:
+    """A program that is the command but for its figures, which it leaves empty."""
+    return f"import json, sys\nsys.argv[1:] = [{str(ROOT)!r}, json.dumps([sys.argv[1:]])]\n{UNDRAWN}"
+
+
 def fgbaseline(
     *arguments: str | Path,
     cwd: Path,
