@@ -5,8 +5,9 @@ PACKAGES := package geometry data diagnosis ekf smoother compare reports
 OUT ?= out/simulated
 
 # What `$(call installed,...)` is given goes to uv, which takes 20 seconds where pip takes 100. Where uv cannot (a mirror
-# that only pip is configured for), pip does it, and says so.
-UV := UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python --reinstall-package fgbaseline
+# that only pip is configured for), pip does it, and says so. Both compile bytecode: without it a start takes three times
+# as long where PYTHONDONTWRITEBYTECODE is set, as in many containers, and tests start Python often.
+UV := UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --reinstall-package fgbaseline
 installed = { $(UV) $(1) || { echo "uv could not install; pip does" >&2; $(BIN)/pip install --quiet $(1); }; }
 
 QUICK_CHECK :=
@@ -95,6 +96,7 @@ install: $(VENV)/tools.stamp
 	  rm -rf build/__editable__* && \
 	  $(call installed,--no-build-isolation --no-deps --config-settings editable_mode=strict -e .) && \
 	  echo "$(FILES)" > $(VENV)/files.stamp; }
+	@$(BIN)/python -m compileall -q build
 
 $(VENV)/tools.stamp: pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -177,6 +177,20 @@ def _beside(place: Place) -> tuple[Side, Side]:
     return side(place.today), side(place.before)
 
 
+def _joint(place: Place) -> tuple[Side, Side]:
+    """Frames of the joint filter, and the dense algebra between them in the same process."""
+    source, taken = place.today.parents[1] / "source", dict[str, float]()
+
+    def ours() -> Taken:
+        words = [str(place.today / "python"), "-m", "benchmarks.joint_update"]
+        taken.update(
+            json.loads(subprocess.run(words, cwd=source, stdout=subprocess.PIPE, check=True, text=True).stdout)
+        )
+        return Taken(taken["frames"], taken["frames"])
+
+    return ours, lambda: Taken(taken["algebra"], taken["algebra"])
+
+
 def _broken(name: str) -> Callable[[Place], Path]:
     files = {
         "words.tum": "# timestamp tx ty tz qx qy qz qw\n0.0 0 0 0 0 0 0 1\n0.1 here there 0 0 0 0 1\n",
@@ -219,6 +233,12 @@ ALL = (
         f"`from fgbaseline.reports.comparison import compare`, to {BEFORE}",
         0.3,
         both(lambda commands, _: [commands / "python", "-c", "from fgbaseline.reports.comparison import compare"]),
+    ),
+    Waiting(
+        "joint",
+        "`joint-ekf` at 300 features a frame, to one Cholesky, one triangular solve and one symmetric update each",
+        1.5,
+        _joint,
     ),
     Waiting("run", f"`run 03.npz` beside its estimators, to {BEFORE}", 0.5, _beside),
 )

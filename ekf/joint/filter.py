@@ -123,16 +123,22 @@ class JointFilter:
             return True
         state = self.state
         innovation = Innovation.of(seen.H, seen.residual, state.P)
-        factor = self._record_nis(k, innovation)
         verdict = gate_observations(innovation.nis_per_observation(self.row_variance), self.measurement, self.settings)
+        order = verdict.order
+        innovation = innovation.in_order(order)
+        factor = self._record_nis(k, innovation)
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.accepted)
             if not verdict.accepted.any():
                 return verdict.rejection is not EventKind.FRAME_DISAGREES
         try:
-            if factor is None or not verdict.full_weight:
-                innovation = innovation.select(verdict.accepted)
-                factor = innovation.factorize(self.row_variance / verdict.weight[verdict.accepted, None])
+            weight = verdict.weight[order][: np.count_nonzero(verdict.accepted), None]
+            innovation = innovation.first(len(weight))
+            if factor is None:
+                factor = innovation.factorize(self.row_variance / weight)
+            else:
+                lower = weight[weight[:, 0] != 1.0]
+                factor = factor.reweighted(innovation.residual, self.row_variance / lower - self.row_variance)
             self._apply_correction(kalman_update(innovation, factor, state.P))
         except NotPositiveDefiniteError:
             self._reject(k, EventKind.COVARIANCE_LOST, verdict.accepted)

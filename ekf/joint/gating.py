@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from fgbaseline.data.estimate import EventKind
-from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement
 from fgbaseline.geometry.measurement import ROWS
 
@@ -32,9 +32,9 @@ class GatedObservations:
     """reason for which the others are rejected"""
 
     @property
-    def full_weight(self) -> bool:
-        """True where every observation is accepted with weight 1."""
-        return bool(self.accepted.all() and (self.weight == 1.0).all())
+    def order(self) -> IntArray:
+        """Indices (n,): first the accepted observations with weight 1, then the other accepted ones, then the rest."""
+        return np.argsort(np.where(self.accepted, self.weight != 1.0, 2), kind="stable")
 
 
 def gate_observations(

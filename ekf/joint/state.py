@@ -16,6 +16,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..motion_model import POSE, BodyState, Prediction
 from .landmark_representation import WorldPoints, generators, motion_jacobian, world_points
+from .update import subtract_symmetric
 
 ABSENT = -1
 
@@ -109,8 +110,8 @@ class JointState:
         """P <- B P B^T with an identity B but for the pose's columns (size, 6)."""
         P, pose_block, G = self.P, columns[:POSE], columns[POSE:]
         own, cross = P[:POSE, :POSE].copy(), P[:POSE, POSE:].copy()
-        half = G @ (cross + 0.5 * own @ G.T)
-        P[POSE:, POSE:] += half + half.T
+        half = -(cross + 0.5 * own @ G.T)
+        subtract_symmetric(P[POSE:, POSE:], lambda rows, of: G[rows] @ half[:, of] + half[:, rows].T @ G[of].T)
         P[:POSE, POSE:] = pose_block @ (cross + own @ G.T)
         P[POSE:, :POSE] = P[:POSE, POSE:].T
         turned = pose_block @ own @ pose_block.T

@@ -8,6 +8,7 @@ S = H P H^T + R = L L^T and W = L^-1 H P the update is
 which equals K = P H^T S^-1 and (I - K H) P with every product formed once, and is symmetric to the last bit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,6 +21,9 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.measurement import squared_norm
 
 from ..motion_model import POSE
+
+PANEL = 192
+"""rows or columns that are worked on at a time"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,12 +42,23 @@ class StackedJacobian:
     def multiply(self, matrix: FloatArray) -> FloatArray:
         """Product H A (3n, c) with a matrix A (size, c)."""
         n, c = len(self.slot), matrix.shape[1]
-        product = self.landmark_jacobian @ matrix[self.n_body :].reshape(-1, 3, c)[self.slot]
-        product += (self.pose_jacobian.reshape(3 * n, POSE) @ matrix[:POSE]).reshape(n, 3, c)
+        product, landmarks = np.empty((n, 3, c)), matrix[self.n_body :].reshape(-1, 3, c)
+        for first in range(0, n, PANEL // 3):
+            part = slice(first, first + PANEL // 3)
+            np.matmul(self.landmark_jacobian[part], landmarks[self.slot[part]], out=product[part])
+            product[part] += (self.pose_jacobian[part].reshape(-1, POSE) @ matrix[:POSE]).reshape(-1, 3, c)
         return product.reshape(3 * n, c)
 
-    def select(self, chosen: BoolArray) -> "StackedJacobian":
-        """Rows of the chosen observations (n,)."""
+    def own_blocks(self, HP: FloatArray) -> FloatArray:
+        """Blocks (n, 3, 3) on the diagonal of H P H^T, from H P (3n, size)."""
+        rows = HP.reshape(len(self.slot), 3, -1)
+        columns = self.n_body + 3 * self.slot[:, None] + np.arange(3)
+        of_landmark = np.take_along_axis(rows, columns[:, None, :], axis=2)
+        of_pose = rows[:, :, :POSE] @ np.swapaxes(self.pose_jacobian, 1, 2)
+        return np.asarray(of_pose + of_landmark @ np.swapaxes(self.landmark_jacobian, 1, 2))
+
+    def select(self, chosen: BoolArray | IntArray | slice) -> "StackedJacobian":
+        """Rows of the chosen observations: a mask (n,), indices or a slice."""
         return StackedJacobian(
             self.slot[chosen], self.pose_jacobian[chosen], self.landmark_jacobian[chosen], self.n_body
         )
@@ -62,17 +77,37 @@ class CholeskyFactor(NamedTuple):
     """(3n,) L^-1 nu"""
 
     @staticmethod
-    def of(HPHt: FloatArray, residual: FloatArray, variance: FloatArray) -> "CholeskyFactor":
-        """Factorize H P H^T (3n, 3n), not modified, plus R of diagonal (n, 3) or (3,), px^2; whiten nu (n, 3), px.
+    def of(
+        HPHt: FloatArray, residual: FloatArray, variance: FloatArray, *, overwrite: bool = False
+    ) -> "CholeskyFactor":
+        """Factorize H P H^T (3n, 3n) plus R of diagonal (n, 3) or (3,), px^2; whiten nu (n, 3), px.
 
-        Raises NotPositiveDefiniteError.
+        H P H^T is modified only with `overwrite`. Raises NotPositiveDefiniteError.
         """
-        S = HPHt.copy()
+        S = HPHt if overwrite else HPHt.copy()
         diagonal = S.reshape(-1)[:: len(S) + 1].reshape(-1, 3)
         diagonal += variance
         L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
         if failed or not np.isfinite(L[-1, -1]):
             raise NotPositiveDefiniteError
+        return CholeskyFactor(L, dtrsv(L, residual.reshape(-1), lower=1))
+
+    def reweighted(self, residual: FloatArray, added: FloatArray) -> "CholeskyFactor":
+        """Factor of the first m observations, of nu (m, 3), with more noise in the last k of these: R + diag(added).
+
+        `added` is (k, 3), px^2. The other columns of L are those of the factor without it, which is overwritten. Raises
+        NotPositiveDefiniteError.
+        """
+        last = residual.size
+        first = last - added.size
+        L = self.L if last == len(self.L) else np.asfortranarray(self.L[:last, :last])
+        if added.size:
+            own = np.tril(L[first:, first:])
+            S = own @ own.T
+            S.reshape(-1)[:: len(S) + 1] += added.reshape(-1)
+            L[first:, first:], failed = dpotrf(S, lower=1, clean=0)
+            if failed:
+                raise NotPositiveDefiniteError
         return CholeskyFactor(L, dtrsv(L, residual.reshape(-1), lower=1))
 
     @property
@@ -90,36 +125,34 @@ class Innovation:
     """(n, 3) measured minus predicted, px"""
     HP: FloatArray
     """(3n, size)"""
-    HPHt: FloatArray
-    """(3n, 3n)"""
 
     @staticmethod
     def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
         """Innovation of residuals (n, 3), px, under the state covariance P (size, size)."""
-        HP = H.multiply(P)
-        return Innovation(H, residual, HP, H.multiply(np.ascontiguousarray(HP.T)))
+        return Innovation(H, residual, H.multiply(P))
 
     def __len__(self) -> int:
         return len(self.residual)
 
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
         """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance (3,))."""
-        n = np.arange(len(self))
-        own = self.HPHt.reshape(len(self), 3, len(self), 3)[n, :, n]  # the blocks on the diagonal
-        return squared_norm(self.residual, own + np.diag(variance))
+        return squared_norm(self.residual, self.H.own_blocks(self.HP) + np.diag(variance))
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
         """Factor of S for R = diag(variance), (n, 3) or (3,), px^2. Raises NotPositiveDefiniteError."""
-        return CholeskyFactor.of(self.HPHt, self.residual, variance)
+        HPHt = self.H.multiply(np.ascontiguousarray(self.HP.T))
+        return CholeskyFactor.of(HPHt, self.residual, variance, overwrite=True)
 
-    def select(self, chosen: BoolArray) -> "Innovation":
-        """Innovation of the chosen observations (n,)."""
-        if chosen.all():
+    def in_order(self, order: IntArray) -> "Innovation":
+        """Innovation of the observations in another order (n,)."""
+        if (np.diff(order) > 0).all():
             return self
-        rows = np.repeat(chosen, 3)
-        return Innovation(
-            self.H.select(chosen), self.residual[chosen], self.HP[rows], np.ascontiguousarray(self.HPHt[rows][:, rows])
-        )
+        HP = self.HP.reshape(len(self), -1)[order].reshape(self.HP.shape)
+        return Innovation(self.H.select(order), self.residual[order], HP)
+
+    def first(self, n: int) -> "Innovation":
+        """Innovation of the first n observations."""
+        return Innovation(self.H.select(slice(n)), self.residual[:n], self.HP[: 3 * n])
 
 
 def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:
@@ -129,5 +162,19 @@ def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray)
     """
     W_transposed = dtrsm(1.0, factor.L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
     delta: FloatArray = W_transposed @ factor.whitened
-    P -= W_transposed @ W_transposed.T
+    subtract_symmetric(P, lambda rows, columns: W_transposed[rows] @ W_transposed[columns].T)
     return delta
+
+
+def subtract_symmetric(P: FloatArray, block: Callable[[slice, slice], FloatArray]) -> None:
+    """Subtract a symmetric matrix from a symmetric one (n, n), in place; `block` gives its rows and columns.
+
+    It is made in panels, from the diagonal down, and mirrored above: each product is formed once and read in the cache.
+    """
+    for first in range(0, len(P), PANEL):
+        own, below = slice(first, first + PANEL), slice(first + PANEL, len(P))
+        P[own, own] -= block(own, own)
+        P[own, own] = 0.5 * (P[own, own] + P[own, own].T)
+        if below.start < below.stop:
+            P[below, own] -= block(below, own)
+            P[own, below] = P[below, own].T

@@ -104,24 +104,34 @@ class ComparisonReport(NotebookResult, Comparison):
         return place / "report.html"
 
     def _fill(self, folder: Path) -> None:
-        import pandas as pd
+        from fgbaseline.data.parallel import cores
 
+        from ..figures.comparison import drawn_in_background
         from ..figures.saving import save
         from ..html.comparison_page import render
+
+        with drawn_in_background(self, cores()) as drawn:
+            self._fill_tables(folder)
+            figures = drawn()
+        (folder / "figures").mkdir()
+        save(figures, folder / "figures")
+        (folder / "report.html").write_text(render(self, self.summary, figures), encoding="utf-8")
+
+    def _fill_tables(self, folder: Path) -> None:
+        import pandas as pd
 
         maps = {name: result.map for name, result in self.results.items() if result.map is not None}
         relative = {name: result.relative for name, result in self.results.items() if result.relative}
         optional = {"maps": maps, "relative": relative}
-        for name in ("series", "trajectories", "figures", *(name for name, tables in optional.items() if tables)):
+        for name in ("series", "trajectories", *(name for name, tables in optional.items() if tables)):
             (folder / name).mkdir()
         for name, landmarks in maps.items():
             columns = ["landmark", "distance", "seen", "depth", "sigmas"]
             landmarks[columns].to_csv(folder / "maps" / f"{name}.csv", index=False)
         for name, motions in relative.items():
-            joined = pd.concat({delta: to_frame(of) for delta, of in motions.items()}, names=["delta"]).reset_index(
-                level="delta"
-            )
-            joined.to_csv(folder / "relative" / f"{name}.csv", index=False, float_format="%.9g")
+            joined = pd.concat({delta: to_frame(of) for delta, of in motions.items()}, names=["delta"])
+            table = joined.reset_index(level="delta")
+            table.to_csv(folder / "relative" / f"{name}.csv", index=False, float_format="%.9g")
         for name, result in self.results.items():
             _write_series(result, folder / "series" / f"{name}.csv")
         paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
@@ -129,13 +139,10 @@ class ComparisonReport(NotebookResult, Comparison):
             write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
         main_table(self, self.by_name).to_csv(folder / "table.csv")
         self.metrics.to_csv(folder / "metrics.csv", index=False)
-        figures = self.figures()
-        save(figures, folder / "figures")
         as_dict = self.summary.model_dump(mode="json", by_alias=True)
         for file, text in {
             "table.md": markdown(self.text_table),
             "table.tex": latex(self.text_table),
-            "report.html": render(self, self.summary, figures),
             COMPARISON: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
         }.items():
             (folder / file).write_text(text, encoding="utf-8")

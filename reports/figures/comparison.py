@@ -1,6 +1,8 @@
 """Figures of a comparison of trajectories, and of one that a check of accuracy failed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +19,14 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
 from .comparison_data import ComparisonData, of_comparison
+from .drawing import DrawOne, encoded_in_background
 from .evidence import maps_by_depth, three_sigma_of
 from .layout import lay_out
 from .over_time import TITLE_ROOM, columns, component_panels
 from .panels import few_ticks, fit_log_or_linear
 from .paths import frame_top_view
 from .reprojection import distribution
+from .saving import EncodedFigure
 from .style import (
     GRAY,
     PAPER,
@@ -49,12 +53,23 @@ CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
 
 def draw(comparison: "Comparison") -> dict[str, Figure]:
     """Figures by name; those for which there is nothing to show are missing."""
-    data = of_comparison(comparison)
     with in_style():
-        drawn = {name: draw_one(data) for name, (draw_one, _) in EACH.items()}
-        drawn["reprojection"] = _reprojection(comparison, data)
-        drawn |= {f"three_sigma_{n}": _three_sigma(data, r) for n, r in comparison.results.items()}
-        return _laid_out(drawn)
+        return _laid_out({name: draw_one() for name, draw_one in figure_functions(comparison).items()})
+
+
+def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
+    """Functions that draw each of these figures, within `in_style()` and without layout; each may answer None."""
+    data = of_comparison(comparison)
+    each: dict[str, DrawOne] = {name: partial(draw_one, data) for name, (draw_one, _) in EACH.items()}
+    each["reprojection"] = partial(_reprojection, comparison, data)
+    return each | {f"three_sigma_{n}": partial(_three_sigma, data, r) for n, r in comparison.results.items()}
+
+
+@contextmanager
+def drawn_in_background(comparison: "Comparison", processes: int) -> Iterator[Callable[[], dict[str, EncodedFigure]]]:
+    """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, encoded."""
+    with encoded_in_background(figure_functions(comparison), processes) as drawn:
+        yield drawn
 
 
 def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:

@@ -1,6 +1,5 @@
 """All figures of a run, in the order in which the page shows them, and those of its folder for a paper."""
 
-import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -8,21 +7,19 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from fgbaseline.data.parallel import background_map
-
+from .drawing import encoded_in_background
 from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
 from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
 from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
-from .saving import EncodedFigure, encode_figure
+from .saving import EncodedFigure
 from .style import PAPER, in_style
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
 
-FORMS = ("png", "svg")
 OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
     divergence,
     error_to_truth,
@@ -129,34 +126,11 @@ def drawn_in_background(run: "Run", processes: int) -> Iterator[Callable[[], dic
     The bytes are the same however many processes share the work. The figures over time, which take longest, are the
     last and come first.
     """
-    each = figure_functions(of_run(run))
-    names = list(each)
-    with background_map(lambda number: _one(each[names[number]]), len(names), processes) as gathered:
-        yield lambda: {name: one for name, one in zip(names, gathered(), strict=True) if one is not None}
+    with encoded_in_background(figure_functions(of_run(run)), processes) as drawn:
+        yield drawn
 
 
 def draw_and_write(run: "Run", processes: int = 1) -> dict[str, EncodedFigure]:
     """Figures as `drawn_in_background` gives them, with nothing else to do meanwhile."""
     with drawn_in_background(run, processes) as drawn:
         return drawn()
-
-
-def _one(draw_one: Callable[[], Figure | None]) -> EncodedFigure | None:
-    with _without_garbage_collection(), in_style():
-        figure = draw_one()
-        if figure is None:
-            return None
-        lay_out(figure)
-        return encode_figure(figure, FORMS)
-
-
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    """Without the search for cyclic garbage, a seventh of the time; that garbage is 13 MB for seven estimators."""
-    collected = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collected:
-            gc.enable()

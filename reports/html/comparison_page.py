@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..figures.comparison_data import of_comparison
+from ..figures.saving import EncodedFigure
 from ..formatting import counted, number
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
@@ -35,7 +36,7 @@ STILLS = ("paths", "errors")
 """figures that show what the interactive plots show"""
 
 
-def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure]) -> str:
+def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure | EncodedFigure]) -> str:
     """`report.html` of a comparison."""
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)

@@ -1,12 +1,14 @@
 """The command `fgbaseline`: as a user starts it, or in a fork of this process, which has imported what it needs."""
 
+import gc
+import json
 import os
 import pkgutil
 import signal
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from importlib import import_module
@@ -15,7 +17,7 @@ from typing import NoReturn
 
 import pytest
 
-from fgbaseline import reports
+import fgbaseline as fgbaseline_package
 from fgbaseline.reports.cli import main
 
 from .empty_figures import empty_files, figures_left_empty
@@ -25,6 +27,7 @@ ROOT = Path(__file__).parents[2]
 SECONDS = 1200
 """that a command may take, on a machine that has much else to do"""
 UNDRAWN = """
+import json
 import sys
 import pytest
 from fgbaseline.reports.cli import main
@@ -35,7 +38,14 @@ from tests.builders.empty_figures import figures_left_empty
 
 sys.path.remove(root)
 figures_left_empty(pytest.MonkeyPatch())
-main(sys.argv[1:])
+codes = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv[1:] = arguments
+    try:
+        main(arguments)
+    except SystemExit as ended:
+        codes.append(ended.code or 0)
+sys.exit(max(codes))
 """
 
 
@@ -50,9 +60,14 @@ def installed(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.Compl
     return _ended([COMMAND, *arguments], cwd, environment(**env))
 
 
-def undrawn(*arguments: str | Path, cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
-    """The command in a new Python that leaves its figures empty."""
-    return _ended([sys.executable, "-c", UNDRAWN, ROOT, *arguments], cwd, environment(**env))
+def undrawn(*commands: Sequence[str], cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
+    """Commands one after another in one new Python that leaves their figures empty; the highest of their exit codes."""
+    return _ended([sys.executable, "-c", UNDRAWN, ROOT, json.dumps(commands)], cwd, environment(**env))
+
+
+def undrawn_command() -> str:
+    """A program that is the command but for its figures, which it leaves empty."""
+    return f"import json, sys\nsys.argv[1:] = [{str(ROOT)!r}, json.dumps([sys.argv[1:]])]\n{UNDRAWN}"
 
 
 def fgbaseline(
@@ -121,8 +136,8 @@ def _in_a_fork(
 @cache
 def _everything_imported() -> None:
     """What the commands import when they run, so that no fork has to."""
-    for module in pkgutil.walk_packages(reports.__path__, f"{reports.__name__}."):
-        if not module.name.endswith((".schema", ".pytest_plugin")):
+    for module in pkgutil.walk_packages(fgbaseline_package.__path__, f"{fgbaseline_package.__name__}."):
+        if not module.name.endswith((".schema", ".pytest_plugin", "__main__")):
             import_module(module.name)
 
 
@@ -135,6 +150,7 @@ def _become(
 ) -> NoReturn:
     """Turns this fork into the command, in the folder and with the output that it has; never returns into the tests."""
     code: int | str | None = 1
+    gc.freeze()  # a search for garbage among all that the tests have would copy their memory, page by page
     try:
         for number in _descriptors() - known - {0, 1, 2}:  # one of them has the parent wait for a new program
             with suppress(OSError):

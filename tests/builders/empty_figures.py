@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from fgbaseline.reports.figures import comparison, layout, run, saving
+from fgbaseline.reports.figures import comparison, drawing, layout, run, saving
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import RunData
 
@@ -43,11 +43,11 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
     patch.setattr(run, "figure_functions", blank)
-    for module in (run, comparison):
+    for module in (run, comparison, drawing):
         patch.setattr(module, "lay_out", lambda _: None)
 
 
 def figures_left_out(patch: pytest.MonkeyPatch) -> None:
     """Runs and comparisons have no figures, which saves what even empty ones take."""
     patch.setattr(run, "figure_functions", lambda _: {})
-    patch.setattr(comparison, "draw", lambda _: {})
+    patch.setattr(comparison, "figure_functions", lambda _: {})

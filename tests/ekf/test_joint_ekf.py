@@ -440,7 +440,8 @@ def test_a_frame_is_rejected_where_more_than_half_of_five_or_more_observations_d
     always = gate_observations(
         np.repeat([WILD, TAME], [wild, tame]), measured(None), JointSettings(gate=None, disagreeing_share=None)
     )
-    assert always.full_weight
+    assert always.accepted.all()
+    assert (always.weight == 1.0).all()
 
 
 def test_nan_residuals_reject_the_frame() -> None:
@@ -457,9 +458,11 @@ def test_the_gate_and_the_kernel_are_those_of_chi_square_and_huber() -> None:
         np.array([0.0, 4.0, 16.0, 400.0]), measured(HuberKernel(2.0)), JointSettings(gate=None)
     )
     assert weighted.weight.tolist() == [1.0, 1.0, 0.5, 0.1]
-    assert not weighted.full_weight
-    assert gate_observations(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings()).full_weight
-    assert not gated.full_weight
+    both = gate_observations(np.array([16.0, 0.0, 400.0, 4.0]), measured(HuberKernel(2.0)), JointSettings(gate=0.9999))
+    assert both.order.tolist() == [1, 3, 0, 2]  # weight 1, less, rejected
+    full = gate_observations(np.array([0.0, 4.0]), measured(HuberKernel(2.0)), JointSettings())
+    assert full.accepted.all()
+    assert (full.weight == 1.0).all()
 
 
 def test_a_covariance_that_becomes_indefinite_is_an_event_with_its_frame() -> None:

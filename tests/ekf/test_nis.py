@@ -28,6 +28,20 @@ def test_the_norm_of_a_joint_innovation_is_that_of_dense_algebra() -> None:
         CholeskyFactor.of(-HPHt, residual, variance)
 
 
+@pytest.mark.parametrize(("used", "lower"), [(6, 0), (6, 2), (6, 6), (4, 0), (4, 1), (4, 4)])
+def test_the_factor_of_a_frame_gives_that_of_its_first_observations_with_more_noise_in_some(
+    used: int, lower: int
+) -> None:
+    random = np.random.default_rng(2)
+    A, residual, variance = random.normal(size=(18, 30)), random.normal(size=(6, 3)), np.array([0.4, 0.4, 0.2])
+    added = random.uniform(0.1, 5.0, (lower, 3))
+    noise = variance + np.concatenate([np.zeros((used - lower, 3)), added])
+    expected = CholeskyFactor.of((A @ A.T)[: 3 * used, : 3 * used], residual[:used], noise)
+    factor = CholeskyFactor.of(A @ A.T, residual, variance).reweighted(residual[:used], added)
+    np.testing.assert_allclose(np.tril(factor.L), np.tril(expected.L), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(factor.whitened, expected.whitened, rtol=0, atol=1e-12)
+
+
 def test_the_norm_with_known_landmarks_is_that_of_dense_algebra() -> None:
     pose = se3.exp([0.05, 0.02, -0.03, 0.01, 0.0, 0.02])
     innovation = first_innovation(Scene().sequence(), pose)

@@ -27,7 +27,7 @@ TABLES = {".csv", ".tum", ".md", ".tex", ".npz", ".toml"}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording, its truth and a path that is a little off."""
     place = tmp_path_factory.mktemp("same")
-    sequence = drive("town", seconds=5.0, features_per_frame=10.0, wrong=0.05)
+    sequence = drive("town", seconds=4.0, features_per_frame=10.0, wrong=0.05)
     assert sequence.truth is not None
     data.write_npz(sequence, place / "drive.npz")
     poses = sequence.truth.world_T_imu.copy()
@@ -58,20 +58,28 @@ def timeless(words: Any) -> Any:
     return [timeless(value) for value in words] if isinstance(words, list) else words
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_two_processes_give_the_same_tables(folder: Path, name: str) -> None:
-    places = []
+@pytest.fixture(scope="module")
+def places(folder: Path) -> list[Path]:
+    """Folders in which two processes, with other hash seeds, worked through all commands: inputs and outputs."""
+    made = []
     for seed in ("1", "2"):
-        # the same name in different folders, since a summary says where it was written
-        work = folder / f"{name}-{seed}"
+        work = folder / seed
         work.mkdir()
         for path in folder.iterdir():
             if path.is_file():
                 (work / path.name).write_bytes(path.read_bytes())
-        result = undrawn(*COMMANDS[name], "--out", "out", cwd=work, PYTHONHASHSEED=seed)
+        # the same name in different folders, since a summary says where it was written
+        commands = [(*arguments, "--out", f"out-{name}") for name, arguments in COMMANDS.items()]
+        result = undrawn(*commands, cwd=work, PYTHONHASHSEED=seed)
         assert result.returncode in (0, 1), result.stderr
-        places.append(work / "out")
-    one, other = ({p.relative_to(place): p for p in place.rglob("*") if p.is_file()} for place in places)
+        made.append(work)
+    return made
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_two_processes_give_the_same_tables(places: list[Path], name: str) -> None:
+    outputs = [place / f"out-{name}" for place in places]
+    one, other = ({p.relative_to(place): p for p in place.rglob("*") if p.is_file()} for place in outputs)
     assert set(one) == set(other)
     tables = [path for path in one if path.suffix in TABLES]
     assert tables or name == "diagnose"

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from junitparser import JUnitXml
 
-from ..builders.commands import environment
+from ..builders.commands import environment, undrawn_command
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs" / "ci"
@@ -53,7 +53,7 @@ def test_the_gitlab_job_runs_the_same_commands() -> None:
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository with the limits, and with a pip and a gh that only say what they were asked."""
+    """A repository with limits, a pip and a gh that only say what they were asked, and a command that draws nothing."""
     (tmp_path / "accuracy").mkdir()
     shutil.copy(EXAMPLES / "limits.toml", tmp_path / "accuracy" / "limits.toml")
     (tmp_path / "accuracy" / "requirements.txt").write_text("fgbaseline\n")
@@ -62,6 +62,9 @@ def repository(tmp_path: Path) -> Path:
         program = tmp_path / "bin" / name
         program.write_text('#!/bin/sh\necho "$(basename "$0") $*" >> asked.txt\n')
         program.chmod(0o755)
+    program = tmp_path / "bin" / "fgbaseline"
+    program.write_text(f"#!{sys.executable}\n{undrawn_command()}")
+    program.chmod(0o755)
     return tmp_path
 
 
