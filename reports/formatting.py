@@ -10,8 +10,8 @@ DASH = "–"
 INFINITY = "∞"
 MINUS = "\N{MINUS SIGN}"
 NO_BREAK = "\N{NO-BREAK SPACE}"
-RESOLUTION = 1e-6
-"""m and degrees, below which differences between the estimates of a run are rounding"""
+RESOLUTION = 1e-5
+"""m and degrees, below which estimates of a run do not differ: `isam2` does not propagate smaller changes"""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _TEX = {
