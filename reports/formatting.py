@@ -63,7 +63,9 @@ def resolved(value: float, resolution: float) -> str:
 
 
 def per_cent(share: float) -> str:
-    """A share of one as per cent; a dash for NaN."""
+    """A share of one as per cent, `below 0.001 %` for a smaller one; a dash for NaN."""
+    if 0.0 < abs(share) < 1e-5:
+        return "below 0.001 %"
     return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
 
 
