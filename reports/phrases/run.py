@@ -1,8 +1,8 @@
 """Verdict on a run: sentences with one fact each, its number and its threshold."""
 
 from collections.abc import Callable
-from functools import partial
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
