@@ -294,6 +294,17 @@ def test_a_finger_zooms_by_dragging_and_moves_the_cursor_by_a_tap(phone: Opened)
     assert "0\u00a0s" not in ticks
 
 
+def test_headings_are_aligned_as_the_cells_below_them(opened: Opened) -> None:
+    aligned = """tables => tables.map(table => {
+        const heads = [...table.tHead.rows].at(-1).cells, row = [...table.querySelectorAll("tbody tr")]
+            .find(row => row.cells.length > 2), skipped = table.tHead.rows.length > 1 ? 1 : 0;
+        return [...heads].map((head, i) => [head, row.cells[i + skipped]].map(e => getComputedStyle(e).textAlign));
+    })"""
+    tables = opened.page.eval_on_selector_all("table:has(tbody tr td + td)", aligned)
+    assert len(tables) > 3
+    assert [pair for pairs in tables for pair in pairs if pair[0] != pair[1]] == []
+
+
 def test_the_sticky_header_ends_with_its_table(opened: Opened) -> None:
     opened.page.set_viewport_size({"width": 1400, "height": 500})
     (table,) = opened.boxes("#table table")
