@@ -19,6 +19,8 @@ from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
+RESOLUTION = 1e-5
+"""m and relative cost, below which a solution and the batch solution do not differ"""
 NOTABLE_INFLATION = 1.1
 """factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
@@ -243,7 +245,10 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     verdict = max(criterion.verdict for criterion in criteria)
     start = " started at isam2's answer" if EventKind.STARTED_AT_ISAM2 in kinds else ""
     agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
-    text = f"a batch solution{start} {agrees}: the cost is {excess:+.2g} of it away and the path {rmse:.2g} m (RMSE)"
+    side = "above" if excess > 0.0 else "below"
+    cost_gap = f"{abs(excess):.2g} {side} it, relative" if abs(excess) >= RESOLUTION else "the same"
+    path_gap = f"{rmse:.2g} m (RMSE) away" if rmse >= RESOLUTION else "the same"
+    text = f"a batch solution{start} {agrees}: the cost is {cost_gap}, the path {path_gap}"
     return _BesideBatch(verdict, text, criteria)
 
 

@@ -1,7 +1,7 @@
 """Numbers, counts and names as text: for sentences and tables, and made safe for LaTeX and Markdown."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import isfinite, isinf
 
 from fgbaseline.data.plural import plural
@@ -10,8 +10,10 @@ DASH = "–"
 INFINITY = "∞"
 MINUS = "\N{MINUS SIGN}"
 NO_BREAK = "\N{NO-BREAK SPACE}"
-RESOLUTION = 1e-6
-"""m and degrees, below which differences between the estimates of a run are rounding"""
+RESOLUTION = 1e-5
+"""m and degrees, below which estimates of a run do not differ: `isam2` does not propagate smaller changes"""
+SMALLEST: Mapping[str, float] = {"m": RESOLUTION, "°": RESOLUTION, "%": 10.0 * RESOLUTION, "°/m": 0.1 * RESOLUTION}
+"""by unit, what means something in a comparison of trajectories; rates are over 10 m of the path"""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _TEX = {
@@ -57,13 +59,20 @@ def interval(value: float, low: float, high: float) -> str:
     return f"{number(value)} [{number(low)}, {number(high)}]" if isfinite(low) and isfinite(high) else number(value)
 
 
+def resolution(of_files: Mapping[str, float], unit: str) -> float:
+    """Size below which a figure of a comparison is rounding: that of its files, at least `SMALLEST`, or 0."""
+    return max(of_files.get(unit, 0.0), SMALLEST.get(unit, 0.0))
+
+
 def resolved(value: float, resolution: float) -> str:
     """A number, or `0 ± 1 × 10⁻⁶` for one below the resolution of the files it comes from."""
     return f"0 ± {number(resolution)}" if abs(value) < resolution else number(value)
 
 
 def per_cent(share: float) -> str:
-    """A share of one as per cent; a dash for NaN."""
+    """A share of one as per cent, `below 0.001 %` for a smaller one; a dash for NaN."""
+    if 0.0 < abs(share) < 1e-5:
+        return "below 0.001 %"
     return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
 
 

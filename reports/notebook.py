@@ -1,9 +1,14 @@
-"""Results in a terminal and in a notebook: conclusions in at most five lines, and the main table as HTML."""
+"""Results in Python: conclusions in at most five lines, the main table as HTML, and the page or folder they write."""
 
+from collections.abc import Callable
 from html import escape
+from pathlib import Path
 from typing import Protocol
 
 from fgbaseline.data.display import LINES, cut
+from fgbaseline.data.formats.atomic_folder import atomic_folder
+from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.formats.named_file import FilePath
 
 from .tables import Table, html
 
@@ -28,3 +33,20 @@ class NotebookResult:
     def _repr_html_(self: _Result) -> str:
         sentences = "".join(f"<li>{escape(text)}</li>" for text in self.verdict)
         return f"<b>{escape(self.heading)}</b><ul>{sentences}</ul>{html(self.text_table)}"
+
+
+def write_report(
+    path: FilePath, page: Callable[[], str], fill: Callable[[Path], object], *, force: bool, mark: str
+) -> Path:
+    """Writes the page alone where `path` ends in `.html`, else a folder that `fill` fills; returns the page's path.
+
+    Both are atomic. Raises InputError where `path` exists without `force`, or is not a folder with the file `mark`.
+    """
+    place = Path(path)
+    if place.suffix.lower() == ".html":
+        with atomic_write(place, force=force) as file:
+            file.write(page().encode("utf-8"))
+        return place
+    with atomic_folder(place, force=force, mark=mark) as building:
+        fill(building)
+    return place / "report.html"

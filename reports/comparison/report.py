@@ -14,11 +14,10 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Resu
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
-from fgbaseline.data.formats.atomic_folder import atomic_folder
 from fgbaseline.data.formats.named_file import FilePath
 
 from ..keywords import for_python
-from ..notebook import NotebookResult
+from ..notebook import NotebookResult, write_report
 from ..phrases import comparison as phrases
 from ..results.comparison_summary import results_by_name, summarize
 from ..results.documents import COMPARISON
@@ -94,14 +93,16 @@ class ComparisonReport(NotebookResult, Comparison):
 
     @for_python
     def report(self, path: FilePath, *, force: bool = False) -> Path:
-        """Writes tables, paths, series, figures and report.html into a folder atomically; returns the page's path.
+        """Writes the page alone to `NAME.html`, or a folder with tables, paths, series, figures and page.
 
-        Raises InputError where the folder exists without `force` or is not that of a comparison.
+        Returns the path of the page. Raises InputError where the path exists without `force`, or is a folder that is
+        not that of a comparison.
         """
-        place = Path(path)
-        with atomic_folder(place, force=force, mark=COMPARISON) as building:
-            self._fill(building)
-        return place / "report.html"
+        from ..html.comparison_page import render
+
+        return write_report(
+            path, lambda: render(self, self.summary, self.figures()), self._fill, force=force, mark=COMPARISON
+        )
 
     def _fill(self, folder: Path) -> None:
         from fgbaseline.data.parallel import cores

@@ -8,8 +8,11 @@ from fgbaseline.compare import RmseDifference, distance_traveled
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.samples import coverage
 
-from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolved
+from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolution, resolved
 from .evidence import threshold_sentences
+
+NOTABLE_SHARE = 0.05
+"""share of heading or scale in the squared position error from which on it is reported"""
 
 
 def position_rmse(comparison: Comparison) -> list[str]:
@@ -75,7 +78,7 @@ def _signed(meters: float) -> str:
 def _rmse(result: Result) -> str:
     """Position RMSE with its interval, `0.52 m [0.41, 0.66]`; 0 below the resolution of the files."""
     if _is_unresolved(result):
-        return f"{resolved(result.rmse, result.resolution['m'])} m"
+        return f"{resolved(result.rmse, resolution(result.resolution, 'm'))} m"
     value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
     return f"{value} m{mark}{bounds}"
 
@@ -89,32 +92,37 @@ def maximum_errors(comparison: Comparison) -> list[str]:
             when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
             onset[result.name] = f"{when}, {number(result.passing.travelled)} m along the path"
     largest = {r.name: float(np.nanmax(r.departure["position"])) for r in comparison.ranked}
-    most = {r.name: (r.bound, resolved(largest[r.name], r.resolution["m"])) for r in comparison.ranked}
+    most = {r.name: (r.bound, resolved(largest[r.name], resolution(r.resolution, "m"))) for r in comparison.ranked}
     return threshold_sentences("position error", most, onset)
 
 
 def file_resolution(comparison: Comparison) -> list[str]:
     """States the resolution where a path is nearer to the reference than the files resolve."""
-    each = [f"{r.name} {number(r.resolution['m'])} m" for r in comparison.ranked if _is_unresolved(r)]
+    each = [f"{r.name} {number(r.resolution['m'])} m" for r in comparison.ranked if r.rmse < r.resolution["m"]]
     if not each:
         return []
     return [f"Nearer to {comparison.reference.name} than the decimals of the files resolve: {listed(each)}."]
 
 
 def _is_unresolved(result: Result) -> bool:
-    return result.rmse < result.resolution["m"]
+    return result.rmse < resolution(result.resolution, "m")
 
 
 def error_decompositions(comparison: Comparison) -> list[str]:
-    """Shares of heading and scale in the squared position error."""
-    each = []
+    """Shares of heading and scale in the squared position error, where they are notable."""
+    each, others = [], 0
     for result in comparison.ranked:
         if np.isfinite(result.shares.noise) and not _is_unresolved(result):
-            heading, scale, rest = (_share(result, name) for name in ("heading", "scale", "noise"))
+            if not any(result.share_intervals.by_name[name][0] >= NOTABLE_SHARE for name in ("heading", "scale")):
+                others += 1
+                continue
             each.append(
-                f"of {result.name} {heading} from heading, {scale} from scale (least-squares scale "
-                f"{1.0 + 0.01 * result.shares.scale_percent:.4f}) and {rest} from the rest"
+                f"of {result.name} {_share(result, 'heading')} from heading and {_share(result, 'scale')} from scale "
+                f"(least-squares scale {1.0 + 0.01 * result.shares.scale_percent:.4f})"
             )
+    below = f"heading and scale have less than {per_cent(NOTABLE_SHARE)} each"
+    if others:
+        each.append(f"{'of the others ' if each else ''}{below}")
     return [f"Squared position error: {'; '.join(each)}."] if each else []
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -47,10 +48,11 @@ def verdict(run: Run) -> list[str]:
         _reference,
         overconfidence_sentences,
         _reference_sigma,
-        _failures,
+        partial(_with_status, Status.FAILED),
         ate_sentences,
         divergence_sentences,
         _coverage,
+        partial(_with_status, Status.RECOVERED),  # the table marks them, and what they lost shows in the ranking
         _maximum_divergence,
         _missing_poses,
         _consistency,
@@ -144,15 +146,13 @@ def _maximum_divergence(run: Run) -> list[str]:
     return sentences
 
 
-def _failures(run: Run) -> list[str]:
-    sentences = []
-    for status in (Status.FAILED, Status.RECOVERED):
-        reasons: dict[str, list[str]] = {}
-        for result in run.results.values():
-            if result.estimate.status is status:
-                reasons.setdefault(result.estimate.reason or "no reason was given", []).append(result.name)
-        sentences += [f"{listed(names)} {status.value}: {reason.rstrip('.')}." for reason, names in reasons.items()]
-    return sentences
+def _with_status(status: Status, run: Run) -> list[str]:
+    """Estimators that ended so, by reason."""
+    reasons: dict[str, list[str]] = {}
+    for result in run.results.values():
+        if result.estimate.status is status:
+            reasons.setdefault(result.estimate.reason or "no reason was given", []).append(result.name)
+    return [f"{listed(names)} {status.value}: {reason.rstrip('.')}." for reason, names in reasons.items()]
 
 
 def _missing_poses(run: Run) -> list[str]:

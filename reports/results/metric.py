@@ -165,8 +165,11 @@ class Metric:
         return number(int(value) if self.count and isfinite(value) else value)
 
     def is_rounding(self, value: float) -> bool:
-        """Whether a distance or an angle is not zero, and too small to mean anything."""
-        return self.unit in ("m", "°") and 0.0 < abs(value) < RESOLUTION
+        """Whether a distance, an angle or what is normalized is not zero, and too small to mean anything.
+
+        A small ratio of sigmas means something: the estimator is overconfident.
+        """
+        return self.unit in ("m", "°", "") and self.term != "sigma ratio" and 0.0 < abs(value) < RESOLUTION
 
     def value(self, results: Mapping[str, Any]) -> Value:
         """Its figure in the results of one estimator."""

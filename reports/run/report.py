@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data.formats.atomic_folder import atomic_folder
 
 from ..keywords import for_python
-from ..notebook import NotebookResult
+from ..notebook import NotebookResult, write_report
 from ..phrases.run import verdict
 from ..results.run import Summary, as_dict, summarize
 from ..tables import Table
@@ -73,19 +72,27 @@ class RunReport(NotebookResult, Run):
 
     @for_python
     def report(self, path: str | os.PathLike[str], *, force: bool = False, processes: int = 1) -> Path:
-        """Writes the folder of `fgbaseline run` atomically; returns the path of its page, `report.html`.
+        """Writes the page alone to `NAME.html`, or the folder of `fgbaseline run`; returns the path of the page.
 
-        `force` replaces the folder of an earlier run; `processes` draw the figures. Raises InputError where the folder
-        exists without `force`, or is not that of a run.
+        `force` replaces an earlier file or folder; `processes` draw the folder's figures. Raises InputError where
+        the path exists without `force`, or is a folder that is not that of a run.
         """
+        from ..html.run_page import render
         from .folder import write_run
 
-        place = Path(path)
-        with atomic_folder(place, force=force, mark=MARK) as building:
-            write_run(self, building, processes)
-        return place / "report.html"
+        return write_report(
+            path,
+            lambda: render(self, self._document, self.figures()),
+            lambda folder: write_run(self, folder, processes),
+            force=force,
+            mark=MARK,
+        )
 
     @cached_property
+    def _document(self) -> Mapping[str, Any]:
+        return as_dict(self.summary)
+
+    @property
     def _estimators(self) -> Mapping[str, Any]:
-        estimators: Mapping[str, Any] = as_dict(self.summary)["estimators"]
+        estimators: Mapping[str, Any] = self._document["estimators"]
         return estimators

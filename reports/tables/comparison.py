@@ -9,7 +9,7 @@ import numpy as np
 from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
-from ..formatting import resolved
+from ..formatting import resolution, resolved
 from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
 from ..results.metrics import over_deltas, shown_in
 from .table import Cell, Column, Row, Table, compared
@@ -41,10 +41,10 @@ def comparison_table(comparison: Comparison, results: Results, caption: str, *, 
 
 
 def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Value]) -> dict[str, Cell]:
-    """Cells of the distances and angles that are below the resolution of the files: 0, and never the best."""
+    """Cells of the distances, angles and rates that are below the resolution: 0, and never the best."""
     found = {}
     for name, result in comparison.results.items():
-        step = 0.0 if metric.group == MAP else result.resolution.get(metric.unit, 0.0)
+        step = resolution({} if metric.group == MAP else result.resolution, metric.unit)
         if abs(values[name].value) < step:
             found[name] = Cell(resolved(values[name].value, step))
     return found

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,11 @@ from fgbaseline.compare.estimate_comparison import Run, same_frames
 from fgbaseline.data import Estimate
 from fgbaseline.data.finding import Finding
 
-from ..formatting import DASH, INFINITY, counted, number, per_cent, quantity
+from ..formatting import DASH, INFINITY, RESOLUTION, counted, number, per_cent, quantity, resolved
 from ..results.json_tree import INFINITE, at, leaves
 from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import shown_in
-from ..results.reader import DIVERGENCES, INERTIAL
+from ..results.reader import DIVERGENCES
 from ..results.run import Summary
 from .table import Cell, Column, Row, Table, best
 
@@ -78,10 +78,8 @@ def evidence_table(run: Run, estimators: Estimators) -> Table:
 
 
 def terminal_table(estimators: Estimators, reference: str | None) -> Table:
-    """The few figures of every estimator that a terminal has room for."""
-    needed = {"ate", *INERTIAL}
-    there = {key for e in estimators.values() for key in needed if at(e, key)}
-    metrics = [m for m in shown_in(TERMINAL) if m.path[0] not in needed or m.path[0] in there]
+    """The few figures of every estimator that a terminal has room for; those that no estimator has are left out."""
+    metrics = [m for m in shown_in(TERMINAL) if any(not isnan(m.value(e).value) for e in estimators.values())]
     if len({e["coverage"] for e in estimators.values()}) == 1:
         metrics = [metric for metric in metrics if not metric.uneven_only]
     rows = []
@@ -172,8 +170,8 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
 
 def _criterion(c: Criterion) -> Row:
     sign = "≥" if c.at_least else "≤"
-    texts = (number(c.value), f"{sign} {number(c.doubtful)}", f"{sign} {number(c.untrusted)}")
-    cells = tuple(map(Cell, (*texts, c.verdict.name.lower(), c.remark)))
+    texts = (f"{sign} {number(c.doubtful)}", f"{sign} {number(c.untrusted)}", c.verdict.name.lower(), c.remark)
+    cells = (*_numbers(c.value), *map(Cell, texts))
     return Row(f"{c.name}, {c.unit}" if c.unit else c.name, cells)
 
 
@@ -332,7 +330,11 @@ def _frames(
 
 
 def _numbers(*values: object) -> tuple[Cell, ...]:
-    return tuple(Cell(number(value)) for value in values)
+    """Cells of figures; 0 with the resolution for rounding."""
+    return tuple(
+        Cell(resolved(v, RESOLUTION) if isinstance(v, float) and 0.0 < abs(v) < RESOLUTION else number(v))
+        for v in values
+    )
 
 
 def long_tables(run: Run) -> list[Table]:

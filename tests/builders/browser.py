@@ -37,7 +37,9 @@ class Opened:
         scheme: str = "light",
         *,
         touch: bool = False,
+        ready: str = "#path-view .line",
     ) -> None:
+        """Opens a page and waits for the element `ready`."""
         size = {"width": width, "height": height}
         self.context = browser.new_context(viewport=size, color_scheme=scheme, has_touch=touch)
         self.page = self.context.new_page()
@@ -49,7 +51,7 @@ class Opened:
         self.page.on("dialog", lambda dialog: (self.said.append("a dialog"), dialog.dismiss()))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(address)
-        self.page.wait_for_selector("#path-view .line")
+        self.page.wait_for_selector(ready)
 
     def attribute(self, selector: str, name: str) -> str:
         return str(self.page.eval_on_selector(selector, f"element => element.getAttribute('{name}')"))

@@ -9,13 +9,18 @@ from fgbaseline import compare, data
 from fgbaseline.data.plural import noun, plural
 from fgbaseline.geometry import se3
 from fgbaseline.reports.comparison import compare as compared
-from fgbaseline.reports.formatting import counted, number
+from fgbaseline.reports.formatting import counted, number, per_cent
 
 
 def test_a_count_of_one_has_a_singular() -> None:
     assert [plural(n, "frame") for n in (0, 1, 2, 1009)] == ["0 frames", "1 frame", "2 frames", "1,009 frames"]
     assert [noun(n, "match", "matches") for n in (1, 2)] == ["match", "matches"]
     assert counted(1, "error is", "errors are") == "1 error is"
+
+
+def test_a_share_that_is_nearly_nothing_is_not_printed_in_full() -> None:
+    shares = (0.0, 1.17e-7, -1.17e-7, 3.5e-5, 0.12345, float("nan"))
+    assert list(map(per_cent, shares)) == ["0 %", "below 0.001 %", "below 0.001 %", "0.0035 %", "12.3 %", "–"]
 
 
 def path(n: int = 200, scale: float = 1.0) -> data.Trajectory:

@@ -22,7 +22,7 @@ from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.metric import MAIN
 from fgbaseline.reports.results.metrics import shown_in
-from fgbaseline.reports.tables.run import main_table
+from fgbaseline.reports.tables.run import evidence_table, long_tables, main_table
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
@@ -96,11 +96,15 @@ def test_rounding_is_zero_with_its_resolution_and_never_the_best() -> None:
     at = [i for i, column in enumerate(table.columns) if column.group.startswith("divergence") and column.unit == "m"]
     rows = {row.name: [row.cells[i] for i in at] for row in table.rows}
     assert len(at) == 2
-    assert {(cell.text, cell.best) for cell in rows["ekf"]} == {("0 ± 1.00 × 10⁻⁶", False)}
+    assert {(cell.text, cell.best) for cell in rows["ekf"]} == {("0 ± 1.00 × 10⁻⁵", False)}
     assert all("10⁻⁶" not in cell.text for cell in rows["joint-ekf"])
     sentences = " ".join(verdict(run))
-    assert "0 ± 1.00 × 10⁻⁶ m" in sentences
+    assert "0 ± 1.00 × 10⁻⁵ m" in sentences
     assert "10⁻⁹ m" not in sentences
+    printed = [main_table(run, as_dict(run)["estimators"]), evidence_table(run, as_dict(run)["estimators"])]
+    texts = [cell.text for one in (*printed, *long_tables(run)) for row in one.rows for cell in row.cells]
+    assert any(text.startswith("0 ±") for text in texts)
+    assert not [text for text in texts if re.search("10⁻([6-9]|[¹²³])", text)]
 
 
 @pytest.mark.parametrize(("farthest", "logarithmic"), [(60.0, True), (6.0, False)])

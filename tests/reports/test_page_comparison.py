@@ -221,3 +221,16 @@ def test_the_command_line_of_a_page_can_be_given_again(
     line = record["command line"].replace("&#39;", "'")
     assert line == "fgbaseline compare truth.tum 'my path.tum' --align none --out out"
     assert "command line" in creation()["Made"]
+
+
+def test_heading_and_scale_are_in_a_sentence_only_where_they_explain_the_error() -> None:
+    t, poses = truth().t, truth().world_T_body
+    shaken, scaled = poses.copy(), poses.copy()
+    shaken[:, :3, 3] += np.random.default_rng(0).normal(0.0, 0.1, (len(t), 3))
+    scaled[:, :3, 3] *= 1.05
+    estimates = (Trajectory(t, shaken, "shaken"), Trajectory(t, scaled, "scaled"))
+    (text,) = (s for s in compare(truth(), *estimates, align="yaw").verdict if s.startswith("Squared position error"))
+    assert "of scaled" in text
+    assert "(least-squares scale 1.0500)" in text
+    assert text.endswith("of the others heading and scale have less than 5 % each.")
+    assert "shaken" not in text

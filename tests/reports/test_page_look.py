@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fgbaseline.diagnosis import diagnose
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.style import (
     DARK_GROUND,
@@ -22,14 +23,17 @@ from fgbaseline.reports.figures.style import (
     colors,
     on_dark,
 )
+from fgbaseline.reports.html import comparison_page, diagnosis_page
 from fgbaseline.reports.html.explore import policy
 from fgbaseline.reports.html.plot_encoding import embedded_json, floats
 from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.results.diagnosis import found_by
 
 from ..builders.browser import Opened
 from ..builders.color_vision import DEFICIENCIES, difference, seen
 from ..builders.runs import answer, as_dict, run_of, scene
-from ..builders.synthetic import plain_problem
+from ..builders.synthetic import drive, plain_problem
+from .test_page_comparison import six
 
 TEN = (
     "dead-reckoning",
@@ -290,6 +294,17 @@ def test_a_finger_zooms_by_dragging_and_moves_the_cursor_by_a_tap(phone: Opened)
     assert "0\u00a0s" not in ticks
 
 
+def test_headings_are_aligned_as_the_cells_below_them(opened: Opened) -> None:
+    aligned = """tables => tables.map(table => {
+        const heads = [...table.tHead.rows].at(-1).cells, row = [...table.querySelectorAll("tbody tr")]
+            .find(row => row.cells.length > 2), skipped = table.tHead.rows.length > 1 ? 1 : 0;
+        return [...heads].map((head, i) => [head, row.cells[i + skipped]].map(e => getComputedStyle(e).textAlign));
+    })"""
+    tables = opened.page.eval_on_selector_all("table:has(tbody tr td + td)", aligned)
+    assert len(tables) > 3
+    assert [pair for pairs in tables for pair in pairs if pair[0] != pair[1]] == []
+
+
 def test_the_sticky_header_ends_with_its_table(opened: Opened) -> None:
     opened.page.set_viewport_size({"width": 1400, "height": 500})
     (table,) = opened.boxes("#table table")
@@ -311,11 +326,37 @@ def test_printed_paths_have_a_legend_of_what_is_shown(opened: Opened) -> None:
     assert [box["name"] for box in opened.boxes("#path-view .legend li")] == [TEN[0], *TEN[2:], "truth"]
 
 
+@pytest.fixture(scope="module")
+def pages(page: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, str]]:
+    """Page of each kind, and an element that is there once it is drawn."""
+    folder = tmp_path_factory.mktemp("pages")
+    comparison, found = six(), found_by(diagnose(drive(seconds=4.0)))
+    assert found.diagnosis is not None
+    assert found.tracks is not None
+    drawn = figures.draw_diagnosis(found.diagnosis, found.tracks)
+    texts = {
+        "comparison": comparison_page.render(comparison, comparison.summary, comparison.figures()),
+        "diagnosis": diagnosis_page.render(found, drawn),
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    line = "#path-view .line"
+    return {
+        "run": (page, line),
+        "comparison": (folder / "comparison.html", line),
+        "diagnosis": (folder / "diagnosis.html", "#figures"),
+    }
+
+
+@pytest.mark.parametrize("kind", ["run", "comparison", "diagnosis"])
 @pytest.mark.parametrize("width", [1400, 390])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_serious_fault(chromium: Any, page: Path, width: int, scheme: str) -> None:
+def test_axe_finds_no_serious_fault(
+    chromium: Any, pages: dict[str, tuple[Path, str]], kind: str, width: int, scheme: str
+) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    opened = Opened(chromium, page.as_uri(), width=width, scheme=scheme)
+    file, ready = pages[kind]
+    opened = Opened(chromium, file.as_uri(), width=width, scheme=scheme, ready=ready)
     opened.page.set_default_timeout(120_000)
     opened.page.eval_on_selector_all("details", "all => all.forEach(details => { details.open = true; })")
     found = axe.Axe().run(opened.page, options={"resultTypes": ["violations"]}).response["violations"]

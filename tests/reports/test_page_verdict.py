@@ -137,6 +137,20 @@ def test_failures_and_recoveries_are_reported_with_their_reason() -> None:
     assert "isam2 recovered: 8 landmarks were given up." in verdict(run)
 
 
+def test_a_recovery_stands_below_failures_and_ranking() -> None:
+    problem = plain_problem(scene())
+    paths = {"ekf": 3.0, "joint-ekf": 9.0}
+    run = run_of(
+        problem,
+        failed(problem, "fixed-lag", "no observations"),
+        *(answer(problem, name, (drift, 0.0, 0.0)) for name, drift in paths.items()),
+        answer(problem, "isam2", status=RECOVERED, reason="8 landmarks were given up"),
+    )
+    beginnings = ("fixed-lag failed", "Smallest divergence", "isam2 recovered")
+    at = [next(i for i, text in enumerate(verdict(run)) if text.startswith(beginning)) for beginning in beginnings]
+    assert at == sorted(at)
+
+
 def test_without_an_estimate_the_verdict_is_that_nothing_is_compared() -> None:
     problem = plain_problem(scene(observations=Observations.none(), truth=None))
     run = run_of(problem, failed(problem, "ekf", "no observations"))

@@ -76,6 +76,12 @@ def without_times(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     return summary, metrics[~metrics["metric"].isin(TIMINGS)].reset_index(drop=True)
 
 
+def json_of(page: Path) -> dict[str, Any]:
+    """Data of the plots of a page."""
+    held: dict[str, Any] = json.loads(page.read_text(encoding="utf-8").partition('id="run">')[2].partition("</")[0])
+    return held
+
+
 def test_run_writes_the_folder_of_the_command(
     sequence: Sequence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,6 +104,11 @@ def test_run_writes_the_folder_of_the_command(
     with pytest.raises(InputError, match=r"ours: the folder exists; .*force=True"):
         result.report("ours")
     assert result.report("ours", force=True) == page
+    alone = result.report("ours.html")
+    assert alone == Path("ours.html")
+    assert json_of(alone)["charts"] == json_of(page)["charts"]
+    with pytest.raises(InputError, match=r"ours.html: .*force=True"):
+        result.report("ours.html")
 
 
 def test_compare_trajectories_answers_as_the_command(paths: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,6 +121,7 @@ def test_compare_trajectories_answers_as_the_command(paths: Path, monkeypatch: p
     result = fgbaseline.compare_trajectories("truth.tum", ["ekf.tum", "it=mine.tum"], align="yaw")
     result.report("ours")
     assert everything_in(paths / "ours") == everything_in(paths / "theirs")
+    assert result.report("ours.html").read_text() == (paths / "ours" / "report.html").read_text()
     named = fgbaseline.compare_trajectories("truth.tum", {"ekf": Path("ekf.tum"), "it": "mine.tum"}, align="yaw")
     pd.testing.assert_frame_equal(named.metrics, result.metrics)
 

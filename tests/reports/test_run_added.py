@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import fgbaseline
 from fgbaseline import data
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.user_estimator import load_all
@@ -14,6 +16,8 @@ from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.run.folder import write_run
 from fgbaseline.reports.run.problem import RunSettings, build_problem
 from fgbaseline.reports.run.solution import read_added, solve
+
+from ..builders.browser import Opened
 
 MINE = '''
 from fgbaseline import data
@@ -64,6 +68,29 @@ def test_an_added_trajectory_has_the_error_that_compare_gives_it(problem: data.P
     assert summary.estimators["mine"].seconds is None
     assert run.added["mine"] in (folder / "report.html").read_text().replace("&#39;", "'")
     assert "mine" in run.unranked
+
+
+def test_a_user_function_and_an_added_path_are_clicked_on_the_page(
+    chromium: Any, problem: data.Problem, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(MINE)
+    given = rotated(problem, problem.sequence.up, 40.0, tmp_path / "path.tum")
+    result = fgbaseline.run(problem, estimators=["ekf", "dead-reckoning", f"my-filter={file}:solve"], add=given)
+    page = result.report(tmp_path / "page.html")
+    assert sorted(place.name for place in tmp_path.iterdir()) == ["mine.py", "page.html", "path.tum"]
+    opened = Opened(chromium, page.as_uri())
+    assert result.added["mine"] in opened.text("#table")
+    assert [opened.text(f"#table tbody tr:nth-child({i}) th") for i in (3, 4)] == ["my-filter", "mine"]
+    for i in (2, 3):
+        line = f".line.estimator-{i}"
+        assert opened.count(f"#path-view {line}") == 1
+        assert opened.count(f"#over-time {line}") > 3
+        opened.page.uncheck(f'#estimators-shown input[value="{i}"]')
+        assert opened.count(line) == 0
+        opened.page.check(f'#estimators-shown input[value="{i}"]')
+    assert (opened.said, opened.asked) == ([], [page.as_uri()])
+    opened.context.close()
 
 
 def test_a_world_that_is_not_level_is_aligned_in_six_degrees_of_freedom(problem: data.Problem, tmp_path: Path) -> None:
