@@ -73,7 +73,7 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
         linear, angular = recorded_velocities(path, t, settings)
     else:
         samples, *inertial = recorded_samples(path, t, settings)
-        truth = Truth(poses, tracks.first, "simulated", *inertial)
+        truth = Truth(poses, tracks.first, "simulated", *inertial, up=np.array([0.0, 0.0, 1.0]))
     sequence = Sequence(
         name=f"simulated-{settings.path}",
         t=t,

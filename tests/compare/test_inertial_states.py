@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import logm
 from scipy.optimize import minimize_scalar
 
 from fgbaseline import compare, ekf
@@ -22,7 +23,10 @@ PROBLEM = inertial_problem(3, n_frames=25)
 
 
 def drawn(seed: int, scale: float = 1.0) -> tuple[Estimate, Truth]:
-    """A random estimate with correlated covariances of very different units, and truth drawn from them."""
+    """A random estimate with correlated covariances of very different units, and truth drawn from them.
+
+    The error of position and velocity is that of the extended pose: both turn alike with the rotation error.
+    """
     rng = np.random.default_rng(seed)
     units = np.repeat([0.3, 0.02, 0.1, 1e-4, 1e-2], 3)
     L = units[:, None] * (np.eye(15) + 0.3 * rng.normal(size=(T, 15, 15)))
@@ -39,9 +43,12 @@ def drawn(seed: int, scale: float = 1.0) -> tuple[Estimate, Truth]:
         accelerometer_bias=rest[2],
         state_covariance=L @ np.swapaxes(L, 1, 2),
     )
+    extended = poses.copy()
+    extended[:, :3, 3] = rest[0]
+    body_velocity = np.einsum("nji,nj->ni", poses[:, :3, :3], error[:, 6:9])
     truth = Truth(
         poses @ se3.exp(error[:, :6]),
-        velocity=rest[0] + error[:, 6:9],
+        velocity=(extended @ se3.exp(np.hstack([body_velocity, error[:, 3:6]])))[:, :3, 3],
         gyroscope_bias=rest[1] + error[:, 9:12],
         accelerometer_bias=rest[2] + error[:, 12:],
     )
@@ -56,6 +63,35 @@ def turned_world(angle: float) -> FloatArray:
     return motion
 
 
+def extended_velocity_error(estimate: Estimate, truth: Truth, k: int) -> FloatArray:
+    """Velocity (3,) of the matrix logarithm of the extended poses [[R, v, p], [0, I]] of a frame, in world axes."""
+    matrices = []
+    for states in (estimate, truth):
+        assert states.velocity is not None
+        matrix = np.eye(5)
+        matrix[:3] = np.column_stack([states.world_T_imu[k, :3, :3], states.velocity[k], states.world_T_imu[k, :3, 3]])
+        matrices.append(matrix)
+    error: FloatArray = matrices[0][:3, :3] @ logm(np.linalg.solve(*matrices)).real[:3, 3]
+    return error
+
+
+def test_a_tilt_of_the_whole_world_counts_once_however_large_it_is() -> None:
+    """The covariance has the tilt alone: its error is N g, with N the unobservable directions at the estimate."""
+    estimate, _ = drawn(4)
+    sigma, axis = 0.02, np.array([0.6, -0.8, 0.0])
+    N = np.zeros((T, 15))
+    N[:, :6] = se3.adjoint(se3.inverse(estimate.world_T_imu))[:, :, 3:] @ axis
+    N[:, 6:9] = np.cross(axis, estimate.velocity)
+    P = sigma**2 * N[:, :, None] * N[:, None, :] + 1e-12 * np.eye(15)
+    motion = np.eye(4)
+    for times in (0.1, 1.0, 5.0):
+        motion[:3, :3] = so3.exp_so3(times * sigma * axis)
+        moved = estimate.transformed(motion)
+        truth = Truth(moved.world_T_imu, None, "moved", moved.velocity, moved.gyroscope_bias, moved.accelerometer_bias)
+        found = compare.state_nees(replace(estimate, state_covariance=P), truth)["state"]
+        np.testing.assert_allclose(found, times**2, rtol=1e-3)
+
+
 def test_the_nees_of_the_state_and_of_each_block_is_the_dense_quadratic_form() -> None:
     estimate, truth = drawn(0)
     table, P = compare.state_nees(estimate, truth), estimate.state_covariance
@@ -66,6 +102,7 @@ def test_the_nees_of_the_state_and_of_each_block_is_the_dense_quadratic_form() -
     back = estimate.world_T_imu @ se3.exp(error[:, :6])
     np.testing.assert_allclose(back, truth.world_T_imu, atol=1e-9)
     np.testing.assert_allclose(error[:, 6:9], truth.velocity - estimate.velocity, atol=1e-12)
+    error[:, 6:9] = [extended_velocity_error(estimate, truth, k) for k in range(T)]
     for k in range(T):
         assert table["state"][k] == pytest.approx(float(error[k] @ np.linalg.inv(P[k]) @ error[k]), rel=1e-6)
         for name, block in BLOCKS.items():

@@ -13,6 +13,7 @@ from fgbaseline import data, diagnosis
 from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.imu import ImuSamples
 from fgbaseline.data.problem import Problem
+from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis.conventions.rate_units import DEGREE
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
@@ -100,6 +101,16 @@ def test_a_world_that_is_nearly_level_is_leveled_by_the_samples(recording: data.
     assert reference is not None
     up = found.world_T_imu[:, 2, :3], reference.world_T_imu[:, 2, :3]
     assert np.rad2deg(np.arccos(np.einsum("ni,ni->n", *up))).max() < 1.0
+
+
+def test_the_simulated_truth_defines_up_and_keeps_its_tilt() -> None:
+    """The measured up of this start is off by 1.6 degrees."""
+    imu = SimulatedImu(accelerometer_bias=(0.1, -0.2, 0.0))
+    drive = simulate(Simulation(path="town", duration=4.0, features_per_frame=30.0, wrong_share=0.0, seed=2, imu=imu))
+    found = diagnosis.calibrated(drive).sequence.truth
+    assert found is not None
+    assert drive.truth is not None
+    np.testing.assert_allclose(found.world_T_imu[:, 2, :3], drive.truth.world_T_imu[:, 2, :3], atol=1e-9)
 
 
 def test_true_velocities_turn_with_the_world(problem: Problem, recording: data.Sequence) -> None:
