@@ -74,11 +74,10 @@ from .trajectory.frame_conventions import (
     BodyRotation,
     body_rotation,
     has_conjugated_orientations,
+    least_rotation_misfit,
     length_unit,
     rmse_of_inverse_poses,
-    rotation_misfit,
     travel_direction_misfit,
-    world_rotation_from_orientations,
     world_rotation_from_positions,
 )
 from .trajectory.path import distance_traveled
@@ -148,6 +147,7 @@ __all__ = [
     "interpolated",
     "interval_coverage",
     "is_insufficient",
+    "least_rotation_misfit",
     "length_unit",
     "map_by_depth",
     "map_difference",
@@ -173,7 +173,6 @@ __all__ = [
     "residual_patterns",
     "rmse_difference",
     "rmse_of_inverse_poses",
-    "rotation_misfit",
     "scaled_covariance",
     "segment_errors",
     "share_inside_bounds",
@@ -192,6 +191,5 @@ __all__ = [
     "velocity_and_bias_errors",
     "velocity_and_biases",
     "whitened_summary",
-    "world_rotation_from_orientations",
     "world_rotation_from_positions",
 ]
