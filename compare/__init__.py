@@ -84,11 +84,10 @@ if TYPE_CHECKING:
         BodyRotation,
         body_rotation,
         has_conjugated_orientations,
+        least_rotation_misfit,
         length_unit,
         rmse_of_inverse_poses,
-        rotation_misfit,
         travel_direction_misfit,
-        world_rotation_from_orientations,
         world_rotation_from_positions,
     )
     from .trajectory.path import distance_traveled
@@ -132,8 +131,7 @@ else:
             "trajectory.drift": "drift",
             "trajectory.error_decomposition": "ErrorDecomposition decomposition_intervals error_decomposition",
             "trajectory.frame_conventions": "BodyRotation body_rotation has_conjugated_orientations "
-            "length_unit "
-            "rmse_of_inverse_poses rotation_misfit travel_direction_misfit world_rotation_from_orientations "
+            "least_rotation_misfit length_unit rmse_of_inverse_poses travel_direction_misfit "
             "world_rotation_from_positions",
             "trajectory.path": "distance_traveled",
             "trajectory.segments": "SegmentErrors segment_errors",
@@ -204,6 +202,7 @@ __all__ = [
     "interpolated",
     "interval_coverage",
     "is_insufficient",
+    "least_rotation_misfit",
     "length_unit",
     "map_by_depth",
     "map_difference",
@@ -229,7 +228,6 @@ __all__ = [
     "residual_patterns",
     "rmse_difference",
     "rmse_of_inverse_poses",
-    "rotation_misfit",
     "scaled_covariance",
     "segment_errors",
     "share_inside_bounds",
@@ -248,6 +246,5 @@ __all__ = [
     "velocity_and_bias_errors",
     "velocity_and_biases",
     "whitened_summary",
-    "world_rotation_from_orientations",
     "world_rotation_from_positions",
 ]

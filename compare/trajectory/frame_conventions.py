@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.data.formats.quaternion_order import CLEARLY, STEP, fits_clearly_better
+from fgbaseline.data.formats.quaternion_order import CLEARLY, NOTICED, STEP, fits_clearly_better
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..statistics.descriptive import rms_norm
@@ -53,13 +53,16 @@ def world_rotation_from_positions(matched: MatchedTrajectories) -> FloatArray | 
 
     It is for a nearly straight path, whose second extent is below CLEARLY times the RMSE of the aligned positions.
     """
-    if len(matched) < MIN_PAIRS:
+    return _world_rotation(matched.estimate.world_T_body, matched.reference.world_T_body)
+
+
+def _world_rotation(estimate: FloatArray, reference: FloatArray) -> FloatArray | None:
+    if len(reference) < MIN_PAIRS:
         return None
-    estimate, reference = matched.estimate.world_T_body, matched.reference.world_T_body
     motion = align(estimate, reference, Align.SIM3)
     rmse = rms_norm(motion.apply(estimate)[:, :3, 3] - reference[:, :3, 3])
     spread = np.linalg.svd(reference[:, :3, 3] - reference[:, :3, 3].mean(axis=0), compute_uv=False)
-    return None if motion.free or spread[1] / np.sqrt(len(matched)) < CLEARLY * rmse else motion.rotation
+    return None if motion.free or spread[1] / np.sqrt(len(reference)) < CLEARLY * rmse else motion.rotation
 
 
 def world_rotation_from_orientations(reference: FloatArray, estimate: FloatArray) -> FloatArray:
@@ -79,10 +82,32 @@ def rotation_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArr
     return float(np.rad2deg(np.median(so3.rotation_angle(np.swapaxes(turned[0], 1, 2) @ turned[1]))))
 
 
+def least_rotation_misfit(matched: MatchedTrajectories) -> float:
+    """Least `rotation_misfit`, deg, of the estimate as it is, of its inverse poses, and of its transposed orientations.
+
+    Where it fits as it is, that is all. The rotation between the worlds is that of the positions, and for the estimate
+    as it is else that of the rotations.
+    """
+    R_ref, poses = matched.reference.rotation, matched.estimate.world_T_body
+    R = poses[:, :3, :3]
+    world = world_rotation_from_positions(matched)
+    misfit = rotation_misfit(R_ref, R, world_rotation_from_orientations(R_ref, R) if world is None else world)
+    if misfit <= NOTICED:
+        return misfit
+    inverse = se3.inverse(poses)
+    others = (
+        (np.swapaxes(R, 1, 2), world),
+        (inverse[:, :3, :3], _world_rotation(inverse, matched.reference.world_T_body)),
+    )
+    return min([misfit, *(rotation_misfit(R_ref, other, W) for other, W in others if W is not None)])
+
+
 def travel_direction_misfit(position: FloatArray, rotation: FloatArray) -> float:
     """Median angle, deg, of the direction of travel in the body to its median; of positions and rotations (n, 3, 3)."""
     steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
     length = np.linalg.norm(steps, axis=1)
+    if len(length) < MIN_PAIRS:
+        return float("nan")
     moving = length > 0.1 * np.percentile(length, 90)
     if moving.sum() < MIN_PAIRS:
         return float("nan")

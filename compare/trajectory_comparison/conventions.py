@@ -151,7 +151,8 @@ def _with_orders(
         chosen, other = _decided(each, *misfits)
         matched = paired(reference.trajectory(times), each.trajectory(times), settings)
         if len(misfits) > 1 and not other and matched is not None and len(matched) >= FEWEST:
-            chosen = _with_doubt(chosen, *misfits)
+            inverse = _of_inverse_poses(reference, chosen, times, settings)
+            chosen = _with_doubt(chosen, *misfits) if inverse is None else inverse
         decided_estimates.append(chosen)
     return [reference, *decided_estimates]
 
@@ -166,8 +167,7 @@ def _asked_for(each: Resolved, order: Order | None) -> Resolved:
 def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Settings) -> FloatArray | None:
     """Misfits of the rotations, deg: a row for each order of the reference, a column for each of the estimate.
 
-    The rotation between the worlds is that of the positions, else of the rotations themselves. None without
-    orientations, and with too few pairs.
+    Inverse poses and transposed orientations count in either order. None without orientations, and with too few pairs.
     """
     if len(reference.orders) == len(estimate.orders) == 1:
         return None
@@ -178,13 +178,7 @@ def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Se
             matched = paired(reference.trajectory(times, row), estimate.trajectory(times, column), settings)
             if matched is None or len(matched) < FEWEST or not (_vary(matched.reference) and _vary(matched.estimate)):
                 return None
-            rotations = matched.reference.rotation, matched.estimate.rotation
-            world = compare.world_rotation_from_positions(matched)
-            cells.append(
-                compare.rotation_misfit(
-                    *rotations, compare.world_rotation_from_orientations(*rotations) if world is None else world
-                )
-            )
+            cells.append(compare.least_rotation_misfit(matched))
         rows.append(cells)
     return np.array(rows)
 
@@ -207,6 +201,22 @@ def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[
         f"{assumed:.3g}° as {in_words(each.orders[0])}"
     )
     return replace(each, order=order).remarked(remark), 1
+
+
+def _of_inverse_poses(reference: Resolved, each: Resolved, times: Times, settings: Settings) -> Resolved | None:
+    """The input with the one order in which its inverse poses fit the reference's positions; None without such."""
+    fitting = []
+    for order in each.orders:
+        matched = paired(reference.trajectory(times), each.trajectory(times, order), settings)
+        if matched is None:
+            continue
+        rmse, inverted = compare.rmse_of_inverse_poses(matched)
+        if fits_clearly_better(inverted, rmse, least=0.0):
+            fitting.append(order)
+    if len(fitting) != 1:
+        return None
+    found = replace(each, order=fitting[0])
+    return found if fitting[0] == each.orders[0] else found.remarked(f"its quaternions are {in_words(fitting[0])}")
 
 
 def _with_doubt(each: Resolved, assumed: float, other: float) -> Resolved:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from fgbaseline.geometry import InputError
 
+from ..plural import plural
 from .number_table import Lines, split
 
 Order = Literal["xyzw", "wxyz"]
@@ -31,6 +32,8 @@ NO_POSITION = QUATERNION | {
     *("v", "vel", "velocity", "twist", "linear", "angular", "acc", "accel", "acceleration", "w", "omega", "gyro", "b"),
     *("bg", "ba", "bw", "bias", "std", "sigma", "cov", "covariance", "err", "error", "var", "a", "euler", "rpy", "g"),
 }
+VECTORS = {"timestamp": 1, "q": 4, "p": 3, "v": 3, "bg": 3, "ba": 3}
+"""numbers of the vectors that a state file of OpenVINS names"""
 OPENVINS = [f"p{part}{i}{k}" for part in "rt" for i in (1, 2, 3) for k in (1, 2, 3) if k >= i]
 """names of OpenVINS covariances: rotation, then translation, upper triangles"""
 
@@ -79,6 +82,9 @@ def named_columns(lines: Lines) -> Columns | None:
     """
     for comment in reversed(lines.comments):
         names = names_of(comment, lines.separator)
+        state = _of_state(names, lines.width)
+        if state is not None:
+            return state
         found = _by_name(names) if len(names) in (lines.width, lines.width - 1) else None
         if found is not None:
             return found if len(names) == lines.width else _behind_an_index(found)
@@ -109,6 +115,20 @@ def names_of(header: str, separator: str | None) -> list[str]:
     return split(header, separator)
 
 
+def _of_state(names: list[str], width: int) -> Columns | None:
+    """Columns of a header that names whole vectors, as `timestamp(s) q p v bg ba` of OpenVINS; None for another."""
+    places, place = {}, 0
+    for name in (_plain(name) for name in names):
+        if name not in VECTORS:
+            break
+        places[name] = tuple(range(place, place + VECTORS[name]))
+        place += VECTORS[name]
+    if not {"timestamp", "q", "p"} <= places.keys() or not len(names) < place <= width:
+        return None
+    # the numbers of JPL's rotation from the world to the body are those of Hamilton's from the body to the world
+    return Columns(position=places["p"], quaternion=places["q"], time=places["timestamp"][0], unit="s")
+
+
 def counted_columns(lines: Lines, *, whole: bool) -> Columns:
     """Columns by their count, without a header; `whole` is True for integer stamps.
 
@@ -131,8 +151,9 @@ def counted_columns(lines: Lines, *, whole: bool) -> Columns:
     if width == 9 and [lines.words(i)[0] for i in range(min(3, len(lines.text)))] in (["0", "1", "2"], ["1", "2", "3"]):
         return _behind_an_index(pose)
     raise InputError(
-        f"line {lines.number[0]}: it has {width} words, but without a header that names them a line has 8 numbers (TUM "
-        "and EuRoC), 4 (positions), 12 or 13 (KITTI), 11 or 17 (with velocities behind), or 20 or 44 (with covariances)"
+        f"line {lines.number[0]}: it has {plural(width, 'word')}, but without a header that names them a line has 8 "
+        "numbers (TUM and EuRoC), 4 (positions), 12 or 13 (KITTI), 11 or 17 (with velocities behind), or 20 or 44 "
+        "(with covariances)"
     )
 
 
@@ -183,7 +204,7 @@ def _by_name(names: Sequence[str]) -> Columns | None:
     number = None
     if time is None:
         number = next((plain.index(name) for name in NUMBER if name in plain), None)
-    turned = any(name.split("_")[-1] in ("roll", "pitch", "yaw") for name in plain)
+    turned = any({"roll", "pitch", "yaw"} & set(name.split("_")) for name in plain)
     return Columns(
         position=position,
         quaternion=quaternion,

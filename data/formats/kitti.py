@@ -54,8 +54,8 @@ def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
         if unit is not None and not settled:
             return stamps.seconds(unit)
         if TimeUnit.S not in units and len(units) != 1:
-            cause = "its time stamps may be in several units" if units else no_unit(stamps)
-            raise InputError(f"{cause}; give --time-unit")
+            several = "its time stamps may be in several units; give --time-unit"
+            raise InputError(several if units else f"{no_unit(stamps)}; write seconds")
         return stamps.seconds(units[0])
 
 

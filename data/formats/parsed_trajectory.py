@@ -143,7 +143,7 @@ def unit_ambiguity(file: ParsedTrajectory, units: Sequence[TimeUnit] | None = No
     assert file.stamps is not None
     possible = file.units if units is None else units
     if not possible:
-        return f"{file.source}: {no_unit(file.stamps)}; give --time-unit"
+        return f"{file.source}: {no_unit(file.stamps)}; write seconds"
     names = " or ".join(unit.noun for unit in possible)
     return (
         f"{file.source}: its time stamps, {file.stamps.interval:.3g} apart, may be in {names}; give --time-unit "

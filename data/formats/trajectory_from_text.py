@@ -18,6 +18,12 @@ from .trajectory_text import TrajectoryText
 
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
+STEPS = (0.01, 0.1, 1.0, 10.0, 100.0)
+"""m, of decimal digits"""
+MIN_STEPS = 1e4
+"""in the largest position, where digits are lost to it"""
+COARSE = 2.0
+"""times what the positions move from line to line on average"""
 FORWARD = 0.9
 """the cosine of the angle to the body's x axis: a body that travels so is no camera"""
 
@@ -44,7 +50,7 @@ def parsed(text: TrajectoryText) -> ParsedTrajectory:
     if columns.length in METERS:
         pose = _in_meters(pose, METERS[columns.length], columns)
         file = replace(file, remarks=(*file.remarks, f"its positions are in {columns.length} and are given in m"))
-    file = replace(file, position=pose[:, :3])
+    file = replace(file, position=pose[:, :3], remarks=(*file.remarks, *_rounding_remark(pose[:, :3])))
     if not columns.quaternion:
         return replace(file, remarks=(*file.remarks, "it has positions and no orientations"))
     quaternion = pose[:, 3:7]
@@ -64,6 +70,23 @@ def parsed(text: TrajectoryText) -> ParsedTrajectory:
     )
 
 
+def _rounding_remark(position: FloatArray) -> tuple[str, ...]:
+    """A remark on positions (n, 3) far from the origin that `%g` or a float32 rounded to steps in which they jump."""
+    for axis, x in zip("xyz", position.T, strict=True):
+        largest = float(np.abs(x).max(initial=0.0))
+        if largest < MIN_STEPS * STEPS[0] or float(np.ptp(x)) == 0.0:
+            continue
+        sizes = [size for size in (*STEPS, float(np.spacing(np.float32(largest)))) if MIN_STEPS * size <= largest]
+        step = max((size for size in sizes if np.abs(x / size - np.round(x / size)).max() < 1e-6), default=0.0)
+        moves = float(np.abs(np.diff(x)).mean())
+        if step > COARSE * moves:
+            return (
+                f"its positions have lost digits: {axis}, up to {largest:.6g} m, is in steps of {step:.3g} m and moves "
+                f"by {moves:.2g} m from line to line; write them in full, or less an origin",
+            )
+    return ()
+
+
 def _in_meters(pose: FloatArray, unit: float, columns: Columns) -> FloatArray:
     """Positions and covariances (n, m) behind each other, their lengths in multiples of `unit` m, in m."""
     scale = np.ones(pose.shape[1])
@@ -81,7 +104,7 @@ def _known(
 ) -> tuple[IntArray, Columns, list[str]]:
     """Indices (m,) of the lines (n,) that have a pose, the columns that they have, and what there is to remark."""
     if columns.quaternion and np.isnan(pose[:, 3:7]).all() and np.isfinite(pose[:, :3]).any():
-        remarks = ["its quaternions are NaN: it has positions and no orientations"]
+        remarks = ["its quaternions are NaN"]
         columns, pose = replace(columns, quaternion=(), covariance=()), pose[:, :3]
     else:
         remarks = []

@@ -17,6 +17,8 @@ MIN_CORRELATION = 0.6
 """from which on the ratio of two signals is known within a factor of 1 / MIN_CORRELATION"""
 CHANCE = 4.5
 """standard deviations of the correlation of noise"""
+SURE = 3.0
+"""standard errors"""
 WINDOWS = (1, 4, 8, 16, 32)
 """intervals that are averaged: noise shrinks by it, a motion lasts"""
 OUTER = 0.95
@@ -33,15 +35,25 @@ class ScaleRatio(NamedTuple):
     known: bool
     """whether both correlate, so that it is more than the ratio of two noises"""
     correlation: float = 0.0
+    samples: int = 0
+    """that are compared"""
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Between which the factor of the motion lies: the slopes of the two regressions of one on the other.
 
-        The noise of its regressor attenuates each of them (Frisch 1934).
+        The noise of its regressor attenuates each of them (Frisch 1934); SURE standard errors are added.
         """
-        c = max(self.correlation, np.finfo(np.float64).tiny)
-        return self.ratio * c, self.ratio / c
+        if not self.known:
+            return 0.0, np.inf
+        c = self.correlation
+        error = SURE * float(np.sqrt(max(0.0, 1.0 - c**2) / self.samples)) / c
+        return self.ratio * c / (1.0 + error), self.ratio / c * (1.0 + error)
+
+    def admits(self, factor: float, tolerance: float) -> bool:
+        """Whether the factor is within the bounds, widened by a share `tolerance`."""
+        low, high = self.bounds
+        return bool(low / (1.0 + tolerance) <= factor <= high * (1.0 + tolerance))
 
 
 def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, centered: bool) -> ScaleRatio:
@@ -64,7 +76,7 @@ def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, cen
             correlation = float(np.einsum("cij,ij->c", MATRICES, cross).max())
             sure = bool(correlation > max(MIN_CORRELATION, CHANCE / np.sqrt(3 * len(y))))
             if np.isnan(best.ratio) or (sure and correlation > most):
-                best = ScaleRatio(size_y / size_x, sure, correlation)
+                best = ScaleRatio(size_y / size_x, sure, correlation, len(y))
                 most = correlation if sure else 0.0
     return best
 

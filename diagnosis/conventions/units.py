@@ -13,6 +13,7 @@ intervals and baselines, is chosen; where it does not lead, nothing is changed.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from math import log10
 
 import numpy as np
 
@@ -24,12 +25,15 @@ from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
 from .jumps import FAR_BLIND, among_neighbors
-from .rate_units import DEGREE, doubt_of_rate_unit
+from .rate_units import CALIBRATED, DEGREE, doubt_of_rate_unit, measured, of_no_unit
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
+ANGULAR = (1.0, DEGREE, *THOUSANDS[1:])
+CENTI, KMH, FEET = 1e-2, 1.0 / 3.6, 0.3048
+"""of cm or cm/s, km/h and ft/s"""
 TOLERANCE = 0.45
-"""of the decadic logarithm of a ratio; the nearest two factors, degrees and thousandths, are 1.24 apart"""
+"""of the decadic logarithm of a ratio, for factors of 1000 and degrees; other units have to fit within the noise"""
 BASELINES = (0.01, 5.0)
 """m, of stereo rigs"""
 FARTHEST_CAMERA = 20.0
@@ -48,9 +52,11 @@ SI = {"time": "s", "angular": "rad/s", "linear": "m/s", "baseline": "m"}
 NOUNS = {
     "time": {unit.seconds: unit.noun for unit in TimeUnit},
     "angular": {DEGREE: "°/s", 1e-3: "mrad/s"},
-    "linear": {1e-3: "mm/s", 1e3: "km/s"},
-    "baseline": {1e-3: "mm", 1e3: "km"},
+    "linear": {1e-3: "mm/s", 1e-2: "cm/s", 1.0 / 3.6: "km/h", 1e3: "km/s"},
+    "baseline": {1e-3: "mm", 1e-2: "cm", 1e3: "km"},
 }
+SETTLE_RATES = "write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
+SETTLE_DISTANCES = "write m/s and m, or the factors as linear_velocity and baseline in a table [units] in --repairs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +105,7 @@ def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mappin
     given = ({"time": 1.0} if sequence.time_unit_given else {}) | dict(given or {})
     scale_ratios = _gains(sequence, seen_by_cameras)
     interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
-    ratios = _explicable(*scale_ratios)
+    ratios = _known(scale_ratios[0]), _known(scale_ratios[1])
     if not given and any(ratio is not None for ratio in ratios) and _fits(Units(), ratios):
         return Units(scale_ratios=scale_ratios, doubt=_unfollowed(sequence, Units(), scale_ratios[0], given))
 
@@ -112,13 +118,13 @@ def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mappin
 
     fitting = sorted(((unlikely(u), i, u) for i, u in enumerate(_hypotheses(given)) if _fits(u, ratios)))
     if not fitting:
-        return replace(next(_hypotheses(given)), scale_ratios=scale_ratios)
+        return replace(next(_hypotheses(given)), doubt=_of_no_unit(scale_ratios, given), scale_ratios=scale_ratios)
     least, _, best = fitting[0]
     others = [u for cost, _, u in fitting[1:] if cost < least + LEAD]
     doubt = (
         _doubt(sequence, scale_ratios, [best, *others])
         if others
-        else _unfollowed(sequence, best, scale_ratios[0], given) or _counted(best, scale_ratios[0], given)
+        else _unfollowed(sequence, best, scale_ratios[0], given) or _near_a_unit(best, scale_ratios, given)
     )
     return replace(next(_hypotheses(given)) if doubt else best, doubt=doubt, scale_ratios=scale_ratios)
 
@@ -137,13 +143,31 @@ def _unfollowed(sequence: Sequence, units: Units, seen: ScaleRatio, given: Mappi
     )
 
 
-def _counted(units: Units, seen: ScaleRatio, given: Mapping[str, float]) -> str:
-    """Doubt about rates whose factor is known too well to be that of a unit."""
-    if "angular" in given:
-        return ""
-    turns = seen._replace(ratio=seen.ratio / units.time)
-    doubt = doubt_of_rate_unit(turns, units.angular, _named("angular", units.angular))
-    return doubt and f"{doubt}; write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
+def _near_a_unit(units: Units, scale_ratios: tuple[ScaleRatio, ScaleRatio], given: Mapping[str, float]) -> str:
+    """Doubt about units whose factors are near the measured ones, and differ from them by more than the noise."""
+    angular, linear = scale_ratios
+    if "angular" not in given:
+        doubt = doubt_of_rate_unit(angular, units.angular, _named("angular", units.angular), units.time)
+        if doubt:
+            return f"{doubt}; {SETTLE_RATES}"
+    if {units.linear, units.baseline} & {CENTI, KMH} and not {"linear", "baseline"} & set(given):
+        factor = units.time * units.linear / units.baseline
+        if not linear.admits(factor, CALIBRATED):
+            return f"{of_no_unit('distances', linear)}; {SETTLE_DISTANCES}"
+        if units.linear == KMH and linear.admits(factor * FEET / KMH, CALIBRATED):
+            return f"{measured('distances', linear)}: velocities may be in km/h or ft/s; {SETTLE_DISTANCES}"
+    return ""
+
+
+def _of_no_unit(scale_ratios: tuple[ScaleRatio, ScaleRatio], given: Mapping[str, float]) -> str:
+    """Doubt about ratios that no units explain, unless the user states the unit."""
+    angular, linear = scale_ratios
+    turns = (time * rate for time in THOUSANDS for rate in ANGULAR)
+    if angular.known and "angular" not in given and not any(_is_near(angular.ratio, factor) for factor in turns):
+        return f"{doubt_of_rate_unit(angular, np.nan, '')}; {SETTLE_RATES}"
+    if linear.known and not {"linear", "baseline"} & set(given):
+        return f"{of_no_unit('distances', linear)}; {SETTLE_DISTANCES}"
+    return ""
 
 
 def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleRatio, ScaleRatio]:
@@ -166,19 +190,14 @@ def _without_jumps(recorded: FloatArray) -> FloatArray:
     return np.hstack(parts)
 
 
-def _explicable(angular: ScaleRatio, linear: ScaleRatio) -> tuple[float | None, float | None]:
-    """The ratios that are known and that wrong units explain; what else they are is no matter of units."""
-    degrees = tuple(factor * DEGREE for factor in THOUSANDS)
-    return _near(angular, (*THOUSANDS, *degrees)), _near(linear, THOUSANDS)
-
-
-def _near(g: ScaleRatio, factors: tuple[float, ...]) -> float | None:
-    return g.ratio if g.known and any(abs(np.log10(g.ratio / f)) < TOLERANCE for f in factors) else None
-
-
 def _hypotheses(given: Mapping[str, float]) -> Iterator[Units]:
     """All, the usual units first."""
-    choices: dict[str, tuple[float, ...]] = dict.fromkeys(NAMES, THOUSANDS) | {"angular": (1.0, DEGREE, *THOUSANDS[1:])}
+    choices: dict[str, tuple[float, ...]] = {
+        "time": THOUSANDS,
+        "angular": ANGULAR,
+        "linear": (*THOUSANDS, CENTI, KMH),
+        "baseline": (*THOUSANDS, CENTI),
+    }
     choices |= {name: (factor,) for name, factor in given.items()}
     for time, angular, linear, baseline in product(*(choices[name] for name in NAMES)):
         yield Units(time, angular, linear, baseline)
@@ -187,9 +206,15 @@ def _hypotheses(given: Mapping[str, float]) -> Iterator[Units]:
 def _fits(units: Units, ratios: tuple[float | None, float | None]) -> bool:
     """Whether the ratios of turns and distances that are known are those of these units."""
     expected = (units.time * units.angular, units.time * units.linear / units.baseline)
-    return all(
-        ratio is None or abs(np.log10(ratio / value)) < TOLERANCE for ratio, value in zip(ratios, expected, strict=True)
-    )
+    return all(ratio is None or _is_near(ratio, value) for ratio, value in zip(ratios, expected, strict=True))
+
+
+def _is_near(ratio: float, factor: float) -> bool:
+    return abs(log10(ratio / factor)) < TOLERANCE
+
+
+def _known(seen: ScaleRatio) -> float | None:
+    return seen.ratio if seen.known else None
 
 
 def rescaled(sequence: Sequence, units: Units) -> Sequence:

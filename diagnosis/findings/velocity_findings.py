@@ -21,6 +21,8 @@ from .track_statistics import TrackStatistics, track_statistics
 
 MIN_SCALE = 0.02
 """share by which velocities and stereo must disagree"""
+MIN_GYRO_SCALE = 0.25
+"""share by which angular velocities and cameras must disagree, beyond their noise"""
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
 """intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
@@ -41,6 +43,7 @@ def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> 
             _linear_axes,
             _gyro_bias,
             _time_offset,
+            _gyro_scale,
             _velocity_scale,
             _extrinsic,
             _disparity_offset,
@@ -180,6 +183,26 @@ def _time_offset(diagnosis: Diagnosis) -> Finding | None:
         rate_error(diagnosis, diagnosis.shift, bias, diagnosis.angular.name),
         "rad/s",
         f"standard error {timing.deviation:.4f} s ({timing.deviation / dt:.2f} intervals)",
+    )
+
+
+def _gyro_scale(diagnosis: Diagnosis) -> Finding | None:
+    """Rates that are far larger or smaller than those seen; the fit has no parameter for it."""
+    units = diagnosis.units
+    if units.scale_ratios is None or "angular" in units.given:
+        return None
+    seen = units.scale_ratios[0]
+    if not seen.known or seen.admits(units.time * units.angular, MIN_GYRO_SCALE):
+        return None
+    scale = units.time * units.angular / seen.ratio
+    return Finding(
+        "gyro_scale",
+        f"The recorded turns are {scale:.3g} times those that the cameras see; the recording does not show which of "
+        "the two is wrong, so neither is changed.",
+        scale,
+        scale,
+        "recorded over seen",
+        f"correlation {seen.correlation:.2f}",
     )
 
 

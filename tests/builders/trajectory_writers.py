@@ -22,6 +22,8 @@ ROSTOPIC = (
 )
 OPENVINS = "# timestamp(s) tx ty tz qx qy qz qw Pr11 Pr12 Pr13 Pr22 Pr23 Pr33 Pt11 Pt12 Pt13 Pt22 Pt23 Pt33"
 
+OPENVINS_STATE = "# timestamp(s) q p v bg ba cam_imu_dt num_cam cam0_k cam0_d cam0_rot cam0_trans ... etc"
+
 
 @dataclass(frozen=True)
 class Path3D:
@@ -127,6 +129,12 @@ VARIANTS: dict[str, Variant] = {
     "TUM, a stamp twice": text(repeating),
     "TUM with ROS covariances": text(lambda p: rows(p.stamps("s"), with_more(p.numbers(), ["0.01"] * 36))),
     "OpenVINS": text(lambda p: f"{OPENVINS}\n" + rows(p.stamps("s"), with_more(p.numbers(), ["0.01"] * 12))),
+    "state file of OpenVINS": text(
+        lambda p: (
+            f"{OPENVINS_STATE}\n"
+            + rows(p.stamps("s"), [[*n[3:], *n[:3], *["0.1"] * 9, "0.0", "2"] for n in p.numbers()])
+        )
+    ),
     "EuRoC": text(lambda p: f"{EUROC}\n" + rows(p.stamps("ns"), p.numbers("wxyz"), ",")),
     "EuRoC states": text(
         lambda p: f"{EUROC},{STATES}\n" + rows(p.stamps("ns"), with_more(p.numbers("wxyz"), ["0.1"] * 9), ",")

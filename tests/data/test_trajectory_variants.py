@@ -1,5 +1,7 @@
 """A trajectory gives the same metrics whatever program wrote it, or a refusal that names the cause."""
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fgbaseline.data.formats import read_trajectory, write_kitti, write_trajectory_npz
-from fgbaseline.geometry import InputError, se3
+from fgbaseline.geometry import InputError, se3, so3
 from fgbaseline.reports.comparison import ComparisonReport, compare
 
 from ..builders.refusals import refused
@@ -225,6 +227,49 @@ def test_inverse_poses_and_conjugated_quaternions_are_recognized(tmp_path: Path)
     assert "inverse: the inverses of its poses fit truth to" in said
     said = " ".join(compare(tmp_path / "truth.tum", tmp_path / "jpl.tum").verdict)
     assert "jpl: its orientations fit once transposed" in said
+
+
+@pytest.mark.parametrize("order", ["xyzw", "wxyz"])
+def test_inverse_poses_are_recognized_in_either_order_of_quaternions(tmp_path: Path, order: str) -> None:
+    """Also of a body that turns about one axis, whose inverse in one order resembles the poses in the other."""
+    t = np.arange(120) / 10.0
+    poses = np.tile(np.eye(4), (120, 1, 1))
+    turn = np.stack([0.1 * np.sin(t), 0.1 * np.cos(0.8 * t), 0.2 * t + np.sin(0.6 * t)], axis=1)
+    poses[:, :3, :3] = so3.exp_so3(turn)
+    poses[:, :3, 3] = np.stack([6.0 * np.sin(0.5 * t), 4.0 * np.cos(0.4 * t), np.sin(0.7 * t)], axis=1)
+    truth = Path3D(tuple(k * 10**8 for k in range(120)), poses)
+    estimate = astray(truth, 6)
+    inverse = Path3D(estimate.ns, se3.inverse(estimate.poses))
+    (tmp_path / "truth.tum").write_text("# timestamp tx ty tz qx qy qz qw\n" + tum(truth))
+    (tmp_path / "inverse.txt").write_text(tum(inverse, order=order))
+    (tmp_path / "same.txt").write_text(tum(estimate))
+    rmse = figures(compare(tmp_path / "truth.tum", tmp_path / "same.txt"))["translation.rmse"]
+    said = compare(tmp_path / "truth.tum", tmp_path / "inverse.txt").verdict
+    assert any(f"inverse: the inverses of its poses fit truth to {rmse:.3g} m" in sentence for sentence in said)
+    named = [sentence for sentence in said if "quaternions are" in sentence]
+    assert named == (["inverse: its quaternions are w x y z."] if order == "wxyz" else [])
+
+
+@pytest.mark.parametrize("write", ["{:.6g}".format, lambda x: repr(float(np.float32(x)))])
+def test_positions_that_lost_digits_to_a_far_origin_are_reported(tmp_path: Path, write: Callable[[float], str]) -> None:
+    """UTM coordinates have six digits before the point."""
+    truth = flight(3, n=120)
+    far = Path3D(truth.ns, truth.poses.copy())
+    far.poses[:, :3, 3] += [691_000.0, 5_334_000.0, 500.0]
+    (tmp_path / "truth.tum").write_text(tum(truth))
+    (tmp_path / "whole.tum").write_text(tum(far))
+    short = [[*map(write, map(float, row[:3])), *row[3:]] for row in far.numbers()]
+    (tmp_path / "short.tum").write_text(rows(far.stamps("s"), short))
+    said = " ".join(compare(tmp_path / "truth.tum", tmp_path / "short.tum").verdict)
+    assert re.search(r"short: its positions have lost digits: [xy], up to .* is in steps of (1|10|0.5) m", said)
+    assert "lost digits" not in " ".join(compare(tmp_path / "truth.tum", tmp_path / "whole.tum").verdict)
+
+
+def test_a_file_of_one_pose_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    truth = flight(3)
+    (tmp_path / "truth.tum").write_text(tum(truth))
+    (tmp_path / "one.tum").write_text(tum(truth).splitlines()[0] + "\n")
+    assert "only 1 of its poses has a partner in truth" in str(compared(tmp_path / "truth.tum", tmp_path / "one.tum"))
 
 
 def test_a_straight_path_may_have_one_orientation_throughout(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ The law: the answer is that of the recording without the fault, the factor being
 cause is named; `diagnose` never passes. What is right is never repaired.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -19,6 +20,7 @@ from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.time_unit import unit_of_stamps
 from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
+from fgbaseline.diagnosis.conventions.rate_units import COUNTS
 from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
 from fgbaseline.reports.run.problem import RunSettings, build_problem
@@ -75,6 +77,8 @@ FACTORS = [1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9]
 MUTATIONS = [
     *((what, factor) for what in ("stamps", "velocity", "baseline") for factor in FACTORS),
     ("gyroscope", 180.0 / np.pi),
+    ("velocity", 100.0),
+    ("baseline", 100.0),
 ]
 
 
@@ -92,6 +96,35 @@ def test_a_field_in_another_unit_gives_the_same_problem_and_the_factor_is_report
     problem = calibrated(found.sequence, diagnosis=found)
     assert_same_problem(problem, calibrated(drive(path)))
     assert any("multiplied by" in sentence for sentence in problem.repairs)
+
+
+@pytest.mark.parametrize(
+    ("what", "factor", "cause"),
+    [
+        *(("gyroscope", n * 180.0 / np.pi, f"they may be raw counts of a gyroscope, {n:g} per °/s") for n in COUNTS),
+        ("gyroscope", 300.0, "the factor of no unit; write rad/s"),
+        ("gyroscope", 1.0 / 30.0, "the factor of no unit; write rad/s"),
+        ("velocity", 3.281, "the factor of no unit; write m/s and m"),
+        ("velocity", 30.0, "the factor of no unit; write m/s and m"),
+        ("baseline", 39.37, "the factor of no unit; write m/s and m"),
+    ],
+)
+def test_a_factor_of_no_unit_is_refused_with_its_value(what: str, factor: float, cause: str) -> None:
+    recording = scaled(drive(), what, factor)
+    doubt = known_units(recording).doubt
+    found = re.search(rf"are ([\d.e-]+) times those that the cameras see.*{cause}", doubt)
+    assert found is not None, doubt
+    assert float(found.group(1)) == pytest.approx(1.0 / factor if what == "baseline" else factor, rel=0.03)
+    with pytest.raises(InputError, match="times those that the cameras see"):
+        calibrated(recording)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5])
+def test_rates_twice_as_fast_as_seen_are_a_finding(factor: float) -> None:
+    found = [f for f in findings_of(diagnose(scaled(drive(), "gyroscope", factor))) if f.code == "gyro_scale"]
+    assert len(found) == 1
+    assert found[0].before == pytest.approx(factor, rel=0.03)
+    assert f"{found[0].before:.3g} times" in found[0].sentence
 
 
 @pytest.mark.parametrize("preset", ["as-recorded", "documented"])
