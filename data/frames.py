@@ -1,5 +1,6 @@
 """Tables (pandas) and plots (matplotlib) of recordings, problems and paths; both libraries are imported at a call."""
 
+import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -80,4 +81,15 @@ def plot_over_time(panels: Mapping[str, Mapping[str, tuple[FloatArray, FloatArra
             axes.legend()
     rows[-1, 0].set_xlabel("time, s")
     figure.suptitle(title)
+    return as_cell_value(figure)
+
+
+def as_cell_value(figure: "Figure") -> "Figure":
+    """The figure, ready to be the value of a notebook's cell, which displays it once; elsewhere it is unchanged."""
+    if "ipykernel" in sys.modules:
+        from matplotlib import get_backend
+        from matplotlib import pyplot as plt
+
+        plt.switch_backend(get_backend())  # loads it: until then a notebook displays only the name of a figure
+        plt.close(figure)  # else pyplot displays it again at the end of the cell
     return figure

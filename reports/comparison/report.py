@@ -15,6 +15,7 @@ from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.frames import as_cell_value
 
 from ..keywords import for_python
 from ..notebook import NotebookResult, write_report
@@ -89,7 +90,7 @@ class ComparisonReport(NotebookResult, Comparison):
         """The figures by name."""
         from ..figures.comparison import draw  # matplotlib takes longer to import than a short comparison
 
-        return draw(self)
+        return {name: as_cell_value(figure) for name, figure in draw(self).items()}
 
     @for_python
     def report(self, path: FilePath, *, force: bool = False) -> Path:

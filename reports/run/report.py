@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.data.frames import as_cell_value
 
 from ..keywords import for_python
 from ..notebook import NotebookResult, write_report
@@ -64,7 +65,7 @@ class RunReport(NotebookResult, Run):
         """The figures by name, as the page has them."""
         from ..figures import draw
 
-        return draw(self)
+        return {name: as_cell_value(figure) for name, figure in draw(self).items()}
 
     def plot(self) -> "Figure":
         """The figure of all paths, from above."""

@@ -4,9 +4,11 @@
 
 import inspect
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
@@ -418,3 +420,19 @@ def test_figures_are_by_name_and_plot_is_that_of_the_paths(result: RunReport) ->
     figures = result.figures()
     assert {"paths_overlaid", "divergence"} <= set(figures)
     assert all(figure.axes for figure in figures.values())
+
+
+def test_a_notebook_displays_each_figure_once(result: RunReport, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its backend, once loaded, displays all values of cells, and at the end of a cell all figures of pyplot."""
+    from matplotlib import get_backend
+    from matplotlib import pyplot as plt
+
+    plt.switch_backend("agg")
+    loaded: list[str] = []
+    monkeypatch.setattr(plt, "switch_backend", loaded.append)
+    monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
+    for plot in (result.plot, result.problem.plot, result.problem.sequence.plot):
+        loaded.clear()
+        assert plot().axes
+        assert set(loaded) == {get_backend()}
+        assert plt.get_fignums() == []
