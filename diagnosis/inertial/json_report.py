@@ -88,10 +88,11 @@ def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
         )
     checks = found.sensors
     if checks is not None and checks.determined:
+        scale, error = checks.gyroscope_scale
         said.append(
             f"Gyroscope against the cameras: bias {vector(checks.gyroscope_bias[0], 4)} rad/s, offset "
-            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {checks.gyroscope_scale[0]:.3f}; accelerometer: bias "
-            f"{vector(checks.accelerometer_bias, 3)} m/s^2, gravity {checks.gravity[0]:.3f} m/s^2."
+            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (one standard error {error:.3f}); "
+            f"accelerometer: bias {vector(checks.accelerometer_bias, 3)} m/s^2, gravity {checks.gravity[0]:.3f} m/s^2."
         )
     if found.fit is not None:
         said.append(f"Noise (one sigma): {found.pixel:.2f} px of a pixel row.")

@@ -19,6 +19,8 @@ PRIOR = np.array([0.2] * 3 + [0.2] * 3 + [0.1, 0.1])
 """rad/s, rad, s and share: wide beside what a recording determines"""
 CORRELATED = 2.0
 """on standard errors, since errors of neighboring intervals are correlated"""
+SYSTEMATIC = 0.02
+"""px between frames by which tracks err together: trackers shorten motions of tenths of a pixel"""
 SATURATED = 5
 """samples in succession at the largest value of a component"""
 SATURATED_TIMES = 2
@@ -61,19 +63,28 @@ def sensor_checks(sequence: Sequence, seen: Odometry, path: InertialPath, start:
     bias, turn, offset, scale = _nothing(3), _nothing(3), (0.0, np.inf), (1.0, np.inf)
     before = after = np.nan
     if int(known.sum()) >= MIN_INTERVALS:
-        y = rate[known] - seen.twist(dt)[known, 3:]
+        turned = seen.twist(dt)[known, 3:]
+        y = rate[known] - turned
         slope = np.diff(_rates_at_frames(sequence), axis=0)[known] / dt[known, None]
-        w = rate[known]
-        design = np.concatenate(
-            [np.tile(np.eye(3), (len(y), 1, 1)), so3.hat3(w), -slope[:, :, None], w[:, :, None]], axis=2
-        )
-        fit = regress(y, design, PRIOR)
-        deviation = CORRELATED * np.sqrt(np.diag(fit.covariance))
-        bias, turn = (fit.theta[:3], deviation[:3]), (fit.theta[3:6], deviation[3:6])
-        offset = float(fit.theta[6]), float(deviation[6])
-        scale = 1.0 + float(fit.theta[7]), float(deviation[7])
+        w = rate[known] - np.median(y, axis=0)  # a bias is no rotation that a scale or misalignment could show in
+        ones = np.tile(np.eye(3), (len(y), 1, 1))
+        # Noise of the gyroscope shows in y as a scale of what it reads, noise of the cameras as the opposite scale of
+        # what they see. The truth is between both, which are far apart where the noise is all that moves.
+        designs = [
+            np.concatenate([ones, so3.hat3(w), -slope[:, :, None], scaled[:, :, None]], axis=2)
+            for scaled in (w, turned)
+        ]
+        fits = [regress(y, design, PRIOR) for design in designs]
+        theta = np.mean([fit.theta for fit in fits], axis=0)
+        formal = CORRELATED * np.sqrt(np.diag(fits[0].covariance))
+        between = 0.5 * (fits[0].theta - fits[1].theta)
+        moved = sequence.camera.fu * dt[known, None] * np.linalg.norm(designs[0], axis=1)
+        deviation = np.sqrt(formal**2 + between**2 + SYSTEMATIC**2 / np.mean(moved**2, axis=0))
+        bias, turn = (theta[:3], deviation[:3]), (theta[3:6], deviation[3:6])
+        offset = float(theta[6]), float(deviation[6])
+        scale = 1.0 + float(theta[7]), float(deviation[7])
         before = float(np.median(np.linalg.norm(y, axis=1)))
-        after = float(np.median(np.linalg.norm(y - design @ fit.theta, axis=1)))
+        after = float(np.median(np.linalg.norm(y - designs[0] @ theta, axis=1)))
     middle = path.states.accelerometer_bias[len(path.states) // 2]
     rest = None if start is None or not start.standing else rest_noise(sequence, start.standing)
     return SensorChecks(

@@ -30,6 +30,14 @@ def at_rest(t: FloatArray) -> FloatArray:
     return poses
 
 
+def trembling(t: FloatArray) -> FloatArray:
+    """Standing, with rotations of a ten-thousandth of a radian: some hundredths of a pixel between frames."""
+    poses = np.tile(np.eye(4), (len(t), 1, 1))
+    wave = np.sin(2.0 * np.pi * np.array([4.0, 5.0, 6.0]) * t[:, None])
+    poses[:, :3, :3] = so3.exp_so3(np.array([0.2, -0.1, 0.3])) @ so3.exp_so3(1e-4 * wave)
+    return poses
+
+
 def straight(t: FloatArray) -> FloatArray:
     """A car at 25 m/s that brakes a little and rolls."""
     poses = np.tile(np.eye(4), (len(t), 1, 1))

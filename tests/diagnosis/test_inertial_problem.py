@@ -15,10 +15,12 @@ from fgbaseline.data.imu import ImuSamples
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis.conventions.rate_units import DEGREE
+from fgbaseline.diagnosis.inertial.sensor_findings import sensor_findings
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
+from ..builders import inertial_paths
 from ..builders.commands import fgbaseline
-from ..builders.inertial_paths import PIXEL, inertial_recording, turn, upside_down
+from ..builders.inertial_paths import PIXEL, inertial_recording, trembling, turn, upside_down
 
 
 @pytest.fixture(scope="module")
@@ -263,6 +265,43 @@ def test_a_time_offset_is_found(recording: data.Sequence) -> None:
     found = diagnosis.diagnose_inertial(late)
     assert found.sensors is not None
     assert found.sensors.time_offset[0] == pytest.approx(0.012, abs=max(0.002, 4.0 * found.sensors.time_offset[1]))
+
+
+@pytest.mark.parametrize(("density", "shortened"), [(1e-3, 0.0), (1e-4, 0.15)])
+def test_without_rotation_there_is_a_bias_and_no_scale(
+    density: float, shortened: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rig that stands. What moves is noise of the gyroscope, or trembling that a tracker shortens."""
+    monkeypatch.setattr(inertial_paths, "NOISE", replace(inertial_paths.NOISE, gyroscope_density=density))
+    still = inertial_recording(trembling, seed=3, n_frames=40, rate=20.0, pixel=0.01)
+    o = still.observations
+    first = np.zeros((still.n_landmarks, 4))
+    first[o.landmark[::-1]] = o.pixel[::-1]
+    pixel = o.pixel + shortened * (first[o.landmark] - o.pixel)
+    checks = diagnosis.diagnose_inertial(replace(still, observations=replace(o, pixel=pixel))).sensors
+    assert checks is not None
+    assert {f.code for f in sensor_findings(checks)}.isdisjoint({"gyro_scale", "time_offset", "extrinsic"})
+    assert checks.gyroscope_scale[1] > 0.1
+    truth = still.truth
+    assert truth is not None
+    assert truth.gyroscope_bias is not None
+    bias, deviation = checks.gyroscope_bias
+    assert deviation.max() < 0.002
+    assert (np.abs(bias - truth.gyroscope_bias.mean(axis=0)) < 4.0 * deviation).all()
+
+
+def test_with_rotation_a_scale_is_found() -> None:
+    """A gyroscope that reads 5 % too much on a body that sways."""
+    swaying = inertial_recording(upside_down, seed=3, n_frames=60)
+    imu = swaying.imu
+    assert imu is not None
+    wrong = replace(swaying, imu=replace(imu, angular_velocity=1.05 * imu.angular_velocity))
+    checks = diagnosis.diagnose_inertial(wrong).sensors
+    assert checks is not None
+    scale, deviation = checks.gyroscope_scale
+    assert deviation < 0.01
+    assert scale == pytest.approx(1.05, abs=4.0 * deviation)
+    assert "gyro_scale" in {f.code for f in sensor_findings(checks)}
 
 
 def test_a_recording_without_tracks_is_refused_in_one_sentence(recording: data.Sequence) -> None:
