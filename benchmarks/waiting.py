@@ -26,11 +26,13 @@ from fgbaseline import data
 from . import page
 from .measured import Row, table
 from .metrics import drive
-from .revision import BEFORE, NoHistoryError, environment
+from .revision import BEFORE, ROOT, NoHistoryError, environment
 
 PLACE = Path("docs/performance.md")
 SHORT, MIDDLE, LONG = 600, 3000, 100_000
 """poses"""
+JOBS = 250
+"""of a bench: workers are busy with more of them in the same way"""
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
 
 
@@ -177,18 +179,21 @@ def _beside(place: Place) -> tuple[Side, Side]:
     return side(place.today), side(place.before)
 
 
-def _joint(place: Place) -> tuple[Side, Side]:
-    """Frames of the joint filter, and the dense algebra between them in the same process."""
-    source, taken = place.today.parents[1] / "source", dict[str, float]()
+def _within(module: str, ours: str, peer: str, *options: str) -> Callable[[Place], tuple[Side, Side]]:
+    """Sides that one process of today's measures, and prints as JSON under these keys."""
 
-    def ours() -> Taken:
-        words = [str(place.today / "python"), "-m", "benchmarks.joint_update"]
-        taken.update(
-            json.loads(subprocess.run(words, cwd=source, stdout=subprocess.PIPE, check=True, text=True).stdout)
-        )
-        return Taken(taken["frames"], taken["frames"])
+    def sides(_: Place) -> tuple[Side, Side]:
+        taken = dict[str, float]()
 
-    return ours, lambda: Taken(taken["algebra"], taken["algebra"])
+        def run() -> Taken:
+            words = [sys.executable, "-m", module, *options]
+            text = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, check=True, text=True).stdout
+            taken.update(json.loads(text))
+            return Taken(taken[ours], float("nan"))
+
+        return run, lambda: Taken(taken[peer], float("nan"))
+
+    return sides
 
 
 def _broken(name: str) -> Callable[[Place], Path]:
@@ -238,7 +243,13 @@ ALL = (
         "joint",
         "`joint-ekf` at 300 features a frame, to one Cholesky, one triangular solve and one symmetric update each",
         1.5,
-        _joint,
+        _within("benchmarks.joint_update", "frames", "algebra"),
+    ),
+    Waiting(
+        "bench",
+        f"{JOBS:,} short runs by `bench` on two workers of Dask, to the runs alone",
+        1.05,
+        _within("benchmarks.bench_overhead", "workers", "own", "--runs", str(JOBS)),
     ),
     Waiting("run", f"`run 03.npz` beside its estimators, to {BEFORE}", 0.5, _beside),
 )

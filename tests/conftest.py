@@ -32,6 +32,15 @@ LONGEST = (
     "test_check_ourselves",
     "test_hostile_recordings",
     "test_joint_ekf_consistency",
+    "test_bench_report",
+    "test_reference_real",
+    "test_causality",
+    "test_invariance",
+    "test_inertial",
+    "test_joint_ekf_real",
+    "test_page_look",
+    "test_run_command",
+    "test_inertial_problem",
 )
 """files that take half a minute and more: where they are shared out whole, none of them may be the last that runs"""
 

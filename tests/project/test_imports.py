@@ -99,6 +99,7 @@ def test_names_imported_on_use_are_those_that_type_checkers_see(package: str) ->
     assert homes == imported
     eager = {a.name for node in tree.body if isinstance(node, ast.ImportFrom) and node.level for a in node.names}
     assert {*homes, *eager} == set(module.__all__)
+    assert {*module.__all__} <= {*dir(module)}  # what editors complete
     for name in module.__all__:
         getattr(module, name)
 
