@@ -27,7 +27,6 @@ QUANTITIES = {
     "accelerometer_bias": ("acc. bias", "m/s²"),
 }
 """columns of `compare.velocity_and_bias_errors`, and how little room there is for their headings"""
-PAPER_BAND = "95 % if consistent"
 OVER_BAND, BELOW_ONE = "overconfident above the band", "overconfident below 1"
 
 
@@ -42,7 +41,7 @@ def nees(run: RunData) -> Figure | None:
 def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Reference NEES, NIS and sigma ratios over time; None without any of these. On paper also the NEES."""
     if not style.titled:
-        pose, innovation = _pose_band(PAPER_BAND, 0.6), _innovation_band(PAPER_BAND, 0.6)
+        pose, innovation = _pose_band(CONSISTENT, 0.6), _innovation_band(CONSISTENT, 0.6)
         panels = [
             Panel("NEES", "nees", 0.95, 5.0, pose),
             Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),

@@ -62,20 +62,22 @@ def time_panels(
         return None
     heights = [panel.height for panel, _ in shown]
     figure, axes = stacked_panels(style.room + sum(heights), len(shown), style, height_ratios=heights)
-    handles: list[Any] = []
+    lines: list[Any] = []
+    bands: list[Any] = []
     for on, (panel, series) in zip(axes, shown, strict=True):
-        handles += plot_series(on, run.t, series, run.line(style), **look)
+        lines += plot_series(on, run.t, series, run.line(style), **look)
         if panel.decades is None:
             fit_log_or_linear(on, series)
         else:
             fit_log(on, series, panel.decades)
         if panel.expected is not None:
-            handles += panel.expected(run, on)
+            bands += panel.expected(run, on)
         few_ticks(on, style)
         on.set_ylabel(panel.label)
         on.set_title(panel.title)
     time_axis(run, axes, style)
-    title_and_legend(figure, title, handles, style)
+    order = [run.line(style)(name)["label"] for name in run.names]  # a panel may lack the first of them
+    title_and_legend(figure, title, [*sorted(lines, key=lambda one: order.index(one.get_label())), *bands], style)
     return figure
 
 

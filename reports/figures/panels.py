@@ -18,7 +18,7 @@ DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
-CONSISTENT = "95 % chi-square band of a consistent estimator"
+CONSISTENT = "95 % if consistent"
 
 Line = Callable[[str], Mapping[str, Any]]
 """look of the line of an estimator"""

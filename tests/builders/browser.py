@@ -71,5 +71,10 @@ class Opened:
         found: list[dict[str, float]] = self.page.eval_on_selector_all(selector, script)
         return found
 
+    def unfold_values(self) -> None:
+        """Opens the charts' values as a table, which a later task of the browser fills: `toggle` is queued."""
+        self.page.click("summary:has-text('in numbers')")
+        self.page.wait_for_selector("#values td:not(:empty)")
+
     def set_frame(self, frame: int) -> None:
         self.page.eval_on_selector("#frame", f"e => {{ e.value = {frame}; e.dispatchEvent(new Event('input')); }}")

@@ -34,9 +34,10 @@ def commands(block: Block) -> list[str]:
 
 
 def file_name(block: Block) -> str | None:
-    """The name of the file that a block of TOML is, where its first line says so."""
-    first = re.match(r"# ([\w./-]+\.toml)\n", block.text)
-    return first[1] if first and block.language == "toml" else None
+    """The name of the file that a block of TOML or Python is, where its first line says so."""
+    ends = {"toml": "toml", "python": "py"}
+    first = re.match(r"# ([\w./-]+\.(\w+))\n", block.text)
+    return first[1] if first and ends.get(block.language) == first[2] else None
 
 
 def shown() -> list[tuple[str, str]]:

@@ -67,6 +67,15 @@ def test_on_the_screen() -> None:
             assert_legend_is_whole(name, figure)
 
 
+def test_a_legend_has_the_estimators_in_the_order_of_the_run_and_short_entries() -> None:
+    order = [label(name, "isam2") for name in NAMES]
+    for name, figure in drawn_ten().items():
+        entries = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        names = [entry for entry in entries if entry in order]
+        assert names == [entry for entry in order if entry in names], name
+        assert max(map(len, entries), default=0) <= 32, name
+
+
 def test_on_paper(tmp_path: Path) -> None:
     write_numbers(ten(), tmp_path)
     drawn = draw_for_paper(of_folder(tmp_path))

@@ -133,7 +133,7 @@ def test_a_frame_shows_the_outcome_of_each_observation_and_its_true_reprojection
 
 
 def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> None:
-    opened.page.click("summary:has-text('in numbers')")
+    opened.unfold_values()
     opened.set_frame(59)
     row = opened.text("#values tr:has-text('Divergence from isam2')")
     assert row.split("\t")[1:3] == [
@@ -272,7 +272,7 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     assert opened.count(f"{rotation} .line.estimator-1") == 1
     opened.page.uncheck('#estimators-shown input[value="1"]')
     assert opened.count("#path-view svg .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
-    opened.page.click("summary:has-text('in numbers')")
+    opened.unfold_values()
     row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
     at_ten = six().results["steady"].departure["position"][10]
     assert row[2] == f"{at_ten:#.3g}"

@@ -48,17 +48,22 @@ function thinned(line, [first, last], pixels) {
 
 const lineClass = key => `line estimator-${key}${isReference(key) ? " reference" : ""}`;
 
-const RESOLUTION = 1e-6;  // m and degrees, see formatting.py
+const RESOLUTIONS = { m: 1e-5, "°": 1e-5, px: 1e-4 };  // formatting.py; pixels are kept in 32 bits
 
-function quantity(value, unit = "") {
+// A figure without its unit; 0 for rounding.
+function figure(value, unit) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   let text;
-  if (size === 0 || (size < RESOLUTION && (unit === "m" || unit === "°"))) text = "0";
+  if (size === 0 || size < RESOLUTIONS[unit]) text = "0";
   else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
   else if (size >= 999.5) text = Math.round(value).toLocaleString("en");
   else text = value.toPrecision(3);
-  return text.replace("-", "−") + (unit === "°" ? "°" : unit ? "\u00a0" + unit : "");
+  return text.replace("-", "−");
+}
+
+function quantity(value, unit) {
+  return Number.isFinite(value) ? figure(value, unit) + (unit === "°" ? unit : unit ? "\u00a0" + unit : "") : "–";
 }
 
 const timeOf = frame => seconds[frame].toFixed(1) + "\u00a0s";
