@@ -1,7 +1,7 @@
 """Simulated recording: path, tracks and sensor data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -72,8 +72,14 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     if settings.imu is None:
         linear, angular = recorded_velocities(path, t, settings)
     else:
-        samples, *inertial = recorded_samples(path, t, settings)
-        truth = Truth(poses, tracks.first, "simulated", *inertial, up=np.array([0.0, 0.0, 1.0]))
+        samples, velocity, gyroscope_bias, accelerometer_bias = recorded_samples(path, t, settings)
+        truth = replace(
+            truth,
+            velocity=velocity,
+            gyroscope_bias=gyroscope_bias,
+            accelerometer_bias=accelerometer_bias,
+            up=np.array([0.0, 0.0, 1.0]),
+        )
     sequence = Sequence(
         name=f"simulated-{settings.path}",
         t=t,
