@@ -55,6 +55,8 @@ NOUNS = {
     "linear": {1e-3: "mm/s", 1e-2: "cm/s", 1.0 / 3.6: "km/h", 1e3: "km/s"},
     "baseline": {1e-3: "mm", 1e-2: "cm", 1e3: "km"},
 }
+SAME_RATIO = 0.05
+"""share by which turns and distances may differ beyond their noise where the stamps are the cause"""
 SETTLE_RATES = "write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
 SETTLE_DISTANCES = "write m/s and m, or the factors as linear_velocity and baseline in a table [units] in --repairs"
 
@@ -162,6 +164,12 @@ def _near_a_unit(units: Units, scale_ratios: tuple[ScaleRatio, ScaleRatio], give
 def _of_no_unit(scale_ratios: tuple[ScaleRatio, ScaleRatio], given: Mapping[str, float]) -> str:
     """Doubt about ratios that no units explain, unless the user states the unit."""
     angular, linear = scale_ratios
+    if angular.known and linear.known and "time" not in given and angular.admits(linear.ratio, SAME_RATIO):
+        return (
+            f"the recorded turns and distances are both {1.0 / linear.ratio:.4g} times those that the cameras see, as "
+            f"with stamps in a unit of {linear.ratio:.4g} s; write seconds, or the factor as time in a table [units] "
+            "in --repairs"
+        )
     turns = (time * rate for time in THOUSANDS for rate in ANGULAR)
     if angular.known and "angular" not in given and not any(_is_near(angular.ratio, factor) for factor in turns):
         return f"{doubt_of_rate_unit(angular, np.nan, '')}; {SETTLE_RATES}"

@@ -119,6 +119,14 @@ def test_a_factor_of_no_unit_is_refused_with_its_value(what: str, factor: float,
         calibrated(recording)
 
 
+@pytest.mark.parametrize("unit", [60.0, 3600.0])
+def test_stamps_in_minutes_or_hours_are_the_cause_named(unit: float) -> None:
+    doubt = known_units(scaled(drive(), "stamps", 1.0 / unit)).doubt
+    found = re.search(r"turns and distances are both .* as with stamps in a unit of ([\d.]+) s; write seconds", doubt)
+    assert found is not None, doubt
+    assert float(found.group(1)) == pytest.approx(unit, rel=0.03)
+
+
 @pytest.mark.parametrize("factor", [2.0, 0.5])
 def test_rates_twice_as_fast_as_seen_are_a_finding(factor: float) -> None:
     found = [f for f in findings_of(diagnose(scaled(drive(), "gyroscope", factor))) if f.code == "gyro_scale"]
