@@ -120,6 +120,7 @@ def test_compare_trajectories_answers_as_the_command(paths: Path, monkeypatch: p
     )
     assert ended.returncode == 0, ended.stderr
     figures_left_empty(monkeypatch)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # the pages have the second in which they were written
     result = fgbaseline.compare_trajectories("truth.tum", ["ekf.tum", "it=mine.tum"], align="yaw")
     result.report("ours")
     assert everything_in(paths / "ours") == everything_in(paths / "theirs")
