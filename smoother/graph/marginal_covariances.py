@@ -29,6 +29,11 @@ class _Joint(NamedTuple):
         """The columns of some of the variables, in the order of their keys."""
         return [i for columns in map(self.columns.__getitem__, keys) for i in columns]
 
+    def part(self, keys: list[int]) -> FloatArray:
+        """The joint covariance of some of the variables, in the order of their keys."""
+        columns = np.array(self.of(keys), dtype=np.int64)
+        return self.covariance.take(columns, axis=0).take(columns, axis=1)
+
 
 class _Conditional(NamedTuple):
     """p(x_i | x_S)."""
@@ -81,8 +86,7 @@ def marginal_covariances(
         d, key = len(conditionals[i].inverse), conditionals[i].key
         found[key] = clique.covariance[:d, :d].copy()  # a view would hold the whole
         if key in together:
-            columns = clique.of(together[key])
-            found_together[together[key][0]] = clique.covariance[columns][:, columns]
+            found_together[together[key][0]] = clique.part(together[key])
         inner = [child for child in children[i] if child in children or conditionals[child].key in together]
         pending.extend((child, clique) for child in inner)
         found |= _leaves([conditionals[child] for child in children[i] if child not in inner], clique)
@@ -128,9 +132,8 @@ def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
     for key in conditional.later:
         columns[key] = range(end, end + len(parent.columns[key]))
         end = columns[key].stop
-    among = parent.of(conditional.later)
     covariance = np.empty((end, end))
-    later = covariance[d:, d:] = parent.covariance[among][:, among]
+    later = covariance[d:, d:] = parent.part(conditional.later)
     gain = conditional.gain
     cross = gain @ later
     covariance[:d, d:], covariance[d:, :d] = -cross, -cross.T
@@ -141,13 +144,13 @@ def _joint(conditional: _Conditional, parent: _Joint) -> _Joint:
 def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]:
     """Covariances by key of variables whose later neighbors are all among those of `parent`."""
     result: dict[int, FloatArray] = {}
-    for d in {len(leaf.inverse) for leaf in leaves}:
-        chosen = [leaf for leaf in leaves if len(leaf.inverse) == d]
-        gain = np.zeros((len(chosen), d, len(parent.covariance)))
-        for i, leaf in enumerate(chosen):
-            gain[i][:, parent.of(leaf.later)] = leaf.gain
-        covariance = (gain @ parent.covariance) @ gain.transpose(0, 2, 1) + np.array([leaf.own for leaf in chosen])
-        result |= {leaf.key: covariance[i] for i, leaf in enumerate(chosen)}
+    gathered: dict[tuple[int, ...], FloatArray] = {}
+    for leaf in leaves:
+        neighbors = tuple(leaf.later)
+        if neighbors not in gathered:  # landmarks that the same frames see
+            gathered[neighbors] = parent.part(leaf.later)
+        gain = leaf.gain
+        result[leaf.key] = leaf.own + gain @ gathered[neighbors] @ gain.T
     return result
 
 

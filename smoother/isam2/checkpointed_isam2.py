@@ -39,6 +39,7 @@ class CheckpointedISAM2:
         self._first = pose_key(first)
         self._interval = interval
         self._updates = 0
+        self._groups = _Groups()
         self._take_checkpoint()
 
     def _take_checkpoint(self) -> None:
@@ -61,29 +62,45 @@ class CheckpointedISAM2:
         if len(self._since_checkpoint) >= max(self._interval, int(CHECKPOINT_SHARE * self._updates)):
             self._take_checkpoint()
         try:
-            result = _apply(self.tree, step)
+            result = self._apply(step)
             self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
         except (RuntimeError, IndexError) as error:
             self.tree = gtsam.ISAM2(self._checkpoint)
             for past in self._since_checkpoint:
-                _apply(self.tree, past)
+                self._apply(past)
             self._take_checkpoint()
             raise IndeterminateSystemError(named_variable(str(error)), str(error)) from error
         self._since_checkpoint.append(step)
         self._updates += 1
         return result
 
+    def _apply(self, step: Update) -> gtsam.ISAM2Result:
+        return self.tree.update(
+            step.factors,
+            step.values,
+            list(step.removed),
+            constrainedKeys=None if step.groups is None else self._groups.with_those_of(step.groups),
+            force_relinearize=step.relinearize,
+        )
 
-def _apply(tree: gtsam.ISAM2, step: Update) -> gtsam.ISAM2Result:
-    groups = None
-    if step.groups is not None:
-        groups = gtsam.KeyGroupMap()
-        for key, group in step.groups.items():
-            groups.insert2(key, group)
-    return tree.update(
-        step.factors,
-        step.values,
-        list(step.removed),
-        constrainedKeys=groups,
-        force_relinearize=step.relinearize,
-    )
+
+class _Groups:
+    """GTSAM's map of the elimination groups, in which the changes from one update to the next are set.
+
+    There are hundreds of groups and a dozen changes; every one set is a call of GTSAM.
+    """
+
+    def __init__(self) -> None:
+        self._map = gtsam.KeyGroupMap()
+        self._set: Mapping[int, int] = {}
+
+    def with_those_of(self, groups: Mapping[int, int]) -> gtsam.KeyGroupMap:
+        """GTSAM's map with these groups."""
+        for key in self._set.keys() - groups.keys():
+            self._map.erase(key)
+        for key, group in groups.items() - self._set.items():
+            if key in self._set:
+                self._map.erase(key)
+            self._map.insert2(key, group)
+        self._set = groups
+        return self._map

@@ -232,6 +232,15 @@ def test_the_example_compares_a_filter_of_twenty_lines(place: Place) -> None:
     assert str(namespace["svg"]).count("my-filter") == 1
 
 
+@pytest.mark.slow
+def test_the_example_on_raw_inertial_data_beats_dead_reckoning_and_shows_its_overconfidence(place: Place) -> None:
+    table = place.follow(ROOT / "docs" / "examples" / "my-inertial-filter.md")["table"]
+    mine, reckoned, joint = (table.loc[name] for name in ("my-inertial-filter", "dead-reckoning", "joint-ekf"))  # type: ignore[attr-defined]
+    for quantity in ("error to truth RMSE, m", "velocity RMSE, m/s"):
+        assert joint[quantity] < mine[quantity] < 0.5 * reckoned[quantity]
+    assert mine["NEES of the 15 states, median"] > 10.0 * joint["NEES of the 15 states, median"]
+
+
 def test_a_command_that_does_not_run_is_noticed(place: Place) -> None:
     (unknown,) = commands(Block("", "fgbaseline run drive.npz --no-such-option\n"))
     with pytest.raises(click.UsageError):

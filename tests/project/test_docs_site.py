@@ -95,6 +95,13 @@ def test_the_example_of_the_site_runs(site: Path) -> None:
     assert "Traceback" not in text
 
 
+def test_the_inertial_example_of_the_site_runs(site: Path) -> None:
+    text = (site / "examples" / "my-inertial-filter.html").read_text()
+    assert text.count('class="dataframe"') == 1
+    assert "inertial samples" in text
+    assert "Traceback" not in text
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
 def test_docs_opened_from_a_folder_are_searchable_offline(site: Path, width: int, scheme: str) -> None:
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

@@ -118,3 +118,23 @@ def test_the_tail_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     keys = {key for i in range(graph.size()) for key in list(graph.at(i).keys())}
     assert pose_key(0) in keys
     assert AUXILIARY_POSE not in keys
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.booleans(), st.booleans()), min_size=1, max_size=70), st.booleans())
+def test_groups_that_are_kept_from_frame_to_frame_are_those_made_anew(
+    frames: list[tuple[int, bool, bool]], inertial: bool
+) -> None:
+    """Landmarks of one frame stay, come back or are removed; another ordering makes all of its groups in each frame."""
+    kept, anew, fresh = EliminationOrdering(inertial), EliminationOrdering(inertial), 0
+    alive: list[int] = []
+    for frame, (n, remove, back) in enumerate(frames):
+        sights = [*alive[-n // 2 :], *(alive[:2] if back else []), *(key(fresh + i) for i in range(n))]
+        sights, fresh = list(dict.fromkeys(sights)), fresh + n
+        alive = sights
+        if remove and frame > 0:
+            gone, alive = sights[:1], sights[1:]
+            sights = alive
+            for ordering in (kept, anew):
+                ordering.remove(gone)
+        anew._valid_for = ()
+        assert kept.groups(frame, sights) == anew.groups(frame, sights)
