@@ -1,9 +1,11 @@
 """Images to tracks: pairs are read, rectified and tracked one at a time."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
 
@@ -137,7 +139,8 @@ def track_images(
     T = len(recording.t)
     kept: list[int] = []
     unreadable: list[str] = []
-    numbers, pixels = [], []
+    numbers: list[NDArray[np.int32]] = []
+    pixels: list[NDArray[np.float32]] = []
     for k, pair in enumerate(recording.pairs()):
         if pair.left is None or pair.right is None:
             unreadable.append(pair.name)
@@ -149,17 +152,13 @@ def track_images(
         if pictures is not None:
             pictures.add(len(kept), float(recording.t[k]), left, right)
         kept.append(k)
-        numbers.append(points.number)
+        numbers.append(points.number.astype(np.int32))
         pixels.append(points.pixel.astype(np.float32))  # as OpenCV gives them
         if progress is not None:
             progress(k + 1, T)
     if len(kept) < 2:
         raise InputError(f"{recording.source}: {plural(len(kept), 'pair')} of {T} can be read; check the images")
-    frame = np.repeat(np.arange(len(kept)), [len(number) for number in numbers])
-    number = np.concatenate(numbers)
-    chosen = np.bincount(number, minlength=1)[number] > 1  # what is seen once says nothing of the motion
-    track_number, landmark = np.unique(number[chosen], return_inverse=True)
-    observations = Observations.sort(frame[chosen], landmark, np.concatenate(pixels)[chosen].astype(np.float64))
+    observations, n_landmarks = _observations(numbers, pixels)
     is_kept = np.zeros(T, dtype=np.bool_)
     is_kept[kept] = True
     left_out = tuple(np.flatnonzero(~is_kept).tolist())
@@ -168,7 +167,30 @@ def track_images(
         names = ", ".join(unreadable[:NAMED]) + (" and more" if len(unreadable) > NAMED else "")
         text = f"{plural(len(unreadable), 'pair')} of {T} cannot be read and are left out: {names}."
         recording = replace(recording, remarks=(*recording.remarks, text))
-    return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, observations, len(track_number), left_out)
+    return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, observations, n_landmarks, left_out)
+
+
+def _observations(numbers: list[NDArray[np.int32]], pixels: list[NDArray[np.float32]]) -> tuple[Observations, int]:
+    """Observations of the tracks with two or more, and the number of these tracks; empties both lists.
+
+    `numbers` has the tracks of each frame, rising, and `pixels` (n, 4) their points. A long recording has gigabytes of
+    them: they are copied once, frame by frame.
+    """
+    each = np.array([len(number) for number in numbers])
+    number = np.concatenate(numbers)
+    numbers.clear()
+    is_track = np.bincount(number, minlength=1) > 1  # what is seen once says nothing of the motion
+    chosen = is_track[number]
+    landmark = (np.cumsum(is_track) - 1)[number[chosen]]
+    frame = np.repeat(np.arange(len(each)), each)[chosen]
+    pixel, starts = np.empty((len(frame), 4)), np.concatenate([[0], np.cumsum(each)])
+    pixels.reverse()
+    done = 0
+    for first, last in pairwise(starts.tolist()):
+        points = pixels.pop()[chosen[first:last]]
+        pixel[done : done + len(points)] = points
+        done += len(points)
+    return Observations(frame, landmark, pixel), int(is_track.sum())
 
 
 def _require_motion(r: ImageRecording) -> None:

@@ -1,6 +1,7 @@
 """Recordings of images in every form that is read, written from rendered images: what is found, and what is refused."""
 
 import shutil
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from click.testing import CliRunner
 
 from fgbaseline.data import Sequence, read
 from fgbaseline.data.formats import write_npz
-from fgbaseline.data.tracking import ImageOptions, track
+from fgbaseline.data.tracking import ImageOptions, TrackerSettings, track
 from fgbaseline.data.tracking.sources import ImageRecording, open_recording
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.cli.main import group
@@ -152,6 +153,29 @@ def test_kitti_odometry_has_no_motion(euroc: Path, tmp_path: Path, room: Room) -
     direct = track(folder, options, motion=True).sequence()
     np.testing.assert_array_equal(direct.imu_T_cam, sequence.imu_T_cam)
     np.testing.assert_array_equal(direct.linear_velocity, sequence.linear_velocity)
+
+
+def test_memory_grows_with_the_observations_and_not_with_the_images(euroc: Path, tmp_path: Path) -> None:
+    """Peaks of 6 and 36 frames, in bytes: what is between them is at most 150 for each observation."""
+    folder = kitti_odometry(euroc, tmp_path / "06")
+    images = [sorted((folder / f"image_{i}").iterdir()) for i in (0, 1)]
+
+    def peak() -> tuple[int, int]:
+        tracemalloc.start()
+        found = track(folder, settings=TrackerSettings(max_features=60))
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most, len(found.observations)
+
+    peak()  # what is imported and set up once
+    few = peak()
+    for side in images:
+        for k in range(N, 6 * N):
+            (side[0].parent / f"{k:06d}.png").symlink_to(side[min(k % 10, 10 - k % 10)])
+    (folder / "times.txt").write_text("\n".join(str(k / 20) for k in range(6 * N)))
+    many = peak()
+    assert many[1] > 5 * few[1]
+    assert many[0] - few[0] < 150 * (many[1] - few[1])
 
 
 def test_kitti_raw(recordings: Callable[[str], Path]) -> None:
