@@ -132,11 +132,13 @@ def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
     """What the template needs of the plots besides their data."""
     numbered = list(enumerate(plots["charts"]))
     shown = [(str(i), one["name"]) for i, one in enumerate(plots["estimators"]) if one["answered"]]
+    has = {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")}
+    has["band"] = any(one.get("covariance") for one in plots["estimators"] if one["name"] == plots["reference"])
     return {
         "script": script(),
         "data": embedded_json(plots),
         "groups": [(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
-        "has": {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")},
+        "has": has,
         "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
     }
 

@@ -98,6 +98,23 @@ def test_offsets_from_the_reference_are_enlarged_pose_by_pose(opened: Opened) ->
     assert "offset" not in opened.text("#path-view .plot")
 
 
+def test_the_band_of_the_reference_holds_95_percent_across_its_path(opened: Opened) -> None:
+    """The covariance of 1e-2 m^2 is that of every axis, so the band is 2 x 1.96 x 0.1 m wide everywhere."""
+    band = f"#path-view .bounds.{REFERENCE_LINE}"
+    assert opened.count(band) == 0
+    opened.page.click('[data-do="band"]')
+    assert opened.attribute('[data-do="band"]', "aria-pressed") == "true"
+    edges = np.array(opened.attribute(band, "points").split(), dtype=np.float64).reshape(2, -1, 2)
+    (ruler,) = opened.boxes("#path-view .ruler")
+    meters = float(opened.text("#path-view .plot").split(" m")[0].split()[-1])
+    widths = np.linalg.norm(edges[0] - edges[1, ::-1], axis=1)
+    np.testing.assert_allclose(widths, 2.0 * 1.96 * 0.1 * ruler["width"] / meters, atol=0.3)
+    opened.page.select_option("#path-view select", "10")
+    assert opened.attribute(band, "points").split() != [f"{value:.1f}" for value in edges.ravel()]
+    opened.page.uncheck('#estimators-shown input[value="5"]')
+    assert opened.count(band) == 0
+
+
 def test_the_picture_follows_the_cursor_until_it_is_dragged(opened: Opened) -> None:
     here, center = f"#path-view .here.{REFERENCE_LINE}", middle(opened, "#path-view .plot")
     opened.page.click('[data-do="follow"]')

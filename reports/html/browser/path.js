@@ -2,6 +2,12 @@
 // Paths that coincide are drawn apart: their offsets from the reference, pose by pose, times a factor.
 const ELLIPSES = 25;
 const CHI = Math.sqrt(5.991);  // 95 % of a plane's two degrees of freedom
+const ACROSS = 1.96;  // sigmas: 95 % of one degree of freedom
+const EDGES = 400;  // points of an edge of the band
+
+// a^T P b of the packed covariance xx, xy, xz, yy, yz, zz.
+const times = (P, a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2] * b[2]
+  + P[1] * (a[0] * b[1] + a[1] * b[0]) + P[2] * (a[0] * b[2] + a[2] * b[0]) + P[4] * (a[1] * b[2] + a[2] * b[1]);
 
 class PathView {
   constructor(place) {
@@ -12,6 +18,7 @@ class PathView {
     this.solid = false;
     this.landmarks = false;
     this.ellipses = false;
+    this.band = false;
     this.follow = false;
     this.factor = 1;
     this.reference = [...trajectories.values()].find(trajectory => isReference(trajectory.key));
@@ -111,6 +118,9 @@ class PathView {
       const placed = this.factor === 1 ? shown : shown.filter(trajectory => trajectory === this.reference);
       for (const trajectory of placed) if (trajectory.points) parts.push(svg("path", { class: "dots estimator-" + trajectory.key, d: this.dots(trajectory.points) }));
     }
+    if (this.band && shown.includes(this.reference)) {
+      parts.push(svg("polygon", { class: "bounds estimator-" + this.reference.key, points: this.bandAround(this.reference) }));
+    }
     for (const trajectory of shown) parts.push(svg("path", { class: lineClass(trajectory.key), d: this.track(this.path(trajectory)) }));
     if (this.ellipses) {
       const every = Math.max(1, Math.floor(run.frames / ELLIPSES));
@@ -166,13 +176,33 @@ class PathView {
     return d;
   }
 
+  // Edges of the band that holds 95 % of the positions across the path, as seen in this picture.
+  bandAround({ path, covariance }) {
+    const step = Math.max(1, Math.floor(run.frames / EDGES));
+    const edges = [[], []];
+    let before = null;
+    let across = null;  // that of the last motion, while it stands
+    for (let k = 0; k < run.frames; k += step) {
+      const P = covariance.subarray(6 * k, 6 * k + 6);
+      if (!Number.isFinite(path[3 * k] + P[0])) continue;
+      const at = this.project(path, 3 * k);
+      const [dx, dy] = before ? [at[0] - before[0], at[1] - before[1]] : [0, 0];
+      const length = Math.hypot(dx, dy);
+      if (length > 0.2) across = [-dy / length, dx / length];
+      if (length > 0.2 || before === null) before = at;
+      if (across === null) continue;
+      const direction = this.right.map((value, i) => across[0] * value - across[1] * this.up[i]);
+      const wide = ACROSS * this.factor * this.scale * Math.sqrt(Math.max(0, times(P, direction, direction)));
+      [1, -1].forEach((side, i) => edges[i].push(at.map((value, j) => bounded(value + side * wide * across[j])).join(" ")));
+    }
+    return [...edges[0], ...edges[1].reverse()].join(" ");
+  }
+
   // Where 95 % of the positions would be, as seen in this picture.
   ellipse(trajectory, k) {
     const P = trajectory.covariance.subarray(6 * k, 6 * k + 6);
     if (!Number.isFinite(P[0]) || !Number.isFinite(trajectory.path[3 * k])) return "";
-    const times = (a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2] * b[2]
-      + P[1] * (a[0] * b[1] + a[1] * b[0]) + P[2] * (a[0] * b[2] + a[2] * b[0]) + P[4] * (a[1] * b[2] + a[2] * b[1]);
-    const [a, b, c] = [times(this.right, this.right), times(this.right, this.up), times(this.up, this.up)];
+    const [a, b, c] = [times(P, this.right, this.right), times(P, this.right, this.up), times(P, this.up, this.up)];
     const middle = (a + c) / 2;
     const apart = Math.hypot((a - c) / 2, b);
     if (!(middle - apart >= 0)) return "";
@@ -340,7 +370,7 @@ class PathView {
     for (const button of place.querySelectorAll("button")) {
       const what = button.dataset.do;
       button.addEventListener("click", () => {
-        if (["solid", "landmarks", "ellipses", "follow"].includes(what)) {
+        if (["solid", "landmarks", "ellipses", "band", "follow"].includes(what)) {
           this[what] = !this[what];
           press(button, this[what]);
           if (what === "solid") {
