@@ -95,7 +95,7 @@ def quantity(value: float, unit: str) -> str:
     """A finding's figure: a share as per cent, a physical unit beside the number, and none beside a count."""
     if unit.startswith("share"):
         return per_cent(value)
-    if unit in ("m/s", "rad/s", "°"):
+    if unit in ("m/s", "rad/s", "°", "px", "s"):
         return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
     return number(int(value) if float(value).is_integer() else value)
 

@@ -60,6 +60,7 @@ def test_six_sentences_stand_on_top_and_the_rest_is_folded_away() -> None:
         (0.5, "share of the tracks", "50 %"),
         (0.02, "m/s", "0.0200\N{NO-BREAK SPACE}m/s"),
         (0.793, "°", "0.793°"),
+        (0.361, "px", "0.361\N{NO-BREAK SPACE}px"),
         (1.06, "recorded over seen", "1.06"),
         (12.0, "frames", "12"),
     ],
