@@ -183,7 +183,7 @@ def test_the_page_is_operable_by_keyboard(opened: Opened) -> None:
     assert opened.attribute("#path-view .line.estimator-1", "d") == before
     reached = {""}
     opened.page.focus(".skip")
-    for _ in range(110):
+    for _ in range(130):
         opened.page.keyboard.press("Tab")
         reached.add(str(opened.page.evaluate("document.activeElement.id || document.activeElement.dataset.do || ''")))
     assert {"solid", "landmarks", "ellipses", "in", "out", "reset", "frame", "play"} <= reached
