@@ -84,6 +84,7 @@ HOURS = {
     "make mutants",
     "make bench",
     "make bench BENCH_FLAGS=--quick",
+    "python -m benchmarks.waiting",
     "python -m benchmarks.isam2_variants 2011_09_26_drive_0036_sync_KLT.mat",
 }
 """commands of which there is no cheap form"""
