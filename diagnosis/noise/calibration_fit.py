@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr, stdtrit
 
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
@@ -97,6 +96,8 @@ def fit_windows(
 def _widening(redundancy: FloatArray) -> float:
     """Factor of standard errors by the redundancies (n, 6) of the velocities from which the noise is estimated."""
     freedom = EFFICIENCY * min(float(redundancy[:, :3].sum()), float(redundancy[:, 3:].sum()))
+    from scipy.special import ndtr, stdtrit
+
     return float(-stdtrit(max(freedom, 1.0), float(ndtr(-SIGNIFICANT))) / SIGNIFICANT)
 
 

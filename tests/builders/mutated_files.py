@@ -61,7 +61,7 @@ class Form:
 
 
 FULL = Form(120, ("town", "handheld", "loop"), 1.0, 1.0, figures=True)
-FAST = Form(32, ("town", "handheld", "loop"), 1 / 3, 0.3, figures=False)
+FAST = Form(32, ("town", "handheld", "highway"), 1 / 3, 0.3, figures=False)
 """about a second of a busy processor, where `FULL` takes six"""
 
 
