@@ -52,8 +52,8 @@ SI = {"time": "s", "angular": "rad/s", "linear": "m/s", "baseline": "m"}
 NOUNS = {
     "time": {unit.seconds: unit.noun for unit in TimeUnit},
     "angular": {DEGREE: "°/s", 1e-3: "mrad/s"},
-    "linear": {1e-3: "mm/s", 1e-2: "cm/s", 1.0 / 3.6: "km/h", 1e3: "km/s"},
-    "baseline": {1e-3: "mm", 1e-2: "cm", 1e3: "km"},
+    "linear": {1e-3: "mm/s", CENTI: "cm/s", KMH: "km/h", 1e3: "km/s"},
+    "baseline": {1e-3: "mm", CENTI: "cm", 1e3: "km"},
 }
 SAME_RATIO = 0.05
 """share by which turns and distances may differ beyond their noise where the stamps are the cause"""

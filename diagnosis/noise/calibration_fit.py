@@ -63,8 +63,8 @@ def fit_windows(
     """The fit of windows spread over the recording; None where no window has enough observations.
 
     `twist` (T-1, 6) is the recorded velocity of each interval in the axes of imu_T_cam, `deviation` (T-1, 6) that of
-    interpolated ones. The sigmas are the variance
-    components at which squared residuals match their degrees of freedom, as medians over axes and windows.
+    interpolated ones. The sigmas are the variance components at which squared residuals match their degrees of freedom,
+    as medians over axes and windows.
     """
     windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
     if not windows:
@@ -95,9 +95,9 @@ def fit_windows(
 
 def _widening(redundancy: FloatArray) -> float:
     """Factor of standard errors by the redundancies (n, 6) of the velocities from which the noise is estimated."""
-    freedom = EFFICIENCY * min(float(redundancy[:, :3].sum()), float(redundancy[:, 3:].sum()))
-    from scipy.special import ndtr, stdtrit
+    from scipy.special import ndtr, stdtrit  # a refused file does not wait for scipy
 
+    freedom = EFFICIENCY * min(float(redundancy[:, :3].sum()), float(redundancy[:, 3:].sum()))
     return float(-stdtrit(max(freedom, 1.0), float(ndtr(-SIGNIFICANT))) / SIGNIFICANT)
 
 

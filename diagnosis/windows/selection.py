@@ -66,7 +66,7 @@ def windows_of(
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
     starts, before = o.frame_starts(sequence.n_frames), 0
     parts: list[tuple[WindowData, FloatArray]] = []
-    sights, views, rows = [], [], []
+    observed, views, rows = [], [], []
     for start, size in spans:
         chosen = np.arange(starts[start], starts[start + size])
         chosen = chosen[chain[chosen] >= 0]
@@ -81,13 +81,13 @@ def windows_of(
         rows_of_pixels = measured_rows(o.pixel[chosen])
         data = WindowData(frame, row, rows_of_pixels, twist[intervals], dt[intervals], deviation[intervals])
         parts.append((data, poses))
-        sights.append(chosen)
+        observed.append(chosen)
         views.append((poses @ sequence.imu_T_cam)[frame])
         rows.append(row + before)
         before += int(row.max()) + 1
     if not parts:
         return []
-    pixel, row = o.pixel[np.concatenate(sights)], np.concatenate(rows)
+    pixel, row = o.pixel[np.concatenate(observed)], np.concatenate(rows)
     unit = StereoMeasurement(sequence.camera, 1.0, HuberKernel())
     points = triangulate_tracks(unit, np.concatenate(views), row, pixel, before).position
     ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]

@@ -11,7 +11,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 
 from .landmark_representation import WorldPoints
 
-AT_INFINITY = "its sights put it at infinity or beyond"
+AT_INFINITY = "its observations put it at infinity or beyond"
 FULL = "the state was full while it was seen"
 NOT_INITIALIZED = "no frame that was believed saw it"
 

@@ -26,19 +26,11 @@ class EliminationOrdering:
         self._inertial = inertial
         self._seen: dict[int, int] = {}
         """key of a landmark -> frame that saw it last; those seen last are at the end"""
-        self._groups: dict[int, int] = {}
-        """as last returned, where the next frame changes a few of them only"""
-        self._valid_for: tuple[int, ...] = ()
-        """what the groups of older frames depend on, and the frame that may follow"""
-        self._observed: list[int] = []
-        """landmarks (keys) of the last frame"""
 
     def remove(self, landmarks: Collection[int]) -> None:
         """Remove landmarks (keys): GTSAM accepts no group of an unknown variable."""
         for key in landmarks:
             self._seen.pop(key, None)
-        if landmarks:
-            self._valid_for = ()
 
     def groups(
         self, frame: int, landmarks: Collection[int], *, first: int = 0, all_new: bool = False
@@ -50,11 +42,10 @@ class EliminationOrdering:
         before is eliminated last as well: the system may be close to indeterminate, and GTSAM then names a landmark
         instead of a pose.
         """
-        seen, valid, observed = self._seen, self._valid_for, self._observed
+        seen = self._seen
         for key in landmarks:
             seen.pop(key, None)
             seen[key] = frame
-        self._observed, self._valid_for = list(landmarks), ()
         # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
         most = len(landmarks) + (frame > 0)
         if len(landmarks) > MANY_LANDMARKS:
@@ -65,12 +56,6 @@ class EliminationOrdering:
             return self._with_states(together | {AUXILIARY_POSE: last + 1}, frame)
         last, age = min(N_GROUPS, most), (frame - 1) // GROUP_FRAMES
         oldest = max(first, GROUP_FRAMES * (age - last + 2))
-        newest = dict.fromkeys([pose_key(frame), *landmarks], last) | {AUXILIARY_POSE: last + 1}
-        self._valid_for = (frame + 1, age, last, first)
-        if last > 1 and valid == (frame, age, last, first):  # else the frame before is not listed
-            before = dict.fromkeys([pose_key(frame - 1), *(key for key in observed if seen[key] < frame)], last - 1)
-            self._groups |= self._with_states(before | newest, frame)
-            return self._groups.copy()
         of_frame = [last - 1 - age + k // GROUP_FRAMES for k in range(oldest, frame)]
         groups = {pose_key(k): group for k, group in enumerate(of_frame, oldest)}
         for key in reversed(seen):
@@ -78,8 +63,8 @@ class EliminationOrdering:
                 break
             if seen[key] < frame:
                 groups[key] = of_frame[seen[key] - oldest]
-        self._groups = self._with_states(groups | newest, frame)
-        return self._groups.copy()
+        newest = dict.fromkeys([pose_key(frame), *landmarks], last) | {AUXILIARY_POSE: last + 1}
+        return self._with_states(groups | newest, frame)
 
     def _with_states(self, groups: dict[int, int], newest: int) -> dict[int, int]:
         """Groups with those of velocities and biases.

@@ -126,9 +126,8 @@ class IncrementalSmoother:
         k, new = update.frame, back - self._dropped
         if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
             self._first = 0
-            self._marginalize_at = max(
-                self._marginalize_at, 2 * k
-            )  # so that all of these together cost no more than one
+            # next after twice as many frames: all earlier restorations together cost no more than the last
+            self._marginalize_at = max(self._marginalize_at, 2 * k)
             return update
         self.events += [
             Event(

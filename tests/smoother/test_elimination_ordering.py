@@ -13,7 +13,7 @@ from fgbaseline.data import Problem
 from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import NoiseSettings
-from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key
+from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key, state_keys
 from fgbaseline.smoother.isam2 import estimator
 from fgbaseline.smoother.isam2.elimination_ordering import GROUP_FRAMES, MANY_LANDMARKS, N_GROUPS, EliminationOrdering
 
@@ -50,9 +50,9 @@ def test_older_variables_are_eliminated_first() -> None:
 def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool]]) -> None:
     ordering, fresh_landmark = EliminationOrdering(), 0
     for frame, (n, all_new) in enumerate(frames):
-        sights = [key(fresh_landmark + i) for i in range(n)]
+        observed = [key(fresh_landmark + i) for i in range(n)]
         fresh_landmark += n
-        groups = ordering.groups(frame, sights, all_new=all_new)
+        groups = ordering.groups(frame, observed, all_new=all_new)
         variables = 2 + (frame > 0) + n
         assert max(groups.values()) < variables
         assert groups[AUXILIARY_POSE] > max(group for k, group in groups.items() if k != AUXILIARY_POSE)
@@ -121,20 +121,31 @@ def test_the_tail_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.booleans(), st.booleans()), min_size=1, max_size=70), st.booleans())
-def test_groups_that_are_kept_from_frame_to_frame_are_those_made_anew(
+def test_a_variable_is_in_the_group_of_the_frame_that_observed_it_last(
     frames: list[tuple[int, bool, bool]], inertial: bool
 ) -> None:
-    """Landmarks of one frame stay, come back or are removed; another ordering makes all of its groups in each frame."""
-    kept, anew, fresh = EliminationOrdering(inertial), EliminationOrdering(inertial), 0
+    """Landmarks of one frame stay, come back or are removed; velocities and biases are in the group of their pose."""
+    ordering, fresh = EliminationOrdering(inertial), 0
     alive: list[int] = []
+    last_frame: dict[int, int] = {}
     for frame, (n, remove, back) in enumerate(frames):
-        sights = [*alive[-n // 2 :], *(alive[:2] if back else []), *(key(fresh + i) for i in range(n))]
-        sights, fresh = list(dict.fromkeys(sights)), fresh + n
-        alive = sights
+        observed = [*alive[-n // 2 :], *(alive[:2] if back else []), *(key(fresh + i) for i in range(n))]
+        observed, fresh = list(dict.fromkeys(observed)), fresh + n
         if remove and frame > 0:
-            gone, alive = sights[:1], sights[1:]
-            sights = alive
-            for ordering in (kept, anew):
-                ordering.remove(gone)
-        anew._valid_for = ()
-        assert kept.groups(frame, sights) == anew.groups(frame, sights)
+            ordering.remove(observed[:1])
+            last_frame.pop(next(iter(observed), -1), None)
+            observed = observed[1:]
+        alive = observed
+        last_frame |= dict.fromkeys([*state_keys(frame, inertial), *observed], frame)
+        last = min(N_GROUPS, len(observed) + (frame > 0))
+        age = {k: (frame - 1) // GROUP_FRAMES - k // GROUP_FRAMES for k in range(frame)}
+        groups = {name: last - 1 - age[k] for name, k in last_frame.items() if k < frame}
+        groups |= dict.fromkeys(observed, last) | dict.fromkeys(state_keys(frame, inertial), last + inertial)
+        groups[AUXILIARY_POSE] = last + 1 + inertial
+        listed = ordering.groups(frame, observed)  # those that are not listed are in group 0
+        assert positive(listed) == positive(groups)
+
+
+def positive(groups: dict[int, int]) -> dict[int, int]:
+    """Groups that are eliminated after the first."""
+    return {name: group for name, group in groups.items() if group > 0}
