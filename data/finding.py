@@ -2,7 +2,16 @@
 
 from dataclasses import dataclass
 
-UNITS = frozenset({"time_unit", "imu_time_unit", "angular_velocity_unit", "linear_velocity_unit", "baseline_unit"})
+UNITS = frozenset(
+    {
+        "time_unit",
+        "imu_time_unit",
+        "angular_velocity_unit",
+        "linear_velocity_unit",
+        "baseline_unit",
+        "extrinsic_unit",
+    }
+)
 """codes of values in units other than SI"""
 OF_THE_FILE = frozenset(
     {
@@ -12,6 +21,7 @@ OF_THE_FILE = frozenset(
         "doubled_samples",
         "frames_without_samples",
         "extrinsic_inverse",
+        "intrinsics",
         *UNITS,
     }
 )

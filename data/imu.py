@@ -13,12 +13,16 @@ STANDARD_GRAVITY = 9.81
 """m/s^2, where a recording does not state it"""
 
 
+DENSITIES = (1e-9, 1e3)
+"""smallest noise density and largest density or walk of any inertial sensor"""
+
+
 @dataclass(frozen=True, slots=True)
 class ImuNoise:
     """Noise of an IMU in continuous time, as EuRoC's `sensor.yaml` and Kalibr's `imu.yaml` have it.
 
-    measured = true + bias + white noise; the biases are random walks. Raises InputError for a density that is not
-    positive, and for a walk that is negative.
+    measured = true + bias + white noise; the biases are random walks. Raises InputError for a density out of
+    `DENSITIES`, and for a walk that is negative or larger.
     """
 
     gyroscope_density: float
@@ -38,10 +42,9 @@ class ImuNoise:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            density = field.name.endswith("density")
-            if not (np.isfinite(value) and (value > 0.0 if density else value >= 0.0)):
-                expected = "a positive number" if density else "a number from 0 on"
-                raise InputError(f"imu_noise: {field.name} is {value!r}, expected {expected}")
+            least, most = DENSITIES[0] if field.name.endswith("density") else 0.0, DENSITIES[1]
+            if not least <= value <= most:
+                raise InputError(f"imu_noise: {field.name} is {value!r}, expected a number from {least:g} to {most:g}")
 
 
 ASSUMED_NOISE = ImuNoise(1e-3, 1e-5, 2e-2, 1e-3)

@@ -141,9 +141,7 @@ def check_trajectory(path: Trajectory) -> FloatArray:
     _require(
         np.asarray((np.abs(poses[:, :3, 3]) <= FARTHEST).all(axis=1), dtype=np.bool_),
         path,
-        lambda i: (
-            f"its position {poses[i, :3, 3].tolist()} is beyond {FARTHEST:g} m; give meters, of a path that holds"
-        ),
+        lambda i: f"its position {poses[i, :3, 3].tolist()} is beyond {FARTHEST:g} m; write positions in m",
     )
     with np.errstate(over="ignore", invalid="ignore"):
         last_row = [np.abs(poses[:, 3, i] - float(i == 3)) for i in range(4)]

@@ -26,6 +26,7 @@ from fgbaseline.geometry import FloatArray
 from ..odometry.stereo_odometry import Odometry
 from .jumps import FAR_BLIND, among_neighbors
 from .rate_units import CALIBRATED, DEGREE, doubt_of_rate_unit, measured, of_no_unit
+from .rig import BASELINES, usual_rig
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
@@ -34,10 +35,6 @@ CENTI, KMH, FEET = 1e-2, 1.0 / 3.6, 0.3048
 """of cm or cm/s, km/h and ft/s"""
 TOLERANCE = 0.45
 """of the decadic logarithm of a ratio, for factors of 1000 and degrees; other units have to fit within the noise"""
-BASELINES = (0.01, 5.0)
-"""m, of stereo rigs"""
-FARTHEST_CAMERA = 20.0
-"""m from the IMU"""
 UNUSUAL = 1.5
 """number of wrong units equivalent to an implausible interval or baseline"""
 LEAD = 1.0
@@ -47,14 +44,23 @@ MIN_KNOWN = 20
 OVERSHOOT, LARGE_RATE = 20.0, 0.3
 """times what the cameras see, and rad/s: rates beyond both are no noise of a gyroscope"""
 NAMES = ("time", "angular", "linear", "baseline")
-LABELS = {"time": "stamps", "angular": "angular velocities", "linear": "linear velocities", "baseline": "the baseline"}
-SI = {"time": "s", "angular": "rad/s", "linear": "m/s", "baseline": "m"}
+LABELS = {
+    "time": "stamps",
+    "angular": "angular velocities",
+    "linear": "linear velocities",
+    "baseline": "the baseline",
+    "extrinsic": "the translation of imu_T_cam",
+}
+SI = {"time": "s", "angular": "rad/s", "linear": "m/s", "baseline": "m", "extrinsic": "m"}
+LENGTHS = {1e-3: "mm", CENTI: "cm", 1e3: "km"}
 NOUNS = {
     "time": {unit.seconds: unit.noun for unit in TimeUnit},
     "angular": {DEGREE: "°/s", 1e-3: "mrad/s"},
     "linear": {1e-3: "mm/s", CENTI: "cm/s", KMH: "km/h", 1e3: "km/s"},
-    "baseline": {1e-3: "mm", CENTI: "cm", 1e3: "km"},
+    "baseline": LENGTHS,
+    "extrinsic": LENGTHS,
 }
+TURNS = "the camera's velocity in turns"
 SAME_RATIO = 0.05
 """share by which turns and distances may differ beyond their noise where the stamps are the cause"""
 SETTLE_RATES = "write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
@@ -73,6 +79,8 @@ class Units:
     """m/s"""
     baseline: float = 1.0
     """m"""
+    extrinsic: float = 1.0
+    """m, of the translation of imu_T_cam"""
     doubt: str = ""
     scale_ratios: tuple[ScaleRatio, ScaleRatio] | None = None
     """of angular and linear velocity"""
@@ -82,27 +90,13 @@ class Units:
     @property
     def wrong(self) -> int:
         """The number of factors other than 1."""
-        return sum(factor != 1.0 for factor in (self.time, self.angular, self.linear, self.baseline))
-
-
-def usual_baseline(sequence: Sequence) -> Sequence:
-    """The recording with an implausible baseline scaled to a plausible one, for odometry, which works at any scale.
-
-    The camera is then placed at the IMU, since the unit of its position is unknown.
-    """
-    b = sequence.camera.baseline
-    if BASELINES[0] <= b <= BASELINES[1]:
-        return sequence
-    factor = 1000.0 ** -round(np.log(b / 0.2) / np.log(1000.0))
-    imu_T_cam = sequence.imu_T_cam.copy()
-    imu_T_cam[:3, 3] = 0.0
-    return replace(sequence, camera=replace(sequence.camera, baseline=b * factor), imu_T_cam=imu_T_cam)
+        return sum(factor != 1.0 for factor in (self.time, self.angular, self.linear, self.baseline, self.extrinsic))
 
 
 def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mapping[str, float] | None = None) -> Units:
     """The units of a recording, those that are `given` (by the names of `Units`) as they are.
 
-    `seen_by_cameras` is the odometry of `usual_baseline(sequence)`, or None where nothing is seen.
+    `seen_by_cameras` is the odometry of `usual_rig(sequence)`, or None where nothing is seen.
     """
     given = ({"time": 1.0} if sequence.time_unit_given else {}) | dict(given or {})
     scale_ratios = _gains(sequence, seen_by_cameras)
@@ -183,7 +177,7 @@ def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleR
     if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
         return unknown, unknown
     seen, recorded = seen_by_cameras.twist(sequence.dt), _without_jumps(zero_order_hold(sequence))
-    scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
+    scale = sequence.camera.baseline / usual_rig(sequence).camera.baseline
     angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
     linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
     return angular, linear._replace(ratio=linear.ratio * scale)
@@ -226,12 +220,11 @@ def _known(seen: ScaleRatio) -> float | None:
 
 
 def rescaled(sequence: Sequence, units: Units) -> Sequence:
-    """The recording in SI units; the camera's position is scaled along where it would be far from the IMU."""
+    """The recording in SI units."""
     if units.wrong == 0:
         return sequence
     imu_T_cam = sequence.imu_T_cam.copy()
-    if _takes_camera_along(sequence, units):
-        imu_T_cam[:3, 3] *= units.baseline
+    imu_T_cam[:3, 3] *= units.extrinsic
     return replace(
         rescaled_time(sequence, units.time),
         linear_velocity=sequence.linear_velocity * units.linear,
@@ -241,32 +234,30 @@ def rescaled(sequence: Sequence, units: Units) -> Sequence:
     )
 
 
-def _takes_camera_along(sequence: Sequence, units: Units) -> bool:
-    far = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
-    return units.baseline != 1.0 and far > FARTHEST_CAMERA >= far * units.baseline
-
-
 def unit_findings(units: Units, sequence: Sequence, seen: str = "") -> tuple[Finding, ...]:
     """A finding for each wrong unit of `sequence`, as recorded; `seen` is evidence other than the scale ratios."""
     interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    distance = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
         f"{interval * units.time:.3g} s",
         "angular": f"The angular velocity is in {_named('angular', units.angular)} and not in rad/s",
         "linear": f"The linear velocity is in {_named('linear', units.linear)} and not in m/s",
-        "baseline": f"The stereo baseline, {b:.6g}, is in {_named('baseline', units.baseline)} and not in m"
-        + ("; so is the camera's place in imu_T_cam" if _takes_camera_along(sequence, units) else ""),
+        "baseline": f"The stereo baseline, {b:.6g}, is in {_named('baseline', units.baseline)} and not in m",
+        "extrinsic": f"The translation of imu_T_cam, {distance:.6g} long, is in "
+        f"{_named('extrinsic', units.extrinsic)} and not in m",
     }
     codes = {"time": "time_unit", "angular": "angular_velocity_unit", "linear": "linear_velocity_unit"}
     found = []
-    for name in NAMES:
+    for name in LABELS:
         factor = getattr(units, name)
         if factor != 1.0:
             text = f"{texts[name]}: {1.0 / factor:.6g} times too large; multiplied by {factor:.6g}."
             if factor > 1.0:
                 text = f"{texts[name]}: {factor:.6g} times too small; multiplied by {factor:.6g}."
-            code = codes.get(name, "baseline_unit")
-            certainty = AS_GIVEN if name in units.given else seen or evidence(units)
+            code = codes.get(name, f"{name}_unit")
+            motion = seen or (TURNS if name == "extrinsic" else evidence(units))
+            certainty = AS_GIVEN if name in units.given else motion
             found.append(Finding(code, text, 1.0 / factor, 1.0, "recorded over true", certainty))
     return tuple(found)
 

@@ -11,8 +11,10 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import se3
 
 from ..conventions.axes import ENOUGH
-from ..conventions.units import Units, rescaled, units_of, usual_baseline
+from ..conventions.rig import doubt_of_position, extrinsic_unit, usual_rig
+from ..conventions.units import Units, rescaled, units_of
 from ..odometry.stereo_odometry import Odometry, odometry
+from ..tracks.image_size import doubt_of_intrinsics
 from ..tracks.unusable import unusable
 from .result import Diagnosis
 from .velocity_calibration import calibrate_velocities
@@ -47,7 +49,18 @@ def diagnose(
 def known_units(sequence: Sequence, units: Mapping[str, float] | None = None) -> Units:
     """The units of a recording as `diagnose` estimates them; factors in `units` are known."""
     with threadpool_limits(limits=1, user_api="blas"):
-        return units_of(sequence, _seen(usual_baseline(sequence)), units)
+        usual = usual_rig(sequence)
+        return _units(sequence, usual, _seen(usual), units)
+
+
+def _units(recorded: Sequence, usual: Sequence, seen: Odometry | None, given: Mapping[str, float] | None) -> Units:
+    """The units of all values, of the translation of imu_T_cam last: the others must be known for it."""
+    doubt = doubt_of_intrinsics(recorded)
+    units = Units(doubt=doubt) if doubt else units_of(recorded, seen, given)
+    if units.doubt:
+        return units
+    found = (given or {}).get("extrinsic") or extrinsic_unit(rescaled(recorded, units), usual, seen, units.baseline)
+    return replace(units, doubt=doubt_of_position(recorded)) if found is None else replace(units, extrinsic=found)
 
 
 def _seen(sequence: Sequence) -> Odometry | None:
@@ -61,9 +74,9 @@ def _diagnose(
     inverted: bool | None,
     replace_outliers: bool,
 ) -> Diagnosis:
-    usual = usual_baseline(recorded)
+    usual = usual_rig(recorded)
     seen_by_cameras = _seen(usual)
-    units = units_of(recorded, seen_by_cameras, given)
+    units = _units(recorded, usual, seen_by_cameras, given)
     if units.doubt:
         return Diagnosis(recorded, units.doubt, units=units, recorded=recorded)
     sequence = rescaled(recorded, units)

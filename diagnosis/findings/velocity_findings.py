@@ -11,10 +11,11 @@ from fgbaseline.data.plural import noun, percent, plural
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
-from ..conventions.units import LABELS, NAMES, unit_findings
+from ..conventions.units import LABELS, unit_findings
 from ..estimation.result import Diagnosis
 from ..noise.calibration_fit import SIGNIFICANT
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
+from ..tracks.image_size import intrinsics_findings
 from .phrases import listed, spans, vector
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
@@ -31,7 +32,7 @@ KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
 
 def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> tuple[Finding, ...]:
     """Significant faults, velocities first; none for a clean recording. `tracks` is `track_statistics(diagnosis)`."""
-    findings: list[Finding] = [*diagnosis.sequence.findings]
+    findings: list[Finding] = [*diagnosis.sequence.findings, *intrinsics_findings(diagnosis.sequence)]
     if diagnosis.recorded is not None:
         findings += unit_findings(diagnosis.units, diagnosis.recorded)
     if diagnosis.inversion is not None:
@@ -74,7 +75,7 @@ def _outliers(diagnosis: Diagnosis) -> list[Finding]:
 
 def rescalings(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Conversions of units and an inverted extrinsic, which precede all else; one sentence each."""
-    done = [f"{LABELS[name]} multiplied by {f:.6g}" for name in NAMES if (f := getattr(diagnosis.units, name)) != 1.0]
+    done = [f"{LABELS[name]} multiplied by {f:.6g}" for name in LABELS if (f := getattr(diagnosis.units, name)) != 1.0]
     return (*done, *(["extrinsic imu_T_cam inverted"] if diagnosis.inverted else []))
 
 

@@ -13,6 +13,7 @@ from ..estimation.result import Diagnosis
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
+from ..tracks.image_size import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
 from .baseline import baseline_findings
 from .result import InertialDiagnosis
@@ -30,7 +31,8 @@ def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = 
     """Faults of the samples, then of the tracks; none for a clean recording. `tracks` are computed where not given."""
     units = (*baseline_findings(found.baseline, found.recorded), *imu_unit_findings(found.units))
     meaning = (*units, *axes_findings(found.axes))
-    findings = (*found.sequence.findings, *meaning, *_gaps(found.sequence))
+    of_file = (*found.sequence.findings, *intrinsics_findings(found.sequence))
+    findings = (*of_file, *meaning, *_gaps(found.sequence))
     if found.sensors is not None:
         noise = found.recorded.imu.noise if found.recorded.imu is not None else None
         stated = None if noise is None else (noise.gyroscope_density, noise.accelerometer_density)
@@ -56,8 +58,8 @@ def inertial_repairs(found: InertialDiagnosis) -> tuple[str, ...]:
     """What was done to the samples, one sentence each."""
     named = (("angular velocities", found.units.rate), ("specific forces", found.units.force))
     done = [f"{name} of the inertial samples multiplied by {factor:.6g}" for name, factor in named if factor != 1.0]
-    if found.baseline.factor != 1.0:
-        done.append(f"baseline multiplied by {found.baseline.factor:.6g}")
+    lengths = (("baseline", found.baseline.factor), ("translation of imu_T_cam", found.baseline.extrinsic))
+    done += [f"{name} multiplied by {factor:.6g}" for name, factor in lengths if factor != 1.0]
     if found.axes.changed:
         done.append("inertial samples turned from the axes they were recorded in to those of imu_T_cam")
     return tuple(done)

@@ -9,7 +9,8 @@ from fgbaseline.data.plural import plural
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.units import Units, rescaled, usual_baseline
+from ..conventions.rig import usual_rig
+from ..conventions.units import Units, rescaled
 from ..inertial_start.path import InertialPath, inertial_path
 from ..inertial_start.start import Start, inertial_start
 from ..noise.calibration_fit import fit_windows
@@ -62,14 +63,14 @@ def no_start(seen: Odometry) -> str:
 
 
 def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
-    usual = usual_baseline(recorded)
+    usual = usual_rig(recorded)
     seen = odometry(usual) if len(recorded.observations) else None
     units = imu_units(recorded, seen)
     sequence = rescaled_samples(recorded, units)
     axes = SensorAxes() if seen is None else sensor_axes(sequence, seen)
     sequence = in_imu_axes(sequence, axes)
     baseline = baseline_unit(sequence, seen)
-    sequence = rescaled(sequence, Units(baseline=baseline.factor))
+    sequence = rescaled(sequence, Units(baseline=baseline.factor, extrinsic=baseline.extrinsic))
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
     reason = baseline.doubt or unusable(sequence)

@@ -13,7 +13,7 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
-from ..conventions.units import usual_baseline
+from ..conventions.rig import usual_rig
 from ..inertial_start.start import Start
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
@@ -63,7 +63,7 @@ def as_recorded_inertial(
 
     Raises InputError where no start is found, and for samples and a baseline in other units than rad/s, m/s^2 and m.
     """
-    usual = usual_baseline(sequence)
+    usual = usual_rig(sequence)
     with threadpool_limits(limits=1, user_api="blas"):
         seen = odometry(usual) if len(sequence.observations) else None
     units = imu_units(sequence, seen)

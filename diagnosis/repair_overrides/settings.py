@@ -112,6 +112,8 @@ class UnitOverrides(_Overrides):
     """m/s"""
     baseline: Annotated[float, PlainValidator(_between(1e-12, 1e12, 1.0))] | None = None
     """m"""
+    extrinsic: Annotated[float, PlainValidator(_between(1e-12, 1e12, 1.0))] | None = None
+    """m, of the translation of imu_T_cam"""
 
     def given(self) -> dict[str, float]:
         """The specified factors, by the names of `Units`."""

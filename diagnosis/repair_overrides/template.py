@@ -54,6 +54,7 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     yield f"angular_velocity = {units.angular:.15g}  # rad/s"
     yield f"linear_velocity = {units.linear:.15g}  # m/s"
     yield f"baseline = {units.baseline:.15g}  # m"
+    yield f"extrinsic = {units.extrinsic:.15g}  # m, of the translation of imu_T_cam"
     yield ""
     yield "[sigma]"
     yield f"linear_velocity = {sigmas.linear_velocity:.6g}  # m/s"

@@ -1,19 +1,26 @@
-"""Faults that make all observations of a recording unusable, by their cause."""
+"""Faults that make a recording, or all of its observations, unusable, by their cause."""
 
 import numpy as np
 
 from fgbaseline.data.plural import plural
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.geometry import disparity
+from fgbaseline.geometry import FloatArray, disparity
 
 SWAPPED = 0.9
 """share of the disparities that are negative"""
 MIN_OBSERVATIONS = 20
 """from which on a share is meaningful"""
+LONGEST_GAP, MANY_INTERVALS = 1000.0, 1e4
+"""s, and median intervals: a gap beyond both is bridged by no velocity and no inertial sample"""
 
 
 def unusable(sequence: Sequence) -> str:
-    """Cause and remedy, in a sentence without its full stop; empty where observations are usable."""
+    """Cause and remedy, in a sentence without its full stop; empty where the recording is usable."""
+    gap = _gap("time_stamps", "frame", sequence.t) or (
+        "" if sequence.imu is None else _gap("imu_time_stamps", "sample", sequence.imu.t)
+    )
+    if gap:
+        return gap
     o = sequence.observations
     n = len(o)
     if n == 0:
@@ -30,3 +37,14 @@ def unusable(sequence: Sequence) -> str:
             "track ties one frame to another; give a landmark the same column of features in every frame that sees it"
         )
     return ""
+
+
+def _gap(key: str, what: str, t: FloatArray) -> str:
+    dt = np.diff(t)
+    k = int(np.argmax(dt))
+    if dt[k] < max(LONGEST_GAP, MANY_INTERVALS * float(np.median(dt))):
+        return ""
+    return (
+        f"{key}: {dt[k]:.4g} s pass between {what} {k} and {what} {k + 1}, while the median interval is "
+        f"{float(np.median(dt)):.3g} s: a stray stamp, or two recordings in one file; split it there"
+    )

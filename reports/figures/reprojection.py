@@ -86,8 +86,8 @@ def distribution(
         if name in dashed:
             axes.plot(GRID, 100.0 * share_within(dashed[name], GRID), **{**line(name), **DASHED, "label": None})
     axes.set_xscale("log")
-    first = min(float(np.nanpercentile(known, 1)) for known in errors.values())
-    last = max(float(np.nanpercentile(known, 99)) for known in errors.values())
+    ends = [np.nanpercentile(known, (1, 99)) for known in errors.values() if known.notna().any()]
+    first, last = min((e[0] for e in ends), default=0.5), max((e[1] for e in ends), default=30.0)
     axes.set_xlim(float(np.clip(first, GRID[0], 0.5)), float(np.clip(last, 30.0, GRID[-1])))
     axes.set_ylim(0.0, 101.0)
     axes.set_xlabel("reprojection error, px (norm of the four differences)")

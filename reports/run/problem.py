@@ -277,7 +277,7 @@ def build_problem(sequence: Sequence, settings: RunSettings, processes: int = 1)
         why = "--as-recorded" if settings.as_recorded else "the documented preset"
         raise InputError(f"repairs: {why} uses no repairs; leave out one of the two")
     if len(sequence.observations) and (reason := unusable(sequence)):
-        raise InputError(f"{sequence.source}: features: {reason}")
+        raise InputError(f"{sequence.source}: {reason}")
     if sequence.imu is None and (settings.as_recorded or settings.preset == "documented"):
         _require_units(sequence)
     repairs = None if settings.repairs is None else read_repairs(settings.repairs)

@@ -279,6 +279,7 @@ def test_body_velocities_beside_samples_are_ignored_and_reported(recording: data
 
 BAD_KEYS: dict[str, tuple[dict[str, Any], str]] = {
     "noise of zero": ({"imu_noise": np.array([0.0, 1.0, 1.0, 1.0])}, "gyroscope_density is 0.0"),
+    "noise beyond any sensor": ({"imu_noise": np.full(4, 1e9)}, "expected a number from 1e-09 to 1000"),
     "three densities": ({"imu_noise": np.ones(3)}, "imu_noise: expected 4 numbers"),
     "a negative gravity": ({"gravity": np.array(-9.81)}, "gravity: expected a positive number"),
     "no stamps": ({"imu_time_stamps": None}, "imu_time_stamps is missing, the time stamps of imu_angular_velocity and"),

@@ -17,9 +17,9 @@ import pytest
 from fgbaseline import data
 from fgbaseline.data import Sequence, TimeUnit
 from fgbaseline.data.finding import AS_GIVEN, UNITS
-from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.data.time_unit import unit_of_stamps
-from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units
+from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findings_of, known_units, unusable
 from fgbaseline.diagnosis.conventions.rate_units import COUNTS
 from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
@@ -61,8 +61,16 @@ def scaled(s: Sequence, what: str, factor: float) -> Sequence:
     """The recording with one of its fields multiplied."""
     if what == "baseline":
         return replace(s, camera=replace(s.camera, baseline=s.camera.baseline * factor))
+    if what == "extrinsic":
+        return replace(s, imu_T_cam=with_arm(s.imu_T_cam, s.imu_T_cam[:3, 3] * factor))
     field = {"stamps": "t", "velocity": "linear_velocity", "gyroscope": "angular_velocity"}[what]
     return replace(s, **{field: getattr(s, field) * factor})
+
+
+def with_arm(imu_T_cam: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    turned = imu_T_cam.copy()
+    turned[:3, 3] = arm
+    return turned
 
 
 def assert_same_problem(problem: data.Problem, expected: data.Problem) -> None:
@@ -79,6 +87,8 @@ MUTATIONS = [
     ("gyroscope", 180.0 / np.pi),
     ("velocity", 100.0),
     ("baseline", 100.0),
+    ("extrinsic", 1e3),
+    ("extrinsic", 100.0),
 ]
 
 
@@ -96,6 +106,88 @@ def test_a_field_in_another_unit_gives_the_same_problem_and_the_factor_is_report
     problem = calibrated(found.sequence, diagnosis=found)
     assert_same_problem(problem, calibrated(drive(path)))
     assert any("multiplied by" in sentence for sentence in problem.repairs)
+
+
+def test_a_rig_in_millimeters_is_repaired_as_a_whole() -> None:
+    found = diagnose(scaled(scaled(drive(), "baseline", 1e3), "extrinsic", 1e3))
+    assert {f.code for f in findings_of(found)} & UNIT_CODES == {"baseline_unit", "extrinsic_unit"}
+    assert_same_problem(calibrated(found.sequence, diagnosis=found), calibrated(drive()))
+
+
+@pytest.mark.parametrize("arm", [0.005, 0.07, 0.5])
+def test_the_unit_of_a_short_lever_arm_is_found_or_the_arm_stays(arm: float) -> None:
+    drawn = simulate(Simulation(path="handheld", duration=12.0, features_per_frame=25.0, seed=4))
+    direction = np.array([0.6, -0.48, 0.64])
+    moved = replace(  # the IMU's velocity with the camera elsewhere: v_imu = v_camera - w x p
+        drawn,
+        imu_T_cam=with_arm(drawn.imu_T_cam, arm * direction),
+        linear_velocity=drawn.linear_velocity
+        + np.cross(drawn.angular_velocity, drawn.imu_T_cam[:3, 3] - arm * direction),
+    )
+    assert known_units(moved).wrong == 0
+    in_millimeters = known_units(scaled(moved, "extrinsic", 1e3))
+    assert in_millimeters.extrinsic == 1e-3
+
+
+def test_a_camera_far_from_the_imu_is_in_doubt_where_no_unit_explains_it() -> None:
+    doubt = known_units(scaled(drive(), "extrinsic", 20.0)).doubt
+    assert "places the camera 27.82 m from the IMU" in doubt
+    assert known_units(scaled(drive(), "extrinsic", 20.0), {"extrinsic": 0.05}).doubt == ""
+
+
+def with_intrinsics(s: Sequence, focal: float, principal: float) -> Sequence:
+    c = s.camera
+    K = {"fu": c.fu * focal, "fv": c.fv * focal, "cu": c.cu * principal, "cv": c.cv * principal}
+    return replace(s, camera=replace(c, **K))
+
+
+@pytest.mark.parametrize("path", ["loop", "handheld", "town", "highway"])
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_intrinsics_of_images_of_another_size_is_the_first_finding(path: str, factor: float) -> None:
+    assert "intrinsics" not in codes(diagnose(drive(path)))
+    first = findings_of(diagnose(with_intrinsics(drive(path), factor, factor)))[0]
+    assert first.code == "intrinsics"
+    assert first.before == pytest.approx(factor, rel=0.35)
+
+
+@pytest.mark.parametrize(
+    ("focal", "principal", "cause"),
+    [
+        (0.2, 0.2, "K is of images about 0.2"),
+        (4.0, 4.0, "K is of images about 4"),
+        (1e9, 1e9, "no camera has such a field of view"),
+        (1e-3, 1e-3, "no camera has such a field of view"),
+        (1e4, 1.0, "no camera has such a field of view"),
+    ],
+)
+def test_intrinsics_that_cannot_be_that_of_the_images_is_the_cause(focal: float, principal: float, cause: str) -> None:
+    other = with_intrinsics(drive(), focal, principal)
+    assert cause in known_units(other).doubt
+    with pytest.raises(InputError, match=cause):
+        calibrated(other)
+
+
+def test_normalized_coordinates_in_place_of_pixels_are_named() -> None:
+    drawn, c = drive(), drive().camera
+    center, focal = np.array([c.cu, c.cv, c.cu, c.cv]), np.array([c.fu, c.fv, c.fu, c.fv])
+    normalized = replace(drawn.observations, pixel=(drawn.observations.pixel - center) / focal)
+    assert "no camera has such a field of view" in known_units(replace(drawn, observations=normalized)).doubt
+
+
+@pytest.mark.parametrize("motion", ["velocities", "samples"])
+def test_a_gap_that_nothing_bridges_is_refused_by_its_length(motion: str) -> None:
+    drawn = drive()
+    if motion == "samples":
+        drawn = simulate(Simulation(path="drone", duration=8.0, imu=SimulatedImu(), features_per_frame=25.0, seed=3))
+        assert drawn.imu is not None
+        cut = replace(drawn, imu=replace(drawn.imu, t=drawn.imu.t + 3e8 * (drawn.imu.t > 4.0)))
+        assert "imu_time_stamps: 3e+08 s pass between sample" in unusable(cut)
+    drawn = replace(drawn, t=drawn.t + 3e8 * (np.arange(len(drawn.t)) >= 60))
+    assert "time_stamps: 3e+08 s pass between frame 59 and frame 60" in unusable(drawn)
+
+
+def test_an_hour_between_two_slow_keyframes_is_no_such_gap() -> None:
+    assert unusable(scaled(drive(), "stamps", 36_000.0)) == ""
 
 
 @pytest.mark.parametrize(
