@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     )
     from .residuals.whitening import evaluated_rows, track_chi_square, whitened_summary
     from .statistics.block_bootstrap import error_statistics
-    from .statistics.chi_square import chi_square_bounds, share_inside_bounds
+    from .statistics.chi_square import chi_square_bounds, chi_square_quantile, p_value, share_inside_bounds
     from .statistics.descriptive import summarized
     from .statistics.monte_carlo import MeanInterval, mean_interval, monte_carlo_ranking
     from .statistics.paired_bootstrap import PairedRanking, RmseDifference, paired_ranking, rmse_difference
@@ -115,7 +115,7 @@ else:
             "residuals.reprojection": "component_summary reprojection reprojection_by reprojection_summary used_by_all",
             "residuals.whitening": "evaluated_rows track_chi_square whitened_summary",
             "statistics.block_bootstrap": "error_statistics",
-            "statistics.chi_square": "chi_square_bounds share_inside_bounds",
+            "statistics.chi_square": "chi_square_bounds chi_square_quantile p_value share_inside_bounds",
             "statistics.descriptive": "summarized",
             "statistics.monte_carlo": "MeanInterval mean_interval monte_carlo_ranking",
             "statistics.paired_bootstrap": "PairedRanking RmseDifference paired_ranking rmse_difference",
@@ -178,6 +178,7 @@ __all__ = [
     "body_error",
     "body_rotation",
     "chi_square_bounds",
+    "chi_square_quantile",
     "common_stamps",
     "component_summary",
     "cost",
@@ -213,6 +214,7 @@ __all__ = [
     "nees_table",
     "nis_per_degree",
     "nis_summary",
+    "p_value",
     "paired_ranking",
     "pose_errors",
     "pose_pairs",

@@ -1,9 +1,47 @@
-"""Place of a page on the terminal, and the page in the browser."""
+"""Sentences on the terminal, place of a page there, and the page in the browser."""
 
+import re
+import shutil
+import sys
+import textwrap
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+TOGETHER = re.compile(
+    r"(?<=[\d⁰¹²³⁴-⁹]) (?=[%°]|(?:m|km|mm|px|s|ms|m/s|rad/s)\b)|(?<=\d) (?=× 10)|(?<=×) (?=10)|(?<=,) (?=[^\[\]]*\])"
+)
+"""spaces within a quantity and within an interval"""
+LONGEST_LINE = 100
+"""columns of a line that is read with ease, on a wider terminal too"""
+
+
+def print_sentences(sentences: Sequence[str], most: int | None = None, mark: str = "- ") -> None:
+    """Prints the first `most` sentences, wrapped between words on a terminal, and how many more the report has.
+
+    No figure is parted from its unit, and no interval is broken.
+    """
+    for sentence in sentences[:most]:
+        click.echo(_wrapped(sentence, mark) if sys.stdout.isatty() else f"{mark}{sentence}")
+    if more := len(sentences[most:]) if most is not None else 0:
+        click.echo(f"The report has {more} more {'sentence' if more == 1 else 'sentences'}.")
+
+
+def _wrapped(text: str, mark: str) -> str:
+    width = min(LONGEST_LINE, shutil.get_terminal_size().columns)
+    bound = TOGETHER.sub(NO_BREAK, text)
+    lines = textwrap.fill(
+        bound,
+        width,
+        initial_indent=mark,
+        subsequent_indent=" " * len(mark),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return lines.replace(NO_BREAK, " ")
 
 
 def announce(page: Path, kind: str = "report", *, opened: bool = False, printed: bool = True) -> None:

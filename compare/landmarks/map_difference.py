@@ -12,6 +12,9 @@ from ..consistency.reference_nees import difference_covariance
 from ..residuals.patterns import DEPTHS, depth_classes
 from ..statistics.chi_square import mahalanobis_squared
 
+MIN_WITH_SIGMAS = 10
+"""of a depth class that has a median in sigmas: few landmarks have a covariance of the difference"""
+
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
     """Difference of each landmark that both maps have and a frame with both poses observes, one row per `landmark`:
@@ -56,14 +59,17 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
 def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
     """Medians of a `map_difference` by depth class: `n`, `distance`, `seen`, `sigmas` and the number `with_sigmas`.
 
-    Rows are named by their edges in m; points behind the camera belong to none.
+    Rows are named by their edges in m; points behind the camera belong to none. `sigmas` is NaN where fewer than
+    `MIN_WITH_SIGMAS` landmarks of a class have them.
     """
     groups = table.groupby(pd.cut(table["depth"], DEPTHS, labels=depth_classes(), right=False), observed=False)
+    count = groups["sigmas"].count()
     return pd.DataFrame(
         {
             "n": groups.size(),
-            **{column: groups[column].median() for column in ("distance", "seen", "sigmas")},
-            "with_sigmas": groups["sigmas"].count(),
+            **{column: groups[column].median() for column in ("distance", "seen")},
+            "sigmas": groups["sigmas"].median().where(count >= MIN_WITH_SIGMAS),
+            "with_sigmas": count,
         }
     )
 

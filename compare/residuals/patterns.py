@@ -23,7 +23,7 @@ def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
     """Residuals of a reprojection table in classes, one row per non-empty class, with the columns
 
     `by` (distance, track age, region, side), `of` (the class), `n`, `median`, `mean` and `p95` of the error in px, and
-    the mean residuals `u` and `v` (over both cameras) in px, which are the bias of the class. `distance` is the depth
+    the median residuals `u` and `v` (over both cameras) in px, which are the bias of the class. `distance` is the depth
     in front of the left camera (no class behind it), `track age` counts the observations of the track so far, `region`
     is the ninth of the left image within the bounding box of the observations, and `side` compares the error of the
     left camera, the norm of uL and vL, with that of the right one.
@@ -59,8 +59,8 @@ def _classified(values: pd.DataFrame, by: str, code: IntArray, names: list[str])
             "median": error.median(),
             "mean": error.mean(),
             "p95": _p95(error),
-            "u": groups["u"].mean(),
-            "v": groups["v"].mean(),
+            "u": groups["u"].median(),
+            "v": groups["v"].median(),
         }
     )
     result.insert(0, "of", [names[i] for i in result.index])

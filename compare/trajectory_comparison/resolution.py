@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fgbaseline.data import Truth
 from fgbaseline.geometry import FloatArray
 
 COARSEST, FINEST = 3, 15
@@ -15,6 +16,13 @@ def decimal_step(position: FloatArray) -> float:
         if np.all(np.abs(position - np.round(position, decimals)) <= rounding):
             return max(10.0**-decimals, rounding)
     return rounding
+
+
+def truth_resolution(truth: Truth | None) -> float:
+    """Largest distance that the decimals of ground truth alone can make, m; 0 without ground truth."""
+    if truth is None or not truth.known.any():
+        return 0.0
+    return 0.5 * float(np.sqrt(3.0)) * decimal_step(truth.world_T_imu[truth.known, :3, 3])
 
 
 def position_resolution(position: FloatArray, other: FloatArray) -> float:

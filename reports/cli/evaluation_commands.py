@@ -139,14 +139,18 @@ def compare(
         option, what = ("force", "folder to replace") if force else ("open", "page")
         raise InputError(f"{option}: there is no {what}; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
-    from ..announced import announce
+    from ..announced import announce, print_sentences
+    from ..phrases.evidence import FIRST
     from ..tables import print_table
 
     page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict
-    click.echo(f"{first}\n")
+    print_sentences([first], mark="")
+    click.echo()
     print_table(report.text_table, wrap_names=False)
-    click.echo("\n".join([f"{report.caption}\n", *others]))
+    print_sentences([report.caption], mark="")
+    click.echo()
+    print_sentences(others, None if page is None else FIRST - 1)
     if page is not None:
         announce(page, opened=opened)
 

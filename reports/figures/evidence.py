@@ -12,14 +12,13 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
+from ..formatting import RESOLUTION
 from .over_time import Expected, Panel, time_panels
 from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
 from .reprojection import medians_by_class
 from .run_data import RunData
 from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
 
-MIN_LANDMARKS = 10
-"""of a class that has a median in sigmas: few of them have a covariance of the difference"""
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
 QUANTITIES = {
     "velocity": ("velocity", "m/s"),
@@ -45,13 +44,14 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
         panels = [
             Panel("NEES", "nees", 0.95, 5.0, pose),
             Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),
-            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, innovation),
+            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, innovation, smooth=True),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
         return time_panels(run, panels, "", style)
+    nis = _innovation_band(CONSISTENT)
     panels = [
         Panel("reference NEES", "nees_reference", 1.95, 5.0, _pose_band(CONSISTENT), OVER_BAND),
-        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, _innovation_band(CONSISTENT), OVER_BAND),
+        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, nis, OVER_BAND, smooth=True),
         Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, _one, BELOW_ONE),
         Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, _one, BELOW_ONE),
     ]
@@ -163,9 +163,7 @@ def maps_by_depth(
 ) -> Figure | None:
     """Tables of `compare.map_by_depth` by name: in meters and sigmas, on paper only in the camera frame."""
     columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
-    if style.titled:
-        tables = {n: t.assign(sigmas=t["sigmas"].where(t["with_sigmas"] >= MIN_LANDMARKS)) for n, t in tables.items()}
-    else:
+    if not style.titled:
         columns = {"seen": ""}
     shown = {c: title for c, title in columns.items() if any(t[c].notna().any() for t in tables.values())}
     if not shown:
@@ -177,6 +175,8 @@ def maps_by_depth(
         medians = {name: table[column] for name, table in tables.items()}
         handles += medians_by_class(panel, medians, line, style, _depth)
         log_where_positive(panel)
+        if column != "sigmas" and panel.get_yscale() == "log" and panel.get_ylim()[1] > RESOLUTION:
+            panel.set_ylim(bottom=max(RESOLUTION, panel.get_ylim()[0]))
         panel.set_title(title)
         panel.set_xlabel("depth, m")
     if not style.titled:

@@ -12,7 +12,17 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.columns import Columns
 from fgbaseline.geometry import FloatArray
 
-from .panels import Line, few_ticks, fit_log, fit_log_or_linear, fit_signed, note_out_of_range, plot_series
+from .panels import (
+    Line,
+    few_ticks,
+    fit_log,
+    fit_log_or_linear,
+    fit_signed,
+    note_out_of_range,
+    plot_series,
+    running_median,
+    smoothed,
+)
 from .run_data import RunData
 from .style import SCREEN, Style, safe_text, stacked_panels, title_and_legend
 from .window import common_window, signed_range
@@ -48,13 +58,15 @@ class Panel:
     """of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
     expected: Expected | None = None
     title: str = ""
+    smooth: bool = False
+    """whether its lines jump from frame to frame, so that running medians are drawn"""
 
 
 def time_panels(
     run: RunData, wanted: Sequence[Panel], title: str, style: Style, *, without: str | None = None, **look: Any
 ) -> Figure | None:
     """Panels that have something to show above one another, `look` being that of the lines; None where none has."""
-    known = [(panel, run.column(panel.column, without)) for panel in wanted]
+    known = [(panel, _drawn(run.column(panel.column, without), smooth=panel.smooth)) for panel in wanted]
     if not style.titled:  # a line of zeros, such as the time of an estimator without one, cannot be described in print
         known = [(panel, {name: v for name, v in series.items() if np.nansum(np.abs(v))}) for panel, series in known]
     shown = [(panel, series) for panel, series in known if series]
@@ -74,11 +86,16 @@ def time_panels(
             bands += panel.expected(run, on)
         few_ticks(on, style)
         on.set_ylabel(panel.label)
-        on.set_title(panel.title)
+        remarks = [panel.title, smoothed(len(run.t)) if panel.smooth and style.titled else ""]
+        on.set_title(", ".join(filter(None, remarks)))
     time_axis(run, axes, style)
     order = [run.line(style)(name)["label"] for name in run.names]  # a panel may lack the first of them
     title_and_legend(figure, title, [*sorted(lines, key=lambda one: order.index(one.get_label())), *bands], style)
     return figure
+
+
+def _drawn(series: Mapping[str, FloatArray], *, smooth: bool) -> dict[str, FloatArray]:
+    return {name: running_median(values) if smooth else values for name, values in series.items()}
 
 
 def time_axis(run: RunData, axes: Sequence[Axes], style: Style = SCREEN) -> None:
@@ -164,8 +181,9 @@ def height(run: RunData) -> Figure:
 def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Time per frame, on the screen beside the interval between frames; None where none is known."""
     if not style.titled:
-        return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0)], "", style)
-    times = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
+        return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0, smooth=True)], "", style)
+    known = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
+    times = _drawn(known, smooth=True)
     if not times:
         return None
     figure, axes = stacked_panels(3.4)
@@ -179,6 +197,7 @@ def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
         interval, color="#888888", linewidth=1.0, linestyle=":", label=f"interval between frames ({interval:.3g} ms)"
     )
     axes[0].set_ylabel("time, ms")
+    axes[0].set_title(smoothed(len(run.t)))
     time_axis(run, axes)
     title_and_legend(figure, "Time per frame", [*handles, real_time])
     return figure
@@ -206,12 +225,13 @@ def _with_prefix(table: pd.DataFrame, prefix: str) -> Columns:
 
 
 def _maxima(tables: Mapping[str, Columns]) -> str:
-    """Largest distance of each, nearest first; only the farthest where there is no room for all."""
+    """Largest distance of each, nearest first; the largest of all where there is no room for that."""
     farthest = {n: float(np.nanmax(t["position"])) for n, t in tables.items() if not np.isnan(t["position"]).all()}
     if not farthest:
         return ""
     each = [f"{safe_text(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
-    return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else each[-1])
+    name, far = max(farthest.items(), key=lambda item: item[1])
+    return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else f"at most {far:.3g} m ({safe_text(name)})")
 
 
 def _names_by_times(times: Mapping[str, FloatArray]) -> list[list[str]]:

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
@@ -19,6 +20,8 @@ DECADES = 1.5
 DEGREES_OF_FREEDOM = 6
 """of a pose"""
 CONSISTENT = "95 % if consistent"
+MEDIANS = 100
+"""windows of a running median that a line holds"""
 
 Line = Callable[[str], Mapping[str, Any]]
 """look of the line of an estimator"""
@@ -29,6 +32,28 @@ def nees_bounds() -> tuple[float, float]:
     """95 % chi-square bounds of the NEES of a pose."""
     low, high = compare.chi_square_bounds(float(DEGREES_OF_FREEDOM))
     return float(low), float(high)
+
+
+@cache
+def nees_median() -> float:
+    """Median NEES of a pose of a consistent estimator."""
+    return float(compare.chi_square_quantile(0.5, float(DEGREES_OF_FREEDOM)))
+
+
+def median_window(n: int) -> int:
+    """Frames of the running median of a line of n frames that jumps from frame to frame: odd, 1 for a short line."""
+    return 2 * (n // (2 * MEDIANS)) + 1
+
+
+def running_median(values: FloatArray) -> FloatArray:
+    """(n,) medians over `median_window` frames around each value; NaN where all of these are."""
+    rolling = pd.Series(values).rolling(median_window(len(values)), center=True, min_periods=1)
+    return np.asarray(rolling.median().to_numpy(dtype=np.float64))
+
+
+def smoothed(n: int) -> str:
+    """Remark on a running median over a line of n frames; empty where it is none."""
+    return f"running median over {median_window(n)} frames" if median_window(n) > 1 else ""
 
 
 def plot_series(axes: Axes, t: ArrayLike, series: Mapping[str, FloatArray], line: Line, **look: Any) -> list[Any]:
@@ -104,9 +129,9 @@ def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray
 
 
 def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
-    """Expected value and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
+    """Median and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
     low, high = (float(limit) / per for limit in compare.chi_square_bounds(degrees))
-    axes.axhline(degrees / per, color=GREEN, linewidth=width, zorder=1.5)
+    axes.axhline(float(compare.chi_square_quantile(0.5, degrees)) / per, color=GREEN, linewidth=width, zorder=1.5)
     bottom, top = axes.get_ylim()
     axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
     return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)

@@ -16,7 +16,7 @@ from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 
 from .over_time import Panel, time_axis, time_panels
-from .panels import Line, fit_log, log_where_positive, plot_series, short
+from .panels import Line, fit_log, log_where_positive, plot_series, running_median, short, smoothed
 from .run_data import RunData, RunDetails
 from .style import GRAY, GREEN, SCREEN, Style, label, stacked_panels, swatch, title_and_legend
 
@@ -24,9 +24,17 @@ SMALL_ERROR = 3.0
 """px, a column of the tables"""
 COARSE = (Excluded.DISPARITY, Excluded.SHORT)
 """reasons of observations that determine little"""
-BANDS = {"in the problem": "#b8c4d0", "too far or track too short": "#e9e4cf", "contradict their track": "#c0392b"}
+BANDS = {
+    "in the problem": "#b8c4d0",
+    "too far or track too short": "#e9e4cf",
+    "copied from the frame before": "#d9b3e0",
+    "wrong match, moved or undetermined": "#c0392b",
+}
+"""observations of a frame, as the mask has them"""
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
+RATIOS = np.geomspace(1e-3, 100.0, 200)
+"""chi-square of a track per degree of freedom, where the expected distribution is drawn"""
 HEAT = "Blues"
 """color map of lightness, which color-blind readers can read too"""
 DASHED: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (2, 1.5))}
@@ -36,15 +44,17 @@ CLASSES = {"distance": "by distance", "track age": "by age of the track, frames"
 def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Median error of each frame, on screen above the numbers of observations; None without any."""
     if not style.titled:
-        return time_panels(run, [Panel("median error, px", "reprojection_median", 1.2, decades=5.0)], "", style)
+        panel = Panel("median error, px", "reprojection_median", 1.2, decades=5.0, smooth=True)
+        return time_panels(run, [panel], "", style)
     if run.observed is None or len(run.observed.problem.sequence.observations) == 0:
         return None
     figure, (upper, lower) = stacked_panels(5.6, 2, height_ratios=[2, 1])
-    medians = run.column("reprojection_median")
+    medians = {name: running_median(values) for name, values in run.column("reprojection_median").items()}
     handles = plot_series(upper, run.t, medians, run.line(), linewidth=1.0)
     fit_log(upper, medians)
     _mark_small_error(upper, vertical=False)
     upper.set_ylabel("median error, px")
+    upper.set_title(smoothed(len(run.t)))
     counts = observations_by_frame(run.observed.problem)
     colors = [BANDS[name] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
@@ -99,7 +109,7 @@ def distribution(
 
 
 def reprojection_classes(run: RunData) -> Figure | None:
-    """Median error of each class, and the probabilities of tracks, uniform where the noise is as assumed."""
+    """Median error of each class, and chi-square of the tracks beside that of the noise as assumed."""
     if run.observed is None or not run.observed.classes:
         return None
     figure = Figure(figsize=(SCREEN.width, 3.8))
@@ -111,7 +121,7 @@ def reprojection_classes(run: RunData) -> Figure | None:
         panel.set_title(title)
         log_where_positive(panel)
     panels[0].set_ylabel("median error, px")
-    handles += _probabilities(panels[2], run.observed, run.line())
+    handles += _track_chi_square(panels[2], run.observed, run.line())
     title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
     return figure
 
@@ -174,9 +184,9 @@ def medians_by_class(
 
 
 def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) observations per frame: in the problem, too coarse, and contradicting, by the names of BANDS."""
+    """(T,) observations per frame by the names of BANDS."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
-    reasons = [(Excluded.NO,), COARSE, WRONG_MATCH]
+    reasons = [(Excluded.NO,), COARSE, (Excluded.COPIED,), WRONG_MATCH]
     return {
         name: np.bincount(frame[np.isin(excluded, reason)], minlength=problem.n_frames).astype(np.float64)
         for name, reason in zip(BANDS, reasons, strict=True)
@@ -189,22 +199,28 @@ def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
     return np.searchsorted(known, limits, side="right") / max(1, len(errors))
 
 
-def _probabilities(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
-    """Share of tracks whose chi-square probability is at most p, over p: the diagonal is what is expected."""
+def _track_chi_square(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
+    """Share of tracks whose chi-square per degree of freedom is at most x, over x, and what is expected."""
+    degrees = np.empty(0)
     for name in observed.classes:
         tracks = compare.track_chi_square(
             observed.problem, compare.evaluated_rows(observed.problem, observed.reprojection[name])
         )
-        p = np.sort(tracks["probability"].dropna().to_numpy())
-        share = np.arange(1, len(p) + 1) / max(1, len(p))
-        panel.plot(p, 100.0 * share, **{**line(name), "label": None})
-    diagonal = panel.plot([0, 1], [0, 100], color=GREEN, linewidth=1.0, linestyle=":", label="noise as assumed")
-    panel.set_xlim(0.0, 1.0)
-    panel.set_ylim(0.0, 100.0)
-    panel.set_xlabel("probability of larger residuals")
+        degrees = np.concatenate([degrees, tracks["degrees"].to_numpy(dtype=np.float64)])
+        ratio = np.sort((tracks["squared"] / tracks["degrees"]).to_numpy(dtype=np.float64))
+        share = np.arange(1, len(ratio) + 1) / max(1, len(ratio))
+        panel.plot(ratio, 100.0 * share, **{**line(name), "label": None})
+    each, counts = np.unique(degrees, return_counts=True)
+    expected = 1.0 - compare.p_value(RATIOS[:, None] * each, each) @ counts / max(1, len(degrees))
+    look: dict[str, Any] = {"color": GREEN, "linewidth": 1.0, "linestyle": ":", "label": "noise as assumed"}
+    drawn = panel.plot(RATIOS, 100.0 * expected, **look)
+    panel.set_xscale("log")
+    panel.set_xlim(RATIOS[0], RATIOS[-1])
+    panel.set_ylim(0.0, 101.0)
+    panel.set_xlabel("chi-square per degree of freedom")
     panel.set_ylabel("share of tracks, %")
     panel.set_title("tracks by chi-square")
-    return list(diagonal)
+    return list(drawn)
 
 
 def _mark_small_error(axes: Axes, *, vertical: bool) -> None:

@@ -11,6 +11,7 @@ from .drawing import encoded_in_background
 from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
 from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
+from .panels import smoothed
 from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
@@ -48,12 +49,12 @@ PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
     "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to ground truth on {sequence}, without alignment."),
     "reprojection": (
         partial(reprojection_over_time, style=PAPER),
-        "Median reprojection error of each frame of {sequence} (norm of the four pixel differences).",
+        "Median reprojection error of each frame of {sequence} (norm of the four pixel differences){smoothed}.",
     ),
     "consistency": (
         partial(consistency, style=PAPER),
         "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
-        "sigma ratios of the position are to {reference}.",
+        "sigma ratios of the position are to {reference}{smoothed_nis}.",
     ),
     "held_out": (
         partial(held_out, style=PAPER),
@@ -63,7 +64,7 @@ PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
         partial(map_difference, style=PAPER),
         "Median distance of landmarks from those of {reference}, in the camera frame, by depth.",
     ),
-    "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}."),
+    "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}{smoothed}."),
 }
 """name -> figure, which may be None, and caption"""
 
@@ -103,7 +104,10 @@ def figure_functions(run: RunData) -> dict[str, Callable[[], Figure | None]]:
 
 def draw_for_paper(run: RunData) -> dict[str, tuple[Figure, str]]:
     """Figures of a run for a paper in two columns: name -> figure and caption."""
+    remark = smoothed(len(run.t))
     words = {
+        "smoothed": remark and f", {remark}",
+        "smoothed_nis": remark and f"; NIS: {remark}",
         "sequence": run.sequence,
         "reference": run.reference,
         "trust": run.trust,

@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
 
+from .coinciding import widen_coinciding
+
 REFERENCE = "#000000"
 TRUTH = "#7f7f7f"
 LANDMARK = "#5fb98c"
@@ -63,6 +65,8 @@ MARKERS = "os^Dv<P*X>"
 """of lines on paper, distinguished without color"""
 MARKS_PER_LINE = 8
 """marks of a line on paper"""
+REFERENCE_ORDER = 2.0
+"""zorder of the reference, below the other lines"""
 WHITE: Mapping[str, Any] = {"color": "white", "markeredgecolor": "black", "zorder": 5}
 """marks of a start or an end"""
 
@@ -211,7 +215,10 @@ def stacked_panels(height: float, rows: int = 1, style: Style = SCREEN, **grid: 
 
 
 def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
-    """Title on top of a figure (not on paper) and below it one legend: each label once, in rows."""
+    """Title on top of a figure (not on paper) and below it one legend: each label once, in rows.
+
+    Called when the panels are drawn. On the screen the lower ones of lines that coincide become wider.
+    """
     by_label = {str(handle.get_label()): handle for handle in handles}
     figure.set_label(title)
     if not style.titled and not by_label:
@@ -225,6 +232,8 @@ def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), st
         **({"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}),
     )
     legend.get_title().set_color("#222222")
+    for axes in figure.axes if style.titled else []:
+        widen_coinciding(axes, REFERENCE_ORDER)
 
 
 def _legend_columns(widths: Sequence[int], room: int) -> int:
@@ -249,7 +258,7 @@ def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
         "color": color,
         "linestyle": linestyle(color),
         "linewidth": 2.6 if thick else 1.3,
-        "zorder": 2.0 if thick else 2.5,
+        "zorder": REFERENCE_ORDER if thick else 2.5,
         "label": label(name, reference),
     }
 
@@ -258,7 +267,7 @@ def marked_line(name: str, color: str, reference: str | None, others: Sequence[s
     """Look of an estimator's line of so many points on paper: the reference thick and lowest, the `others` marked."""
     look: dict[str, Any] = {"color": color, "linestyle": linestyle(color), "label": label(name, reference)}
     if name == reference:
-        return look | {"linewidth": 1.6, "zorder": 2.0}
+        return look | {"linewidth": 1.6, "zorder": REFERENCE_ORDER}
     number, apart = others.index(name), max(1, points // MARKS_PER_LINE)
     return look | {
         "linewidth": 0.8,

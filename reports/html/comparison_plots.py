@@ -11,7 +11,7 @@ from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData
-from ..figures.panels import DEGREES_OF_FREEDOM, nees_bounds
+from ..figures.panels import nees_bounds, nees_median
 from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
 
 MOMENTS = 4000
@@ -119,8 +119,8 @@ def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) ->
     lines = {n: _at(t, data.t[n], of.nees) for n, of in reported.items() if of is not None}
     if not lines:
         return
-    hint = "the band holds 95 % of the poses of a consistent estimator"
-    look = {"log": True, "band": nees_bounds(), "middle": float(DEGREES_OF_FREEDOM), "hint": hint}
+    hint = "the band holds 95 % of the poses of a consistent estimator, the dotted line is their median"
+    look = {"log": True, "band": nees_bounds(), "middle": nees_median(), "hint": hint}
     yield chart("Consistency", "nees", "NEES", "", numbered((data.reference, *data.names), lines), **look)
 
 
@@ -143,6 +143,7 @@ def _pixels(comparison: Comparison, t: FloatArray) -> Charts:
         "px",
         numbered(names, lines),
         log=True,
+        smooth=True,
         hint=hint,
     )
 

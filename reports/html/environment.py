@@ -42,8 +42,8 @@ CAPTIONS: Mapping[str, str] = {
     "can still be separated: the table has the paired difference from the best.",
     "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
     "time-correlated. The sigma ratio of a filter is expected above 1.",
-    "reprojection_classes": "Flat lines: errors do not depend on the distance of a point or the age of its track. The "
-    "dotted diagonal is expected where the noise is as assumed; above it residuals are larger, below it smaller.",
+    "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
+    "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, larger to its right.",
     "image_regions": "Errors that grow towards an edge indicate distortion or a wrong rectification. All panels share "
     "one logarithmic scale.",
     "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "

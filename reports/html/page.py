@@ -1,6 +1,6 @@
 """Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, ClassVar
@@ -98,8 +98,6 @@ class Page:
     """of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
     plots: Mapping[str, Any] | None = None
     """see `plot_data.page_data`"""
-    terms: Mapping[str, str] | None = None
-    """of the glossary; None for those of every page"""
     still_paths: Picture | None = None
     """in place of the paths where no script runs"""
 
@@ -122,10 +120,26 @@ def render_page(page: Page) -> str:
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
-            **({} if page.terms is None else {"terms": page.terms}),
+            terms=_terms(page),
             **({} if plots is None else _interactive(plots)),
         )
     )
+
+
+def _terms(page: Page) -> dict[str, str]:
+    """Terms of the glossary that a table links to or the title of a chart has."""
+    tables = list(_tables([page.table, *page.sections]))
+    linked = {column.term for table in tables for column in table.columns}
+    linked |= {row.term for table in tables for row in table.rows}
+    titles = " ".join(chart["title"].lower() for chart in (page.plots or {}).get("charts", ()))
+    return {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
+
+
+def _tables(holders: "Iterable[Section | Folded]") -> Iterator[Table]:
+    """Tables of sections and of what is folded away in them."""
+    for holder in holders:
+        yield from (block.table for block in holder.blocks if isinstance(block, Grid))
+        yield from _tables(block for block in holder.blocks if isinstance(block, Folded))
 
 
 def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.compare import chi_square_bounds
-from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold
+from fgbaseline.compare import chi_square_bounds, chi_square_quantile
+from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold, worst_second
 from fgbaseline.compare.estimate_comparison import Result, Run
-from fgbaseline.data import Estimate, Excluded, Problem
-from fgbaseline.data.problem import WRONG_MATCH
+from fgbaseline.data import Estimate, Excluded
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import STATE
-from fgbaseline.reports.figures.panels import DEGREES_OF_FREEDOM, moving_sum, nees_bounds
+from fgbaseline.reports.figures.panels import nees_bounds, nees_median
 from fgbaseline.reports.tables.run import REASONS
 
 from .plot_encoding import (
@@ -49,6 +48,7 @@ def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
     yield chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
     yield chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
     yield chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
+    yield chart(group, "above", f"Above {run.reference}", "m", _column(run, "divergence", "up"))
     without = "difference from ground truth; all start at the true pose"
     yield chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
     yield chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
@@ -89,13 +89,14 @@ def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
     }
     title = "Median reprojection error by frame"
     hint = "over all observations of the landmarks that an estimator has"
-    yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, hint=hint)
+    yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, smooth=True, hint=hint)
 
 
 def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
-    group, expected = "Consistency", "the band holds 95 % of the frames of a consistent estimator"
+    group = "Consistency"
+    expected = "the band holds 95 % of the frames of a consistent estimator, the dotted line is their median"
     of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
-    pose = {"log": True, "band": nees_bounds(), "middle": float(DEGREES_OF_FREEDOM), "hint": expected}
+    pose = {"log": True, "band": nees_bounds(), "middle": nees_median(), "hint": expected}
     yield chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
     title = f"Reference NEES, to {run.reference}"
@@ -104,12 +105,14 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
         r.name: r.inertial.nees["state"].to_numpy() for r in run.answered if r.inertial and r.inertial.nees is not None
     }
     dof = float(STATE)
-    state = {"log": True, "band": tuple(map(float, chi_square_bounds(dof))), "middle": dof, "hint": expected}
+    bounds, middle = tuple(map(float, chi_square_bounds(dof))), float(chi_square_quantile(0.5, dof))
+    state = {"log": True, "band": bounds, "middle": middle, "hint": expected}
     yield chart(group, "nees-state", "NEES of the state", "", _numbered(run, whole), **state)
-    band = _innovation_band(run)
-    nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
-    innovations = "NIS per degree of freedom"
-    yield chart(group, "nis", innovations, "", _numbered(run, nis), log=True, band=band, middle=1.0, hint=expected)
+    innovations = _innovations(run)
+    if innovations is not None:
+        nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
+        title, look = "NIS per degree of freedom", {"log": True, "smooth": True, "hint": expected}
+        yield chart(group, "nis", title, "", _numbered(run, nis), **look, **innovations)
     for part in ("position", "rotation"):
         tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
         ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
@@ -117,14 +120,15 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
         yield chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
 
 
-def _innovation_band(run: Run) -> tuple[float, ...] | None:
-    """For as many rows as the median frame that sees anything has; None where no filter sees anything."""
+def _innovations(run: Run) -> dict[str, Any] | None:
+    """Band and median for as many rows as the median frame with observations has; None where no filter has any."""
     seen = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
     rows = np.concatenate([degrees[degrees > 0] for degrees in seen]) if seen else np.empty(0)
     if len(rows) == 0:
         return None
     n = float(np.median(rows))
-    return tuple(float(limit) / n for limit in chi_square_bounds(n))
+    band = tuple(float(limit) / n for limit in chi_square_bounds(n))
+    return {"band": band, "middle": float(chi_square_quantile(0.5, n)) / n}
 
 
 def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
@@ -132,8 +136,8 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
     spent = {r.name: 1e3 * r.estimate.seconds for r in run.answered if len(r.estimate.seconds) == T}
     spent = {name: ms for name, ms in spent.items() if ms.any()}
     interval = 1e3 * float(np.median(run.problem.sequence.dt))
-    hint = "below the thin line an estimator runs in real time"
-    yield chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), log=True, middle=interval, hint=hint)
+    look = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
+    yield chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), middle=interval, **look)
 
 
 def _column(run: Run, table: str, column: str) -> Lines:
@@ -244,18 +248,9 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
         if left is not None:
             text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
             bookmarks.append({"frame": left.frame, "text": text})
-    worst = _most_excluded(run.problem)
+    worst = worst_second(run.problem)
     if worst is not None:
-        bookmarks.append({"frame": worst, "text": "most wrong matches"})
+        t = run.problem.sequence.t
+        middle = int(np.argmin(np.abs(t - t[0] - worst.second - 0.5)))
+        bookmarks.append({"frame": middle, "text": "most wrong matches"})
     return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))
-
-
-def _most_excluded(problem: Problem) -> int | None:
-    """Middle of the second with the largest share of wrong matches, as a frame; None where no match is wrong."""
-    frame, T = problem.sequence.observations.frame, problem.n_frames
-    wrong = np.bincount(frame[np.isin(problem.excluded, (*WRONG_MATCH, Excluded.COPIED))], minlength=T)
-    every = np.bincount(frame[problem.excluded != Excluded.FEATURE_NOT_CHOSEN], minlength=T)
-    if not wrong.any():
-        return None
-    half = round(min(0.5 / float(np.median(problem.sequence.dt)), T))
-    return int(np.argmax(moving_sum(wrong, 1 + 2 * half) / np.maximum(1, moving_sum(every, 1 + 2 * half))))

@@ -70,13 +70,13 @@ Lines = Mapping[str, FloatArray]
 
 
 def chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
-    """A chart; None where no line has a value."""
+    """A chart; None where no line has a value. `smooth` lines jump from frame to frame: they are shown as medians."""
     known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
     if not known:
         return None
-    settings = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "hint": "", **more}
+    look = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "smooth": False, "hint": ""}
     packed = {key: floats(values) for key, values in known.items()}
-    return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **settings}
+    return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **look, **more}
 
 
 def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:

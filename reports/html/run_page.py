@@ -13,7 +13,6 @@ from ..figures.style import colors
 from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
-from ..results.metric import TERMS
 from ..tables import run as tables
 from .environment import Picture, picture
 from .page import (
@@ -83,7 +82,6 @@ def render(
             settings={"Recording": recording, "Settings": summary["settings"]},
             colors=colors(run.results, run.reference),
             plots=plots,
-            terms=None if run.problem.imu is None else TERMS,
             still_paths=pictures.get("paths_overlaid"),
         )
     )
@@ -117,7 +115,7 @@ def _sections(
     bands = [p for name, p in pictures.items() if name.startswith(BAND_FIGURES)]
     stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
-        Grid(evidence),
+        Grid(evidence.transposed("figure")),
         *figure_blocks(pictures, ["held_out"]),
         *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
         *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),

@@ -16,6 +16,7 @@ from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.sample_sizes import insufficient_truth
 
 from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
+from ..results.metrics import ate_resolution
 from .evidence import ROUGH, no_difference
 
 
@@ -36,7 +37,7 @@ def ate_sentences(run: Run) -> list[str]:
     known = sorted((name for name in rmse if not np.isnan(rmse[name])), key=lambda name: rmse[name])
     if not known:
         return [f"There is no ATE: no estimator has a pose where the ground truth ({source}, {coverage}) has one."]
-    each = listed(f"{number(rmse[name])} m for {name}" for name in known)
+    each = listed(f"{resolved(rmse[name], ate_resolution(run))} m for {name}" for name in known)
     alignment = "SE(3) alignment" if run.problem.imu is None else "alignment in yaw and position"
     sentences = [f"ATE (RMSE after {alignment} to the ground truth, {source}, {coverage}): {each}."]
     if run.reference not in known:
@@ -50,17 +51,17 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
     found = paired_ranking({name: e for name, e in errors.items() if name == reference or name not in run.unranked})
     if reference not in found.rmse:
         return []
-    own = found.rmse[reference]
+    own, text = found.rmse[reference], {n: resolved(value, ate_resolution(run)) for n, value in found.rmse.items()}
     smaller = [name for name in found.rmse if name != reference and found.rmse[name] < own]
     pairs = {name: rmse_difference(*_common(errors, (reference, name), found)) for name in smaller}
-    better = [name for name in smaller if is_claimed(pairs[name], own, found.rmse[name])]
-    equal = [name for name in smaller if number(found.rmse[name]) == number(own)]
+    equal = [name for name in smaller if text[name] == text[reference]]
+    better = [name for name in smaller if name not in equal and is_claimed(pairs[name], own, found.rmse[name])]
     over = _over(run, found)
     sentences = []
     if better:
-        than = listed(f"{name} ({number(found.rmse[name])} m)" for name in better)
+        than = listed(f"{name} ({text[name]} m)" for name in better)
         sentences.append(
-            f"The reference {reference} has a larger ATE ({number(own)} m) than {than}, by paired bootstrap{over}; "
+            f"The reference {reference} has a larger ATE ({text[reference]} m) than {than}, by paired bootstrap{over}; "
             f"divergence from it does not measure accuracy on this recording.{_rough(pairs[name] for name in better)}"
         )
     sentences += no_difference(reference, [name for name in smaller if name not in (*better, *equal)], "ATE", over)

@@ -37,8 +37,8 @@ from .statistics import Divergence, Number, Part, PoseSigma, Reprojection, Sprea
 class Component(Part):
     """Measured minus predicted pixel coordinate, px, over all observations of the estimated landmarks."""
 
-    bias: Number
-    spread: Number
+    bias: Annotated[Number, Field(description="median")]
+    spread: Annotated[Number, Field(description="1.4826 median absolute deviation: sigma of Gaussian residuals")]
 
 
 class ObservationCount(Part):

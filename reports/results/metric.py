@@ -158,18 +158,18 @@ class Metric:
         """Short title and unit."""
         return f"{self.short}, {self.unit}" if self.unit else self.short
 
-    def text(self, value: float) -> str:
+    def text(self, value: float, resolution: float = RESOLUTION) -> str:
         """A figure of it, without its unit; 0 with the resolution for rounding."""
-        if self.is_rounding(value):
-            return resolved(value, RESOLUTION)
+        if self.is_rounding(value, resolution):
+            return resolved(value, resolution)
         return number(int(value) if self.count and isfinite(value) else value)
 
-    def is_rounding(self, value: float) -> bool:
+    def is_rounding(self, value: float, resolution: float = RESOLUTION) -> bool:
         """Whether a distance, an angle or what is normalized is not zero, and too small to mean anything.
 
         A small ratio of sigmas means something: the estimator is overconfident.
         """
-        return self.unit in ("m", "°", "") and self.term != "sigma ratio" and 0.0 < abs(value) < RESOLUTION
+        return self.unit in ("m", "°", "") and self.term != "sigma ratio" and 0.0 < abs(value) < resolution
 
     def value(self, results: Mapping[str, Any]) -> Value:
         """Its figure in the results of one estimator."""

@@ -13,7 +13,9 @@ import numpy as np
 
 from fgbaseline.compare import time_coverage
 from fgbaseline.compare.limits import Better
+from fgbaseline.compare.trajectory_comparison.resolution import truth_resolution
 
+from ..formatting import RESOLUTION
 from .inertial_metrics import BLOCK_NEES, MAIN_STATE_NEES, VELOCITY_AND_BIASES
 from .metric import (
     ATE,
@@ -262,6 +264,11 @@ def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric
                 for m in relative
             ]
     return expanded
+
+
+def ate_resolution(run: "Run") -> float:
+    """ATE below which there is only rounding, m: that of the estimates or of the decimals of the ground truth."""
+    return max(RESOLUTION, truth_resolution(run.problem.sequence.truth))
 
 
 MEASURED = tuple(metric for metric in METRICS if metric.measure is not None)

@@ -11,7 +11,7 @@ from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.data.tracking import Pictures
 
-from ..announced import announce
+from ..announced import announce, print_sentences
 from .problem import (
     MARK,
     TRACKS,
@@ -65,6 +65,7 @@ def run(
         progress.print_line("diagnosing the recording")
     with background_map(lambda _: build_problem(kept, settings, cores()), 1, cores()) as built:
         # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
+        from ..phrases.evidence import FIRST
         from ..phrases.run import verdict
         from ..results.run import as_dict
         from ..tables import print_table
@@ -94,9 +95,10 @@ def run(
             from .rerun import write_rerun
 
             write_rerun(solved, rerun_file)
-    print_table(terminal_table(as_dict(summary)["estimators"], summary.reference.name), width=UNWRAPPED)
-    for sentence in [*verdict(solved), *(f"{name}: {text}." for name, text in solved.added.items())]:
-        click.echo(sentence)
+    print_table(terminal_table(solved, as_dict(summary)["estimators"]), width=UNWRAPPED)
+    click.echo()
+    print_sentences(verdict(solved), FIRST)
+    print_sentences([f"{name}: {text}." for name, text in solved.added.items()], mark="")
     announce(place / "report.html", opened=opened)
     return 0 if len(solved.answered) == len(solved.results) else FAILED
 

@@ -12,7 +12,7 @@ from fgbaseline.data.formats.atomic_write import atomic_write, require_new
 from fgbaseline.diagnosis import diagnose, repairs_text
 from fgbaseline.geometry import InputError
 
-from ..announced import announce
+from ..announced import announce, print_sentences
 from ..results.diagnosis import Found, found_by, found_of_inertial
 
 MARK = "diagnosis.json"
@@ -89,13 +89,13 @@ def _print(found: Found) -> None:
     if found.findings:
         _print_findings(found.findings)
     if found.undecided or not found.findings:
-        click.echo(found.verdict[0])
+        print_sentences(found.verdict[:1], mark="")
     if found.not_identifiable:
         click.echo("\nNot identifiable in this recording:")
-        for sentence in found.not_identifiable:
-            click.echo(f"- {sentence}")
+        print_sentences(found.not_identifiable)
     for sentence in found.sentences:
-        click.echo(f"\n{sentence}")
+        click.echo()
+        print_sentences([sentence], mark="")
 
 
 def _print_findings(findings: tuple[Finding, ...]) -> None:

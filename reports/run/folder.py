@@ -134,7 +134,7 @@ def _consistency(result: Result) -> pd.DataFrame:
 
 
 def _write_tables(run: Run, folder: Path) -> None:
-    """Writes trust.csv, reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv.
+    """Writes trust.csv, events.csv, reprojection_classes.csv, moved_points.csv, map_by_depth.csv and held_out.csv.
 
     The first column has the estimator; empty tables are not written.
     """
@@ -142,6 +142,7 @@ def _write_tables(run: Run, folder: Path) -> None:
         criteria = pd.DataFrame([asdict(c) | {"verdict": c.verdict.name.lower()} for c in run.trust.criteria])
         criteria.to_csv(folder / "trust.csv", index=False, float_format="%.6g")
     of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
+        "events": lambda r: pd.DataFrame(r.estimate.events),
         "reprojection_classes": lambda r: r.evidence.patterns,
         "moved_points": lambda r: r.evidence.moved[r.evidence.moved["moved"]].drop(columns="moved"),
         "map_by_depth": lambda r: r.evidence.map_by_depth,

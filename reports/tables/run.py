@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import islice
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -11,13 +12,13 @@ import pandas as pd
 
 from fgbaseline.compare import Criterion
 from fgbaseline.compare.estimate_comparison import Run, same_frames
-from fgbaseline.data import Estimate
+from fgbaseline.data import Estimate, Event
 from fgbaseline.data.finding import Finding
 
 from ..formatting import DASH, INFINITY, RESOLUTION, counted, number, per_cent, quantity, resolved
 from ..results.json_tree import INFINITE, at, leaves
-from ..results.metric import DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
-from ..results.metrics import shown_in
+from ..results.metric import ATE, DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
+from ..results.metrics import ate_resolution, shown_in
 from ..results.reader import DIVERGENCES
 from ..results.run import Summary
 from .table import Cell, Column, Row, Table, best
@@ -30,7 +31,7 @@ NOT_POSITIVE_DEFINITE = (
 )
 MAX_DYNAMIC = 100
 MAX_EVENTS = 200
-"""of an estimator that are listed one by one"""
+"""kinds of events of an estimator, with their causes, that are listed"""
 REASONS: Mapping[str, str] = {
     "feature not chosen": "not among the features asked for",
     "disparity": "disparity too small to determine the depth",
@@ -77,24 +78,31 @@ def evidence_table(run: Run, estimators: Estimators) -> Table:
     return replace(table, rows=tuple(row for row in table.rows if row.cells))
 
 
-def terminal_table(estimators: Estimators, reference: str | None) -> Table:
+def terminal_table(run: Run, estimators: Estimators) -> Table:
     """The few figures of every estimator that a terminal has room for; those that no estimator has are left out."""
     metrics = [m for m in shown_in(TERMINAL) if any(not isnan(m.value(e).value) for e in estimators.values())]
     if len({e["coverage"] for e in estimators.values()}) == 1:
         metrics = [metric for metric in metrics if not metric.uneven_only]
-    rows = []
+    rows, resolutions = [], _resolutions(run, metrics)
     for name, e in estimators.items():
         texts = [
-            "reference" if m.group == DIVERGENCE and name == reference else m.text(m.value(e).value) for m in metrics
+            "reference" if m.group == DIVERGENCE and name == run.reference else m.text(m.value(e).value, resolutions[m])
+            for m in metrics
         ]
         rows.append(Row(name, tuple(map(Cell, [e["status"], *texts]))))
     return Table((Column("status", words=True), *map(Column.flat, metrics)), tuple(rows))
+
+
+def _resolutions(run: Run, metrics: Iterable[Metric]) -> dict[Metric, float]:
+    """Sizes below which figures are rounding."""
+    return {m: ate_resolution(run) if m.group == ATE else RESOLUTION for m in metrics}
 
 
 def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table:
     values, answered, even = _shown(run, estimators, metrics)
     shown = list(values)
     rivals = {m: _rivals(run, m, answered) if even or m.same_data else set[str]() for m in shown}
+    resolutions = _resolutions(run, shown)
     firsts = {m: best(m.better, {name: values[m][name] for name in rivals[m]}) for m in shown}
     notes: dict[str, str] = {}
 
@@ -112,8 +120,8 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
             return Cell(OVERCONFIDENT, note=mark)
         if not isfinite(value):
             return Cell(DASH, note=mark)
-        marked = first is not None and m.text(value) == m.text(first) and not m.is_rounding(value)
-        return Cell(m.text(value), marked, mark)
+        text, is_rounding = m.text(value, resolutions[m]), m.is_rounding(value, resolutions[m])
+        return Cell(text, first is not None and text == m.text(first, resolutions[m]) and not is_rounding, mark)
 
     rows = tuple(
         Row(
@@ -229,7 +237,7 @@ def _residuals(run: Run) -> Table:
     tables = {r.name: r.evidence.patterns for r in run.answered}
     figures = {"n": "n", "median, px": "median", "mean, px": "mean", "95 %, px": "p95"}
     title = "Reprojection errors by distance, track age, place in the image and camera"
-    return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"mean u, px": "u", "mean v, px": "v"})
+    return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"median u, px": "u", "median v, px": "v"})
 
 
 def _map(run: Run) -> Table:
@@ -256,17 +264,17 @@ def _moved(run: Run) -> Table:
 
 
 def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, of each estimator that has any."""
+    """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, robust, of each that has any."""
     components = {name: e.get("components") or {} for name, e in estimators.items()}
     rows = tuple(
         Row(name, _numbers(*((of.get(row) or {}).get(key) for row in PIXEL_ROWS for key in ("bias", "spread"))))
         for name, of in components.items()
         if any(row.get("bias") is not None for row in of.values())
     )
-    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("bias", "spread"))
+    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("median", "1.4826 MAD"))
     caption = (
-        "Measured minus predicted: mean and standard deviation over all observations of the landmarks that an "
-        "estimator has."
+        "Measured minus predicted, over all observations of the landmarks that an estimator has. 1.4826 times the "
+        "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
     )
     return Table(columns, rows, caption=caption)
 
@@ -286,7 +294,7 @@ def exclusions_table(summary: Mapping[str, Any]) -> Table:
 
 
 def events_tables(run: Run) -> list[Table]:
-    """Events of each estimator, the first so many; estimators that one run answers for share a table."""
+    """Events of each estimator by kind and cause; estimators that one run answers for share a table."""
     names: dict[int, list[str]] = {}
     estimates: dict[int, Estimate] = {}
     for name, result in run.results.items():
@@ -297,17 +305,25 @@ def events_tables(run: Run) -> list[Table]:
 
 
 def _events(names: list[str], estimate: Estimate) -> Table:
-    events = estimate.events
-    kinds = Counter(event.kind for event in events).most_common()
+    kinds = Counter(event.kind for event in estimate.events).most_common()
     title = f"{', '.join(names)}: " + ", ".join(f"{number(count)} × {kind}" for kind, count in kinds)
-    rows = tuple(
-        Row(str(e.frame), (Cell("" if e.landmark is None else str(e.landmark)), Cell(e.kind), Cell(e.reason)))
-        for e in events[:MAX_EVENTS]
-    )
-    more = len(events) - MAX_EVENTS
-    caption = f"and {number(more)} more, which are not listed here." if more > 0 else ""
-    columns = (Column("landmark"), Column("what", words=True), Column("why", words=True))
-    return Table(columns, rows, name="frame", title=title, caption=caption)
+    alike: dict[tuple[str, str], list[Event]] = {}
+    for event in estimate.events:
+        alike.setdefault((event.kind, event.reason), []).append(event)
+    rows = tuple(Row(kind, (*_where(events), Cell(why))) for (kind, why), events in islice(alike.items(), MAX_EVENTS))
+    more = len(alike) - MAX_EVENTS
+    caption = f"{f'And {number(more)} more. ' if more > 0 else ''}tables/events.csv has every event."
+    columns = (Column("events"), Column("frames"), Column("landmarks"), Column("why", words=True))
+    return Table(columns, rows, name="event", title=title, caption=caption)
+
+
+def _where(events: list[Event]) -> tuple[Cell, ...]:
+    """Number of events of one kind and cause, first and last frame, and the landmark or how many there are."""
+    frames = sorted({event.frame for event in events})
+    landmarks = sorted({event.landmark for event in events if event.landmark is not None})
+    span = f"{frames[0]}" if len(frames) == 1 else f"{frames[0]}–{frames[-1]}"
+    few = ", ".join(map(str, landmarks)) if len(landmarks) <= 3 else f"{number(len(landmarks))} of them"
+    return Cell(number(len(events))), Cell(span), Cell(few)
 
 
 def _frames(

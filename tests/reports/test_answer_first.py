@@ -12,12 +12,13 @@ from fgbaseline.reports import comparison
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits_file import read_limits
 from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.phrases.run_accuracy import ate_sentences
 from fgbaseline.reports.results.reader import read_folder
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_numbers
-from fgbaseline.reports.tables.run import OVERCONFIDENT, main_table, trust_table
+from fgbaseline.reports.tables.run import OVERCONFIDENT, main_table, terminal_table, trust_table
 
-from ..builders.runs import answer, run_of, scene
+from ..builders.runs import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem
 
 
@@ -116,6 +117,26 @@ def test_a_difference_of_the_decimals_alone_is_zero_and_not_best(digits: int, re
     assert not mine.best
     assert not off.text.startswith("0 ±")
     assert any(s.startswith("Nearer to truth than the decimals of the files resolve: mine") for s in result.verdict)
+
+
+@pytest.mark.parametrize(("digits", "zero"), [(9, False), (4, True)])
+def test_an_ate_below_the_decimals_of_the_ground_truth_is_zero_and_not_ranked(digits: int, zero: bool) -> None:
+    exact = scene()
+    assert exact.truth is not None
+    poses = exact.truth.world_T_imu.copy()
+    poses[:, :3, 3] = np.round(poses[:, :3, 3], digits)
+    problem = plain_problem(replace(exact, truth=replace(exact.truth, world_T_imu=poses)))
+    names = {"ekf": (4e-5, 0.0, 0.0), "isam2": (0.0, 1e-4, 0.0), "joint-ekf": (0.0, 0.5, 0.0)}
+    run = run_of(problem, *(answer(plain_problem(exact), name, drift) for name, drift in names.items()))
+    sentences, estimators = ate_sentences(run), as_dict(run)["estimators"]
+    assert ("0 ± 8.66 × 10⁻⁵ m for" in sentences[0]) == zero
+    assert any("is the same to the printed digits" in sentence for sentence in sentences[1:]) == zero
+    for table in (main_table(run, estimators), terminal_table(run, estimators)):
+        at = next(i for i, column in enumerate(table.columns) if "unaligned" in column.title)
+        cells = {row.name: row.cells[at] for row in table.rows}
+        assert cells["ekf"].text.startswith("0 ±") == cells["isam2"].text.startswith("0 ±") == zero
+        assert not (zero and cells["ekf"].best)
+        assert not cells["joint-ekf"].text.startswith("0 ±")
 
 
 def test_a_claim_above_the_error_is_not_called_overconfident() -> None:

@@ -12,12 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy.stats import chi2
 
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data import Observations
+from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.top_view import TopView
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.layout import lay_out
+from fgbaseline.reports.figures.reprojection import BANDS, observations_by_frame
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, SCREEN, in_style, safe_text
@@ -276,6 +278,36 @@ def test_a_logarithmic_axis_is_labelled_with_numbers_and_powers_where_these_woul
     texts |= dict(zip(minor, axis.get_minor_formatter().format_ticks(list(minor)), strict=True))
     shown = [texts[value] for value in sorted(texts) if limits[0] <= value <= limits[1] and texts[value]]
     assert shown == expected
+
+
+def test_lines_that_coincide_all_show_and_the_reference_lies_on_those_of_its_graph() -> None:
+    problem = plain_problem(scene())
+    drifts = {"ekf": 3.0, "joint-ekf": 3.0, "isam2": 0.0, "batch": 1e-4}
+    run = run_of(problem, *(answer(problem, name, (drift, 0.0, 0.0)) for name, drift in drifts.items()))
+    for figure in drawn(run, "paths_overlaid", "height").values():
+        look = {line.get_label(): line for line in figure.axes[0].get_lines()}
+        batch, reference, ekf, twin = (look[name] for name in ("batch", "isam2 (reference)", "ekf", "joint-ekf"))
+        assert batch.get_zorder() < reference.get_zorder() < ekf.get_zorder() == twin.get_zorder()
+        assert batch.get_linewidth() > reference.get_linewidth() + 1.0
+        assert ekf.get_linewidth() > twin.get_linewidth() + 1.0
+
+
+def test_the_expected_curve_of_the_tracks_is_that_of_white_noise() -> None:
+    """A point seen in 60 frames has 177 degrees of freedom: half of the tracks are below 1 - 2 / (9 x 177)."""
+    panel = drawn_standard()["reprojection_classes"].axes[2]
+    ((x, y),) = lines(panel, "noise as assumed")
+    assert np.interp(50.0, y, x) == pytest.approx(1.0, abs=0.02)
+    assert np.interp(95.0, y, x) == pytest.approx(chi2.ppf(0.95, 177) / 177, abs=0.02)
+
+
+def test_each_observation_of_the_problem_or_the_mask_is_in_one_band() -> None:
+    problem = plain_problem(scene())
+    kinds = [kind for kind in Excluded if kind is not Excluded.FEATURE_NOT_CHOSEN]
+    excluded = np.resize(kinds, len(problem.excluded)).astype(np.uint8)
+    counts = observations_by_frame(replace(problem, excluded=excluded))
+    assert list(counts) == list(BANDS)
+    np.testing.assert_array_equal(sum(counts.values()), np.bincount(problem.sequence.observations.frame))
+    assert counts["copied from the frame before"].sum() == (excluded == Excluded.COPIED).sum() > 0
 
 
 def test_labels_of_a_column_of_panels_are_aligned() -> None:

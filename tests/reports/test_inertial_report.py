@@ -98,7 +98,7 @@ def test_tables_have_the_metrics_where_a_run_has_them() -> None:
     assert {"velocity", "gyroscope bias", "accelerometer bias", "NEES of the state"} <= {
         c.term for c in evidence_table(run, estimators).columns
     }
-    assert any(c.heading == "velocity, m/s" for c in terminal_table(estimators, run.reference).columns)
+    assert any(c.heading == "velocity, m/s" for c in terminal_table(run, estimators).columns)
     inertial = [m for m in METRICS if m.path[0] in INERTIAL]
     for e in estimators.values():
         assert all(bool(m.value(e)) for m in inertial if "divergence" not in m.path[0])

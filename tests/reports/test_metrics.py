@@ -58,7 +58,7 @@ def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.Monke
     run = standard_run()
     summary = as_dict(run)
     value = added.value(summary["estimators"]["ekf"]).text
-    for table in (main_table(run, summary["estimators"]), terminal_table(summary["estimators"], run.reference)):
+    for table in (main_table(run, summary["estimators"]), terminal_table(run, summary["estimators"])):
         (i,) = (i for i, column in enumerate(table.columns) if "95th percentile, m" in column.heading and i > 1)
         assert next(row for row in table.rows if row.name == "ekf").cells[i].text == value
     assert re.search(rf"<td[^>]*>(<strong>)?{re.escape(value)}<", render(run, summary, {}))

@@ -8,8 +8,10 @@ from functools import cache
 from hashlib import sha256
 from html.parser import HTMLParser
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fgbaseline.compare.estimate_comparison import Run
@@ -22,7 +24,8 @@ from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.metric import MAIN
 from fgbaseline.reports.results.metrics import shown_in
-from fgbaseline.reports.tables.run import evidence_table, long_tables, main_table
+from fgbaseline.reports.run.folder import _write_tables
+from fgbaseline.reports.tables.run import MAX_EVENTS, events_tables, evidence_table, long_tables, main_table
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
@@ -228,7 +231,7 @@ def test_a_run_without_observations_and_one_without_any_answer_have_their_page()
     assert "There is no reference" in rendered(nobody, with_figures=True)
 
 
-def test_masked_observations_and_events_are_counted_and_capped() -> None:
+def test_masked_observations_are_counted_and_events_of_one_kind_and_cause_are_one_row(tmp_path: Path) -> None:
     problem = plain_problem(scene())
     excluded = problem.excluded.copy()
     excluded[:31] = Excluded.PREDICTION
@@ -239,8 +242,46 @@ def test_masked_observations_and_events_are_counted_and_capped() -> None:
     html = rendered(run)
     assert re.search(r"contradicts its own track[^/]*</th><td>31</td>", html)
     assert "isam2, isam2-online: 250 × landmark dropped" in html
-    assert html.count("it came to lie behind") == 200
-    assert "and 50 more" in html
+    assert html.count("it came to lie behind") == 1
+    (table,) = events_tables(run)
+    assert [[row.name, *(cell.text for cell in row.cells)] for row in table.rows] == [
+        ["landmark dropped", "250", "0–59", "250 of them", "it came to lie behind"]
+    ]
+    assert "tables/events.csv" in table.caption
+    _write_tables(run, tmp_path)
+    listed = pd.read_csv(tmp_path / "events.csv")
+    assert listed["estimator"].value_counts().to_dict() == {"isam2": 250, "isam2-online": 250}
+    assert listed.loc[7, ["frame", "kind", "reason", "landmark"]].tolist() == [
+        7, "landmark dropped", "it came to lie behind", 7
+    ]  # fmt: skip
+
+
+def test_the_most_frequent_causes_of_events_are_listed_and_the_others_counted() -> None:
+    problem = plain_problem(scene())
+    events = tuple(Event(3, "landmark dropped", f"cause {k}", k) for k in range(MAX_EVENTS + 50))
+    (table,) = events_tables(run_of(problem, answer(problem, "isam2", events=events)))
+    assert len(table.rows) == MAX_EVENTS
+    assert table.caption.startswith("And 50 more. ")
+
+
+def test_the_glossary_has_the_terms_of_the_page_and_no_other() -> None:
+    tags = Elements(rendered(standard_run())).tags
+    links = {a["href"].removeprefix("#term-") for _, a in tags if a.get("href", "").startswith("#term-")}
+    terms = {a["id"].removeprefix("term-") for _, a in tags if a.get("id", "").startswith("term-")}
+    assert links <= terms
+    assert {"ate", "divergence", "nees", "reference-nees"} <= terms
+    assert not terms & {"coverage", "segment-error", "relative-error-rpe", "drift", "held-out-error", "velocity"}
+
+
+def test_the_moment_of_most_wrong_matches_is_the_one_of_the_sentence() -> None:
+    problem = plain_problem(scene())
+    frame = problem.sequence.observations.frame
+    excluded = np.where((frame >= 30) & (frame < 33), Excluded.PREDICTION, problem.excluded)
+    excluded = np.where(frame < 20, Excluded.COPIED, excluded).astype(np.uint8)  # copies are no wrong matches
+    run = run_of(replace(problem, excluded=excluded), answer(problem, "isam2"))
+    (bookmark,) = page_data(run)["bookmarks"]
+    assert bookmark == {"frame": 35, "text": "most wrong matches"}
+    assert any("in the second from 3 s on" in sentence for sentence in verdict(run))
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def unpacked(text: str) -> FloatArray:
 
 def test_a_comparison_has_the_sections_and_scripts_of_a_run_without_those_that_it_has_no_data_for() -> None:
     run, comparison = page_of_run(), page_of(six())
-    assert sections(comparison) == ["verdict", "table", "paths", "over-time", "glossary", "record"]
+    assert sections(comparison) == ["verdict", "paths", "table", "over-time", "glossary", "record"]
     assert set(sections(comparison)) <= set(sections(run))
     assert run.rpartition("<script>")[2] == comparison.rpartition("<script>")[2]
     plots = comparison_plots(six(), of_comparison(six()))

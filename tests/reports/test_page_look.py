@@ -324,20 +324,98 @@ def test_headings_are_aligned_as_the_cells_below_them(opened: Opened) -> None:
 
 def test_the_sticky_header_ends_with_its_table(opened: Opened) -> None:
     opened.page.set_viewport_size({"width": 1400, "height": 500})
-    (table,) = opened.boxes("#table table")
-    for above in (0.0, 0.5, 0.9, 1.2):
+    (table,), (bar,) = opened.boxes("#table table"), opened.boxes("#controls")
+    for above in (0.0, 0.4, 0.9, 1.2):
         opened.page.evaluate(
             f"scrollTo({{ top: scrollY + {table['y'] + above * table['height']}, behavior: 'instant' }})"
         )
         (now,), (head,) = opened.boxes("#table table"), opened.boxes("#table thead")
         assert now["y"] - 0.5 <= head["y"] <= now["y"] + now["height"] - head["height"] + 0.5
-        if above == 0.5:
-            assert head["y"] == pytest.approx(0.0, abs=1.0)
+        if above == 0.4:
+            assert head["y"] == pytest.approx(bar["height"], abs=1.0)
         opened.page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
 
 
+@pytest.mark.parametrize("size", [(1400, 900), (1400, 700), (800, 1000)])
+def test_the_bar_of_slider_and_switches_covers_no_table_and_no_heading(
+    chromium: Any, page: Path, size: tuple[int, int]
+) -> None:
+    opened = Opened(chromium, page.as_uri(), *size)
+    (bar,), (paths,), (table,) = (opened.boxes(one) for one in ("#controls", "#path-view", "#table h2"))
+    assert paths["y"] + paths["height"] <= bar["y"] < bar["y"] + bar["height"] <= table["y"]
+    for link in opened.page.locator("nav a").all():
+        opened.page.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+        section = link.get_attribute("href")
+        link.evaluate("link => link.click()")
+        (bar,) = opened.boxes("#controls")
+        (heading,) = opened.boxes(f"{section} > h2")
+        assert heading["y"] >= 0.0
+        assert section in ("#verdict", "#paths") or heading["y"] >= bar["y"] + bar["height"] - 0.5
+    opened.context.close()
+
+
+def test_lines_that_coincide_with_the_reference_show_at_both_sides_of_it(chromium: Any, tmp_path: Path) -> None:
+    problem = plain_problem(scene())
+    drifts = {"ekf": (3.0, 0.0, 0.0), "isam2": (0.0, 0.0, 0.0), "batch": (1e-4, 0.0, 0.0)}
+    run = run_of(problem, *(answer(problem, name, drift) for name, drift in drifts.items()))
+    file = tmp_path / "report.html"
+    file.write_text(render(run, as_dict(run), {}), encoding="utf-8")
+    opened = Opened(chromium, file.as_uri())
+    widths = """lines => lines.map(line => [line.getAttribute("class"),
+        parseFloat(getComputedStyle(line).strokeWidth)])"""
+    for place in ("#path-view", '.chart:has(svg[aria-label^="Height"])'):
+        drawn = opened.page.eval_on_selector_all(f"{place} .line:not(.estimator-truth)", widths)
+        assert [name for name, _ in drawn] == [f"line estimator-{i}" for i in (2, 1, 0)]  # the lowest first
+        (_, batch), (_, reference), (_, ekf) = drawn
+        assert batch >= reference + 2.0
+        assert reference > ekf
+    opened.page.select_option("#path-view select", "1000")
+    drawn = opened.page.eval_on_selector_all("#path-view .line:not(.estimator-truth)", widths)
+    assert drawn[0] == ["line estimator-1", 3.0]
+    assert all(width < 3.0 for _, width in drawn[1:])
+    opened.context.close()
+
+
+def test_a_line_that_jumps_is_a_running_median_until_the_chart_is_zoomed_in(chromium: Any, tmp_path: Path) -> None:
+    n = 900
+    problem = plain_problem(scene(frames=n))
+    seconds = np.where(np.arange(n) % 3 == 0, 1.0, 2e-3)  # every third frame takes 500 times as long
+    run = run_of(problem, answer(problem, "isam2", seconds=seconds))
+    file = tmp_path / "report.html"
+    file.write_text(render(run, as_dict(run), {}), encoding="utf-8")
+    opened = Opened(chromium, file.as_uri())
+    chart = '.chart:has(svg[aria-label^="Time per frame"])'
+
+    def heights() -> np.ndarray:
+        line = opened.attribute(f"{chart} .line", "d")
+        return np.array([point.split()[1] for point in line[1:].split("L")], dtype=np.float64)
+
+    assert np.ptp(heights()) < 0.1
+    assert "Running median over 9 frames" in opened.text(chart)
+    opened.page.evaluate("document.querySelector('[data-time=in]').click()")
+    for _ in range(3):
+        opened.page.click("[data-time=in]")
+    assert "Running median" not in opened.text(chart)
+    assert np.ptp(heights()) > 50.0
+    opened.context.close()
+
+
+def test_a_table_that_is_cut_off_has_a_shadow_at_its_edge_until_its_end_is_in_sight(phone: Opened) -> None:
+    phone.page.locator("#table .wide").scroll_into_view_if_needed()
+
+    def edge() -> float:
+        """Brightness of the last pixels beside the header, over that of those before."""
+        picture = Image.open(io.BytesIO(phone.page.locator("#table .wide").screenshot())).convert("L")
+        rows = np.asarray(picture, dtype=np.float64)[4:12]
+        return float(rows[:, -3:].mean() / rows[:, -60:-40].mean())
+
+    assert edge() < 0.95
+    phone.page.eval_on_selector("#table .wide", "e => { e.scrollLeft = e.scrollWidth; }")
+    assert edge() == pytest.approx(1.0, abs=0.01)
+
+
 def test_printed_paths_have_a_legend_of_what_is_shown(opened: Opened) -> None:
-    assert opened.boxes("#path-view .legend li") == []
+    assert [box["name"] for box in opened.boxes("#path-view .legend li")] == [*TEN, "truth"]
     opened.page.uncheck('#estimators-shown input[value="1"]')
     opened.page.emulate_media(media="print")
     assert [box["name"] for box in opened.boxes("#path-view .legend li")] == [TEN[0], *TEN[2:], "truth"]

@@ -1,12 +1,14 @@
 """Tables on terminals: no word, no figure and no interval is broken, however narrow the terminal."""
 
 import re
+import sys
 from io import StringIO
 from typing import Any
 
 import pytest
 import rich.console
 
+from fgbaseline.reports.announced import print_sentences
 from fgbaseline.reports.tables import Cell, Column, Row, Table, print_table
 
 HEADINGS = ("ATE RMSE", "divergence RMSE", "median reprojection", "claimed sigma", "reference NEES", "time")
@@ -56,3 +58,27 @@ def test_sentences_wrap_between_words(monkeypatch: pytest.MonkeyPatch) -> None:
     names = " ".join(line[:36] for line in lines)
     assert set(sentence.split()) <= set(names.replace("0.08", "").split())
     assert any("0.08 rad/s" in line and "0.02 rad/s" in line for line in lines)
+
+
+@pytest.mark.parametrize("columns", [50, 80, 120])
+def test_sentences_on_a_terminal_are_a_short_list_whose_lines_break_between_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], columns: int
+) -> None:
+    each = ", ".join(f"joint-ekf-{i} {i + 0.5} × 10⁻⁴ m [{i}.25, {i}.75] (0.286 % of it)" for i in range(8))
+    sentences = [f"Sentence {i}: {each}." for i in range(9)]
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    print_sentences(sentences, 6)
+    *shown, more = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= min(columns, 100)
+    assert [line for line in shown if line.startswith("- ")] == [line for line in shown if "Sentence" in line]
+    for figure in ("0.286 %", *(f"{i + 0.5} × 10⁻⁴ m" for i in range(8)), *(f"[{i}.25, {i}.75]" for i in range(8))):
+        assert "\n".join(shown).count(figure) == "".join(sentences[:6]).count(figure)
+    assert " ".join(" ".join(shown).split()) == " ".join(f"- {sentence}" for sentence in sentences[:6])
+    assert more == "The report has 3 more sentences."
+
+
+def test_sentences_in_a_file_have_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:
+    long = "A sentence with " + "many " * 60 + "words."
+    print_sentences([long, "And a short one."])
+    assert capsys.readouterr().out == f"- {long}\n- And a short one.\n"

@@ -2,11 +2,13 @@
 const ROOM = { left: 50, right: 10, top: 8, bottom: 24 };
 const HEIGHT = 190;
 const SHORTEST_DRAG = 6;  // px; anything shorter is a click
+const MEDIANS = 100;  // windows of a running median that the span holds
 
 class TimeChart {
   constructor(place, chart) {
     this.chart = chart;
     this.log = chart.log;
+    this.words = place.querySelector(".smoothed");
     this.place = place.querySelector(".plot");
     this.svg = svg("svg", { role: "img", "aria-label": chart.title + " over time" });
     this.place.append(this.svg);
@@ -60,13 +62,23 @@ class TimeChart {
     this.svg.addEventListener("dblclick", () => zoom(null));
   }
 
-  // The reference lies below the others.
   shown() {
-    return [...this.chart.lines].filter(([key]) => chosen.shown.has(key)).sort(([a], [b]) => isReference(b) - isReference(a));
+    return [...this.chart.lines].filter(([key]) => chosen.shown.has(key));
   }
 
-  // Over what is shown in the span, and the band where there is one.
-  range([first, last]) {
+  // What is drawn of each line shown between two frames: { key, points }, points being [frame, value].
+  // Of a line that jumps from frame to frame that is a running median, until the charts are zoomed in.
+  drawn(frames, pixels) {
+    const half = this.chart.smooth ? Math.floor((frames[1] - frames[0]) / MEDIANS / 2) : 0;
+    if (this.words) this.words.textContent = half ? `Running median over ${2 * half + 1} frames; zoomed in, each frame.` : "";
+    return this.shown().map(([key, line]) => ({
+      key,
+      points: half ? runningMedian(line, frames, half) : thinned(line, frames, pixels).map(k => [k, line[k]]),
+    }));
+  }
+
+  // Over what is drawn in the span, and the band where there is one.
+  range(lines, [first, last]) {
     let low = Infinity;
     let high = -Infinity;
     const take = value => {
@@ -74,14 +86,14 @@ class TimeChart {
       low = Math.min(low, value);
       high = Math.max(high, value);
     };
-    this.shown().forEach(([, line]) => line.subarray(first, last + 1).forEach(take));
+    lines.forEach(({ points }) => points.forEach(([, value]) => take(value)));
     this.narrowest(first, last).forEach(take);
     if (this.chart.band) this.chart.band.forEach(take);
     if (this.chart.middle !== null) take(this.chart.middle);
     if (low > high) return this.log ? [0.1, 10] : [0, 1];
     if (this.log) {
-      low = Math.max(low, high * 1e-6);
-      return low === high ? [low / 2, high * 2] : [low / 1.15, high * 1.15];
+      low = Math.max(low, high * 1e-6, RESOLUTIONS[this.chart.unit] || 0);
+      return low >= high ? [low / 2, low * 2] : [low / 1.15, high * 1.15];
     }
     if (low >= 0 && this.chart.bounds.size === 0) low = 0;
     const more = 0.04 * (high - low) || 1;
@@ -119,7 +131,8 @@ class TimeChart {
     if (this.width === 0) return;
     const [from, until] = span();
     const frames = [Math.max(0, frameAt(from) - 1), Math.min(run.frames - 1, frameAt(until) + 1)];
-    const [low, high] = this.range(frames);
+    const lines = this.drawn(frames, 2 * (this.width - ROOM.left - ROOM.right));
+    const [low, high] = this.range(lines, frames);
     const to = this.log ? Math.log : value => value;
     const scale = (HEIGHT - ROOM.top - ROOM.bottom) / (to(high) - to(low));
     const y = value => HEIGHT - ROOM.bottom - scale * (to(this.log ? Math.max(value, low) : value) - to(low));
@@ -146,19 +159,20 @@ class TimeChart {
     });
     if (this.chart.middle !== null) parts.push(across(this.chart.middle, "middle"));
     const view = svg("svg", { ...inner, y: 0, height: HEIGHT, viewBox: `${ROOM.left} 0 ${inner.width} ${HEIGHT}` });
-    for (const [key, line] of this.shown()) {
-      const chosenFrames = thinned(line, frames, 2 * inner.width);
+    for (const { key, points } of lines) {
       const bound = this.chart.bounds.get(key);
-      if (bound && !this.log) {
-        const around = chosenFrames.filter(k => Number.isFinite(line[k] + bound[k]));
-        const edge = sign => around.map(k => `${bounded(this.x(seconds[k]))} ${bounded(y(line[k] + sign * bound[k]))}`);
-        view.append(svg("polygon", { class: "bounds estimator-" + key, points: [...edge(1), ...edge(-1).reverse()].join(" ") }));
-      }
-      const d = polyline(chosenFrames.length, i => {
-        const k = chosenFrames[i];
-        return Number.isFinite(line[k]) ? [this.x(seconds[k]), y(line[k])] : null;
-      });
-      view.append(svg("path", { class: lineClass(key), d }));
+      if (!bound || this.log) continue;
+      const around = points.filter(([k, value]) => Number.isFinite(value + bound[k]));
+      const edge = sign => around.map(([k, value]) => `${bounded(this.x(seconds[k]))} ${bounded(y(value + sign * bound[k]))}`);
+      view.append(svg("polygon", { class: "bounds estimator-" + key, points: [...edge(1), ...edge(-1).reverse()].join(" ") }));
+    }
+    const at = (k, value) => (Number.isFinite(value) ? [this.x(seconds[k]), y(value)] : null);
+    const whole = lines.map(({ key, points }) => {
+      const line = this.chart.lines.get(key);
+      return { key, points, place: i => at(frames[0] + i, line[frames[0] + i]) };
+    });
+    for (const line of stacked(whole, frames[1] - frames[0] + 1)) {
+      view.append(lineOf(line, polyline(line.points.length, i => at(...line.points[i]))));
     }
     this.marked = svg("rect", { class: "marked", y: ROOM.top, height: HEIGHT - ROOM.top - ROOM.bottom, width: 0 });
     [this.cursor, this.hairline] = ["cursor", "hairline"].map(name => svg("line", { class: name, y1: ROOM.top, y2: HEIGHT - ROOM.bottom }));

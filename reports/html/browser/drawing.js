@@ -46,7 +46,48 @@ function thinned(line, [first, last], pixels) {
   return frames;
 }
 
-const lineClass = key => `line estimator-${key}${isReference(key) ? " reference" : ""}`;
+// Medians of a line over the frames around every `half`-th frame between two ends, which are among them: [frame, value].
+function runningMedian(line, [first, last], half) {
+  const frames = Array.from({ length: Math.floor((last - first) / half) + 1 }, (_, i) => first + i * half);
+  if (frames[frames.length - 1] !== last) frames.push(last);
+  return frames.map(k => {
+    const around = Array.from(line.subarray(Math.max(0, k - half), k + half + 1)).filter(Number.isFinite).sort((a, b) => a - b);
+    const middle = around.length >> 1;
+    return [k, around.length % 2 ? around[middle] : around.length ? (around[middle - 1] + around[middle]) / 2 : NaN];
+  });
+}
+
+const SAMPLES = 200;  // places of two lines that are compared
+const SAME = 1;  // px: lines nearer than this everywhere coincide
+
+// Whether two lines coincide, by their places ([x, y] or null) in n frames.
+function coincide(a, b, n) {
+  const step = Math.max(1, Math.floor(n / SAMPLES));
+  let both = 0;
+  for (let k = 0; k < n; k += step) {
+    const [at, other] = [a(k), b(k)];
+    if (!at !== !other) return false;
+    if (!at) continue;
+    if (Math.abs(at[0] - other[0]) + Math.abs(at[1] - other[1]) > SAME) return false;
+    both++;
+  }
+  return both > 0;
+}
+
+// Lines { key, place } in the order they are drawn, each with its width: of lines that coincide the lower one is wider.
+// The reference lies below all but those that coincide with it.
+function stacked(lines, n) {
+  const reference = lines.find(line => isReference(line.key));
+  const level = line => (line === reference ? 1 : reference && coincide(line.place, reference.place, n) ? 0 : 2);
+  const order = lines.map(line => [level(line), line]).sort(([a], [b]) => a - b).map(([, line]) => line);
+  for (let i = order.length - 1; i >= 0; i--) {
+    const above = order.slice(i + 1).filter(line => coincide(order[i].place, line.place, n)).map(line => line.width);
+    order[i].width = Math.max(isReference(order[i].key) ? 3 : 1.6, 3 + Math.max(-Infinity, ...above));
+  }
+  return order;
+}
+
+const lineOf = ({ key, width }, d) => svg("path", { class: "line estimator-" + key, style: `stroke-width: ${width.toFixed(1)}px`, d });
 
 const RESOLUTIONS = { m: 1e-5, "°": 1e-5, px: 1e-4 };  // formatting.py; pixels are kept in 32 bits
 

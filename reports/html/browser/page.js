@@ -21,7 +21,11 @@ const fold = () => { list.open = !phone.matches; };
 phone.addEventListener("change", fold);
 fold();
 
-// Legends of paper and phone have what is shown.
+// Headings of tables and of sections stop below the bar that holds slider and switches.
+const bar = document.getElementById("controls");
+new ResizeObserver(() => document.documentElement.style.setProperty("--bar", bar.offsetHeight + "px")).observe(bar);
+
+// Legends have what is shown.
 onShown.push(() => {
   for (const entry of document.querySelectorAll(".legend li")) entry.hidden = !chosen.shown.has(entry.dataset.key);
 });

@@ -1,5 +1,5 @@
 // All paths from above or in 3D, with landmarks, covariance ellipses and the frame of the cursor.
-// Paths that coincide are drawn apart: their offsets from the reference, pose by pose, times a factor.
+// Paths that coincide can be drawn apart: their offsets from the reference, pose by pose, times a factor.
 const ELLIPSES = 25;
 const CHI = Math.sqrt(5.991);  // 95 % of a plane's two degrees of freedom
 const ACROSS = 1.96;  // sigmas: 95 % of one degree of freedom
@@ -109,7 +109,7 @@ class PathView {
   draw() {
     this.width = Math.round(this.place.clientWidth);
     if (this.width === 0) return;
-    this.height = Math.round(Math.max(250, Math.min(0.5 * this.width, 560)));
+    this.height = Math.round(Math.max(250, Math.min(0.6 * this.width, 560)));
     this.svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     this.prepare();
     const parts = [];
@@ -121,7 +121,11 @@ class PathView {
     if (this.band && shown.includes(this.reference)) {
       parts.push(svg("polygon", { class: "bounds estimator-" + this.reference.key, points: this.bandAround(this.reference) }));
     }
-    for (const trajectory of shown) parts.push(svg("path", { class: lineClass(trajectory.key), d: this.track(this.path(trajectory)) }));
+    this.lines = stacked(shown.map(trajectory => {
+      const path = this.path(trajectory);
+      return { key: trajectory.key, trajectory, path, place: k => (Number.isFinite(path[3 * k]) ? this.project(path, 3 * k) : null) };
+    }), run.frames);
+    for (const line of this.lines) parts.push(lineOf(line, polyline(run.frames, line.place)));
     if (this.ellipses) {
       const every = Math.max(1, Math.floor(run.frames / ELLIPSES));
       for (const trajectory of shown) {
@@ -131,14 +135,13 @@ class PathView {
         parts.push(svg("path", { class: "ellipse estimator-" + trajectory.key, d }));
       }
     }
-    for (const trajectory of shown) {
-      const path = this.path(trajectory);
+    for (const { key, path, place } of this.lines) {
       const last = this.lastPose(path);
       if (last < 0) continue;
-      const [x, y] = this.project(path, 3 * last);
-      parts.push(svg("rect", { class: "end estimator-" + trajectory.key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
+      const [x, y] = place(last);
+      parts.push(svg("rect", { class: "end estimator-" + key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
     }
-    const [first] = shown;
+    const first = shown.includes(this.reference) ? this.reference : shown[0];
     const start = first ? first.path.findIndex(Number.isFinite) : -1;
     if (start >= 0) {
       const [x, y] = this.project(first.path, start);
@@ -152,19 +155,13 @@ class PathView {
     this.drawCursor();
   }
 
-  // The reference lies below the others.
   shown() {
-    return [...trajectories.values()].filter(trajectory => chosen.shown.has(trajectory.key))
-      .sort((a, b) => isReference(b.key) - isReference(a.key));
+    return [...trajectories.values()].filter(trajectory => chosen.shown.has(trajectory.key));
   }
 
   lastPose(path) {
     for (let k = run.frames - 1; k >= 0; k--) if (Number.isFinite(path[3 * k])) return k;
     return -1;
-  }
-
-  track(path) {
-    return polyline(path.length / 3, k => (Number.isFinite(path[3 * k]) ? this.project(path, 3 * k) : null));
   }
 
   dots(points) {
@@ -245,10 +242,10 @@ class PathView {
     if (!this.cursor) return;
     const k = chosen.frame;
     const parts = [];
-    for (const trajectory of this.shown()) {
-      const path = this.path(trajectory);
-      if (!Number.isFinite(path[3 * k])) continue;
-      const [x, y] = this.project(path, 3 * k);
+    for (const { trajectory, place } of this.lines) {
+      const at = place(k);
+      if (!at) continue;
+      const [x, y] = at;
       if (this.ellipses && trajectory.covariance) {
         parts.push(svg("path", { class: "ellipse now estimator-" + trajectory.key, d: this.ellipse(trajectory, k) }));
       }
