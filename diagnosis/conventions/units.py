@@ -90,13 +90,13 @@ def usual_baseline(sequence: Sequence) -> Sequence:
 
     The camera is then placed at the IMU, since the unit of its position is unknown.
     """
-    b = sequence.camera.baseline
+    b = sequence.stereo_camera.baseline
     if BASELINES[0] <= b <= BASELINES[1]:
         return sequence
     factor = 1000.0 ** -round(np.log(b / 0.2) / np.log(1000.0))
     imu_T_cam = sequence.imu_T_cam.copy()
     imu_T_cam[:3, 3] = 0.0
-    return replace(sequence, camera=replace(sequence.camera, baseline=b * factor), imu_T_cam=imu_T_cam)
+    return replace(sequence, camera=replace(sequence.stereo_camera, baseline=b * factor), imu_T_cam=imu_T_cam)
 
 
 def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mapping[str, float] | None = None) -> Units:
@@ -106,7 +106,7 @@ def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mappin
     """
     given = ({"time": 1.0} if sequence.time_unit_given else {}) | dict(given or {})
     scale_ratios = _gains(sequence, seen_by_cameras)
-    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    interval, b = float(np.median(sequence.dt)), sequence.stereo_camera.baseline
     ratios = _known(scale_ratios[0]), _known(scale_ratios[1])
     if not given and any(ratio is not None for ratio in ratios) and _fits(Units(), ratios):
         return Units(scale_ratios=scale_ratios, doubt=_unfollowed(sequence, Units(), scale_ratios[0], given))
@@ -183,7 +183,7 @@ def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleR
     if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
         return unknown, unknown
     seen, recorded = seen_by_cameras.twist(sequence.dt), _without_jumps(zero_order_hold(sequence))
-    scale = sequence.camera.baseline / usual_baseline(sequence).camera.baseline
+    scale = sequence.stereo_camera.baseline / usual_baseline(sequence).stereo_camera.baseline
     angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
     linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
     return angular, linear._replace(ratio=linear.ratio * scale)
@@ -236,7 +236,7 @@ def rescaled(sequence: Sequence, units: Units) -> Sequence:
         rescaled_time(sequence, units.time),
         linear_velocity=sequence.linear_velocity * units.linear,
         angular_velocity=sequence.angular_velocity * units.angular,
-        camera=replace(sequence.camera, baseline=sequence.camera.baseline * units.baseline),
+        camera=replace(sequence.stereo_camera, baseline=sequence.stereo_camera.baseline * units.baseline),
         imu_T_cam=imu_T_cam,
     )
 
@@ -248,7 +248,7 @@ def _takes_camera_along(sequence: Sequence, units: Units) -> bool:
 
 def unit_findings(units: Units, sequence: Sequence, seen: str = "") -> tuple[Finding, ...]:
     """A finding for each wrong unit of `sequence`, as recorded; `seen` is evidence other than the scale ratios."""
-    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    interval, b = float(np.median(sequence.dt)), sequence.stereo_camera.baseline
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
         f"{interval * units.time:.3g} s",
@@ -289,7 +289,7 @@ def _doubt(sequence: Sequence, scale_ratios: tuple[ScaleRatio, ScaleRatio], cand
         fits.append(" with ".join(wrong) or "all units as they should be")
     return (
         f"the units are in doubt: {evidence(Units(scale_ratios=scale_ratios))}, the median interval between frames is "
-        f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.camera.baseline:.6g}, which fits "
+        f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.stereo_camera.baseline:.6g}, which fits "
         f"{' as well as '.join(fits)}; settle it with --time-unit s, ms, us or ns, or with a table [units] in --repairs"
     )
 

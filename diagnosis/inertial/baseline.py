@@ -31,8 +31,8 @@ def baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
 
     `seen` is the odometry of `usual_baseline(sequence)`.
     """
-    b = sequence.camera.baseline
-    usual = usual_baseline(sequence).camera.baseline / b
+    b = sequence.stereo_camera.baseline
+    usual = usual_baseline(sequence).stereo_camera.baseline / b
     if usual == 1.0 or seen is None:
         return BaselineUnit()
     for factor in (1.0, usual):
