@@ -105,7 +105,7 @@ class TrustLimits:
     batch_cost: tuple[float, float] = (0.005, 0.05)
     """relative excess of its cost over that of the batch solution"""
     batch_position: tuple[float, float] = (0.1, 2.0)
-    """RMSE of its positions from those of the batch solution, in baselines of the stereo rig"""
+    """RMSE of its positions from those of the batch solution, in baselines of the rig (0.1 m for one camera)"""
     impossible_share: tuple[float, float] = (0.2, 0.5)
     """share of the `expected_observations` without positive disparity"""
 
@@ -213,7 +213,10 @@ def expected_observations(problem: Problem) -> BoolArray:
 
 
 def has_positive_disparity(problem: Problem) -> BoolArray:
-    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has."""
+    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has; one camera has
+    none that is not."""
+    if problem.sequence.monocular:
+        return np.ones(len(problem.excluded), dtype=np.bool_)
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 
@@ -240,7 +243,7 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = rms_norm(apart)
-    baselines = rmse / problem.sequence.camera.baseline
+    baselines = rmse / problem.sequence.camera.unit_length
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
     start = " started at isam2's answer" if EventKind.STARTED_AT_ISAM2 in kinds else ""

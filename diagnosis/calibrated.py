@@ -9,7 +9,7 @@ from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import NoiseSettings, Problem
 from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
-from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.sequence import Sequence, require_scale
 from fgbaseline.geometry import HuberKernel, InputError
 
 from .estimation.pipeline import diagnose
@@ -18,6 +18,7 @@ from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
+from .monocular.problem import monocular_problem
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
@@ -55,6 +56,7 @@ def calibrated(
     increments, and the noise that the recording states. The number of `processes` does not change the result. Raises
     InputError for impossible repairs, for repairs together with `settings`, and where the units are in doubt.
     """
+    require_scale(sequence)
     if sequence.imu is not None:
         return _inertial(sequence, features, settings, repairs, processes)
     if settings is not None and repairs is not None:
@@ -83,6 +85,10 @@ def _inertial(
     """The problem of a recording with raw inertial samples, whose start takes the place of velocities."""
     if repairs is not None:
         raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
+    if sequence.monocular:
+        if settings is not None:
+            return monocular_problem(sequence, features, settings.noise.pixel, settings.kernel)
+        return monocular_problem(sequence, features, None, HuberKernel())
     if settings is not None:
         return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
     return inertial_problem(diagnose_inertial(sequence, processes), features)

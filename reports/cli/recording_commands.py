@@ -11,6 +11,7 @@ from . import options
 from .options import PATH, Numbers
 
 PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
+CAMERAS = ("stereo", "left")
 INTERVALS = ("after", "before", "mean")
 DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
 
@@ -90,7 +91,7 @@ def run(
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
 
-    SEQUENCE is a recording of tracks, or a folder or ROS bag of stereo images: their tracks are written into the
+    SEQUENCE is a recording of tracks, or a folder or ROS bag of images: their tracks are written into the
     folder of the run, tracks.npz.
 
     Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
@@ -127,10 +128,11 @@ def run(
 @options.imu_calibration
 @options.images
 def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
-    """Track the stereo images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
+    """Track the images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
 
-    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. The
-    npz is a recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
+    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. With
+    one camera (--cameras left, cam0 alone, one topic of images) the epipolar constraint is that check. The npz is a
+    recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
     """
     from fgbaseline.data.tracking import ImageOptions
 
@@ -237,6 +239,9 @@ def export(out: Path, force: bool, topics: str | None, settings: Path | None, **
 @click.option("--seed", help="The same seed gives the same bytes.  [default: 0]", type=int)
 @click.option("--standing", help="Seconds at rest before the motion starts.  [default: 0]", type=float)
 @click.option("--imu", is_flag=True, help="Raw inertial samples in place of body velocities.")
+@click.option(
+    "--cameras", help="Both cameras, or the left one alone with --imu.  [default: stereo]", type=click.Choice(CAMERAS)
+)
 @click.option("--imu-rate", help="Hz, with --imu.  [default: 200]", type=float)
 @click.option(
     "--imu-noise",

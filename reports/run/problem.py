@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,17 +24,17 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame, ParsedTrajectory
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.tracking import ImageOptions, Pictures, has_images
+from fgbaseline.data.tracking import Cameras, ImageOptions, Pictures, has_images
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
-from .defaults import DEFAULT_ESTIMATORS
+from .defaults import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS
 
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
 BESIDE = ("velocities", "extrinsic")
-IMAGES = ("right", "calibration", "times", "tracker")
+IMAGES = ("cameras", "right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
 TRACKS = "tracks.npz"
 """of a run on images, in its folder"""
@@ -72,6 +72,8 @@ class RunSettings:
     """CSV of body velocities, in place of the recording's motion"""
     extrinsic: Path | None = None
     """imu_T_cam of the left camera, in place of the recording's"""
+    cameras: Cameras | None = None
+    """of a recording of images: a pair, or the left one alone; None for a pair where there is one"""
     right: Path | None = None
     """folder of right images, where the sequence is that of the left ones"""
     calibration: Path | None = None
@@ -153,6 +155,14 @@ def _source(function: Callable[..., object]) -> str:
         return f"{inspect.getsourcefile(function)}:{name}"
     except TypeError:  # one written in C, or an object that can be called
         return name
+
+
+def with_defaults(settings: RunSettings, sequence: Sequence) -> RunSettings:
+    """The settings for a recording: with one camera, other default estimators."""
+    named = settings.estimators[: len(DEFAULT_ESTIMATORS)] != DEFAULT_ESTIMATORS or settings.batch_up_to == 0
+    if named or not sequence.monocular:
+        return settings
+    return replace(settings, estimators=(*ONE_CAMERA_ESTIMATORS, *settings.estimators[len(DEFAULT_ESTIMATORS) :]))
 
 
 def check_estimators(names: tuple[str, ...], functions: Mapping[str, Callable[..., object]] | None = None) -> None:
@@ -248,7 +258,7 @@ def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
     if settings.time_unit is not None:
         raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
     assert isinstance(settings.sequence, Path)
-    names = ("right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
+    names = ("cameras", "right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
     options = ImageOptions(**{name: getattr(settings, name) for name in names})
     truth = settings.truth if isinstance(settings.truth, Path) else None
     return image_sequence(settings.sequence, options, settings.tracker, truth, settings.truth_frame, pictures)
