@@ -25,6 +25,8 @@ from ..observations import IntArray, Observations
 from .array_stream import ArrayStream
 from .one_camera import ROWS, require_one_kind
 
+MOST_EQUAL = 0.01
+"""share of the entries whose four rows may be equal by chance"""
 UNOBSERVED = -1.0
 FIRST_RIGHT = 2
 """row of the right camera"""
@@ -164,6 +166,12 @@ def _observations(index: IntArray, pixel: FloatArray, layout: _Layout) -> Observ
             f"{layout.key}: landmark {landmark[i]} in frame {frame[i]} is {pixel[i].tolist()}, -1 in some rows only "
             f"({len(half_seen)} such entries); write -1 in all four rows where it was not observed, or four pixel "
             "coordinates of which none is exactly -1, or NaN in uR and vR of all observations for one camera"
+        )
+    same = np.flatnonzero((pixel == pixel[:, :1]).all(axis=1))
+    if len(same) > max(1, MOST_EQUAL * len(pixel)):
+        raise InputError(
+            f"{layout.key}: {len(same):,} of {len(pixel):,} entries have the same number in all four rows, such as "
+            f"{pixel[same[0], 0]:g}: no pixel coordinates; write -1 in all four rows where a landmark was not observed"
         )
     require_one_kind(layout.key, frame, landmark, pixel)
     return Observations.sort(frame, landmark, pixel)

@@ -19,6 +19,7 @@ from .baseline import baseline_findings
 from .result import InertialDiagnosis
 from .sensor_axes import axes_findings
 from .sensor_findings import sensor_findings
+from .spikes import NOUNS, spike_findings
 from .units import imu_unit_findings
 
 MIN_DROPPED = 0.001
@@ -32,7 +33,7 @@ def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = 
     units = (*baseline_findings(found.baseline, found.recorded), *imu_unit_findings(found.units))
     meaning = (*units, *axes_findings(found.axes))
     of_file = (*found.sequence.findings, *intrinsics_findings(found.sequence))
-    findings = (*of_file, *meaning, *_gaps(found.sequence))
+    findings = (*of_file, *meaning, *_gaps(found.sequence), *spike_findings(found.spikes))
     if found.sensors is not None:
         noise = found.recorded.imu.noise if found.recorded.imu is not None else None
         stated = None if noise is None else (noise.gyroscope_density, noise.accelerometer_density)
@@ -60,6 +61,7 @@ def inertial_repairs(found: InertialDiagnosis) -> tuple[str, ...]:
     done = [f"{name} of the inertial samples multiplied by {factor:.6g}" for name, factor in named if factor != 1.0]
     lengths = (("baseline", found.baseline.factor), ("translation of imu_T_cam", found.baseline.extrinsic))
     done += [f"{name} multiplied by {factor:.6g}" for name, factor in lengths if factor != 1.0]
+    done += [f"{plural(len(s.samples), 'spike')} of the {NOUNS[s.sensor][0]} interpolated" for s in found.spikes]
     if found.axes.changed:
         done.append("inertial samples turned from the axes they were recorded in to those of imu_T_cam")
     return tuple(done)

@@ -22,6 +22,7 @@ from .baseline import baseline_unit
 from .result import InertialDiagnosis
 from .sensor_axes import SensorAxes, in_imu_axes, sensor_axes
 from .sensors import sensor_checks
+from .spikes import without_spikes
 from .units import imu_units, rescaled_samples
 
 BEGINNING = 3.0
@@ -71,7 +72,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
     usual = usual_rig(recorded)
     seen = odometry(usual) if len(recorded.observations) else None
     units = imu_units(recorded, seen)
-    sequence = rescaled_samples(recorded, units)
+    sequence, spikes = without_spikes(rescaled_samples(recorded, units))
     axes = SensorAxes() if seen is None else sensor_axes(sequence, seen)
     sequence = in_imu_axes(sequence, axes)
     baseline = baseline_unit(sequence, seen)
@@ -80,7 +81,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
     imu = imu_intervals(sequence.imu, sequence.t)
     reason = baseline.doubt or unusable(sequence)
     if reason or seen is None:
-        return InertialDiagnosis(sequence, recorded, reason, units, axes, baseline, imu)
+        return InertialDiagnosis(sequence, recorded, reason, units, axes, baseline, imu, spikes=spikes)
     if usual is not recorded:  # its camera is at the IMU
         seen = odometry(sequence)
     found = InertialDiagnosis(
@@ -92,6 +93,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
         imu=imu,
         odometry=seen,
         repeated=repeated(sequence),
+        spikes=spikes,
     )
     first = inertial_start(sequence, seen, imu, max(seen.pixel_sigma, np.finfo(float).tiny))
     if first is None:

@@ -17,6 +17,7 @@ from ..odometry.stereo_odometry import Odometry
 from .baseline import BaselineUnit
 from .sensor_axes import SensorAxes
 from .sensors import SensorChecks
+from .spikes import Spikes
 from .units import ImuUnits
 
 
@@ -36,6 +37,7 @@ class InertialDiagnosis(Displayed):
     odometry: Odometry | None = None
     repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """(T-1,) intervals whose tracks are copies"""
+    spikes: tuple[Spikes, ...] = ()
     start: Start | None = None
     path: InertialPath | None = None
     fit: CalibrationFit | None = None

@@ -301,8 +301,10 @@ def build_problem(sequence: Sequence, settings: RunSettings, processes: int = 1)
 
 
 def preliminary_remarks(problem: Problem) -> list[str]:
-    """Sentences that a run prints first: faults of the file, and ground truth for few frames."""
+    """Sentences that a run prints first: faults of the file, an offset that stays, and ground truth for few frames."""
+    left = [f for f in problem.findings if f.code == "time_offset" and f.after == f.before]
     sentences = [finding.sentence for finding in problem.findings if finding.code in OF_THE_FILE]
+    sentences += [finding.sentence for finding in left]
     truth = problem.sequence.truth
     if truth is not None and truth.known.mean() < MIN_TRUTH_SHARE:
         sentences += [remark for remark in problem.sequence.remarks if "ground truth" in remark.lower()]

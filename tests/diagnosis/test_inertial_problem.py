@@ -11,11 +11,12 @@ import pytest
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data.axis_conventions import axes_matrix
-from fgbaseline.data.imu import ImuSamples
+from fgbaseline.data.imu import ASSUMED_NOISE, ImuSamples
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis.conventions.rate_units import DEGREE
 from fgbaseline.diagnosis.inertial.sensor_findings import sensor_findings
+from fgbaseline.diagnosis.inertial.spikes import without_spikes
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
 from ..builders import inertial_paths
@@ -367,3 +368,48 @@ def test_upside_down_is_a_problem_like_any_other() -> None:
     found = diagnosis.calibrated(inertial_recording(upside_down, n_frames=40))
     assert found.initial_pose[2, 2] < -0.9
     assert faults(found) == []
+
+
+def with_jumps(recording: data.Sequence, sensor: str, at: list[int], size: float) -> data.Sequence:
+    """The recording with `size` added to all axes of one sensor at these samples."""
+    assert recording.imu is not None
+    values = getattr(recording.imu, sensor).copy()
+    values[at] += size
+    return replace(recording, imu=replace(recording.imu, **{sensor: values}))
+
+
+@pytest.mark.parametrize(
+    ("sensor", "size", "code"),
+    [("specific_force", 400.0, "accelerometer_spikes"), ("angular_velocity", -30.0, "gyroscope_spikes")],
+)
+def test_single_samples_far_from_all_around_are_replaced_and_counted(
+    recording: data.Sequence, problem: Problem, sensor: str, size: float, code: str
+) -> None:
+    found = diagnosis.calibrated(with_jumps(recording, sensor, [40, 90, 200], size))
+    assert faults(found) == [code]
+    assert next(f for f in found.findings if f.code == code).before == 3
+    assert found.sequence.imu is not None
+    assert problem.sequence.imu is not None
+    ours, clean = getattr(found.sequence.imu, sensor), getattr(problem.sequence.imu, sensor)
+    np.testing.assert_allclose(ours[[40, 90, 200]], clean[[40, 90, 200]], atol=abs(size) / 200.0)
+    np.testing.assert_array_equal(np.delete(ours, [40, 90, 200], axis=0), np.delete(clean, [40, 90, 200], axis=0))
+
+
+def test_a_shock_of_three_samples_is_no_spike(recording: data.Sequence) -> None:
+    shaken = with_jumps(recording, "specific_force", [80, 81, 82], 200.0)
+    assert without_spikes(shaken) == (shaken, ())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "imu/2011_09_30_drive_0027_imu0.csv",
+        "euroc/V1_02_medium/mav0/imu0/data.csv",
+        "euroc/MH_04_difficult/mav0/imu0/data.csv",
+    ],
+)
+def test_samples_of_real_units_have_no_spikes(recordings: Callable[[str], Path], name: str) -> None:
+    rows = np.loadtxt(recordings(name), delimiter=",", comments="#", usecols=range(7))
+    samples = ImuSamples((rows[:, 0] - rows[0, 0]) * 1e-9, rows[:, 1:4], rows[:, 4:7], ASSUMED_NOISE)
+    drawn = inertial_recording(turn, seed=1, n_frames=10)
+    assert without_spikes(replace(drawn, imu=samples))[1] == ()

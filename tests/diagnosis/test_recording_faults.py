@@ -186,6 +186,15 @@ def test_a_gap_that_nothing_bridges_is_refused_by_its_length(motion: str) -> Non
     assert "time_stamps: 3e+08 s pass between frame 59 and frame 60" in unusable(drawn)
 
 
+@pytest.mark.parametrize("value", [-999.0, 1e6, 65535.0])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_another_number_for_unobserved_is_refused_with_it(tmp_path: Path, value: float, order: Any) -> None:
+    features = np.array(arrays_of()["features"], dtype=float, order=order)
+    features[:, (features == -1.0).all(axis=0)] = value
+    with pytest.raises(InputError, match=re.escape(f"the same number in all four rows, such as {value:g}")):
+        data.read(written(tmp_path, features=features))
+
+
 def test_an_hour_between_two_slow_keyframes_is_no_such_gap() -> None:
     assert unusable(scaled(drive(), "stamps", 36_000.0)) == ""
 
