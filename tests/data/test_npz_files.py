@@ -142,7 +142,7 @@ def test_the_dense_block_is_never_held(tmp_path, course_arrays, order):
     course_arrays["time_stamps"] = np.arange(T)[None, :] * 0.1
     course_arrays["linear_velocity"] = course_arrays["angular_velocity"] = np.zeros((3, T))
     features = np.full((4, N, T), -1.0, order=order)
-    features[:, ::7, ::50] = 5.0
+    features[:, ::7, ::50] = np.array([9.0, 5.0, 4.0, 5.0])[:, None, None]
     np.savez_compressed(tmp_path / "big.npz", **course_arrays | {"features": features})
     size = features.nbytes
     del features
