@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dtrsm, dtrsv
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
@@ -137,6 +137,22 @@ class Innovation:
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
         """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance (3,))."""
         return squared_norm(self.residual, self.H.own_blocks(self.HP) + np.diag(variance))
+
+    def nis_given_others(self, variance: FloatArray) -> FloatArray:
+        """NIS (n,) of each observation under its prediction from the state and all other observations.
+
+        With z = S^-1 nu and B_i the i-th block (3, 3) on the diagonal of S^-1 it is z_i^T B_i^-1 z_i, because B_i^-1 is
+        the covariance of the i-th innovation given the others and B_i^-1 z_i its mean. R = diag(variance (3,)). Raises
+        NotPositiveDefiniteError.
+        """
+        factor = self.factorize(variance)
+        inverse, failed = dpotri(factor.L, lower=1)
+        if failed:
+            raise NotPositiveDefiniteError
+        z = dtrsv(factor.L, factor.whitened, lower=1, trans=1).reshape(-1, 3)
+        each = np.arange(len(self))
+        lower = np.tril(inverse.reshape(len(self), 3, len(self), 3)[each, :, each, :])
+        return squared_norm(z, lower + np.swapaxes(np.tril(lower, -1), 1, 2))
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
         """Factor of S for R = diag(variance), (n, 3) or (3,), px^2. Raises NotPositiveDefiniteError."""
