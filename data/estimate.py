@@ -68,6 +68,8 @@ class EventKind(StrEnum):
     """observations rejected by a chi-square gate"""
     FRAME_DISAGREES = "frame disagrees"
     """all observations of a frame rejected, because most of them exceed a chi-square quantile"""
+    MOTION_DOUBTED = "motion doubted"
+    """noise added to a filter's motion, because successive frames disagree with it and not in themselves"""
     INITIALIZATION_DEFERRED = "initialization deferred"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
     STATE_FULL = "state full"

@@ -12,7 +12,7 @@ from fgbaseline.geometry.measurement import back_projected, predict
 
 from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
-from .gating import gate_observations
+from .gating import MAX_REJECTED, GatedObservations, gate_observations, motion_noise_factor
 from .gyro_bias import BiasedVelocityMotion
 from .inverse_depth_prior import inverse_depth_prior
 from .landmark_map import LandmarkMap
@@ -62,6 +62,10 @@ class JointFilter:
         self.map = LandmarkMap(m)
         self.n_deferred = 0
         """number of observations not used because the state was full"""
+        self.n_rejected = 0
+        """number of frames rejected as a whole since the last that was not"""
+        self.motion_noise = np.zeros_like(self.motion.covariance)
+        """(n, n) covariance that the motion has added to the body state since then"""
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
@@ -71,6 +75,9 @@ class JointFilter:
         row = self.feature[index]
         self.map.last_seen[row] = k
         self._marginalize_unseen(k - self.settings.unseen_frames)
+        if self.n_rejected >= MAX_REJECTED:
+            self._marginalize(self.state.feature.copy())
+            self._trust_motion()
         if k > 0:
             self._predict(k)
         absent = self.state.slot_of[row] == ABSENT
@@ -115,6 +122,7 @@ class JointFilter:
             F = first_estimate_transition(prediction.transition, state.predicted, state.body, prediction.body)
             prediction = prediction._replace(transition=F)
         state.predict(prediction)
+        self.motion_noise = prediction.covariance(self.motion_noise)
 
     def _update(self, k: int, index: IntArray) -> bool:
         """Update with observations `index` (n,) of active landmarks; False if the whole frame is rejected."""
@@ -128,8 +136,18 @@ class JointFilter:
         innovation = Innovation.of(seen.H, residual, state.P)
         verdict = gate_observations(innovation.nis_per_observation(variance), self.measurement, self.settings)
         order = verdict.order
-        innovation, variance = innovation.in_order(order), variance[order]
-        factor = self._record_nis(k, innovation, variance)
+        innovation = innovation.in_order(order)
+        factor = self._record_nis(k, innovation, variance[order])
+        if verdict.rejection is not EventKind.FRAME_DISAGREES:
+            self._trust_motion()
+        elif self.n_rejected > 0 and (doubted := self._doubt_motion(k, seen.H, residual, variance)) is not None:
+            innovation, verdict = doubted
+            order, factor = verdict.order, None
+            innovation = innovation.in_order(order)
+            self._trust_motion()
+        else:  # one such frame is more often one of wrong matches
+            self.n_rejected += 1
+        variance = variance[order]
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.accepted)
             if not verdict.accepted.any():
@@ -159,6 +177,39 @@ class JointFilter:
             return seen.residual, np.broadcast_to(self.row_variance, seen.residual.shape)
         terms = second_order_of(self.camera, self.cam_T_imu, self.state, seen.H.slot)
         return seen.residual - terms.mean, self.row_variance + terms.variance
+
+    def _trust_motion(self) -> None:
+        self.n_rejected = 0
+        self.motion_noise = np.zeros_like(self.motion_noise)
+
+    def _doubt_motion(
+        self, k: int, H: StackedJacobian, residual: FloatArray, variance: FloatArray
+    ) -> tuple[Innovation, GatedObservations] | None:
+        """Innovation with more noise in the motion since the last accepted frame, which P then has; None if rejected.
+
+        Two successive frames disagree with the prediction: where this frame's observations agree with each other, the
+        motion between the frames is less certain than modeled.
+        """
+        P, n, pose = self.state.P, self.state.n_body, H.pose_jacobian
+        innovation = Innovation.of(H, residual, P)
+        covariance = innovation.own_covariances(variance)
+        of_motion = pose @ self.motion_noise[:POSE, :POSE] @ np.swapaxes(pose, 1, 2)
+        factor = motion_noise_factor(residual, covariance, of_motion)
+        if factor is None:
+            return None
+        before = P[:n, :n].copy()
+        P[:n, :n] += factor * self.motion_noise
+        innovation = Innovation.of(H, residual, P)
+        try:
+            verdict = gate_observations(innovation.nis_given_others(variance), self.measurement, self.settings)
+        except NotPositiveDefiniteError:
+            verdict = None
+        if verdict is None or verdict.rejection is EventKind.FRAME_DISAGREES:
+            P[:n, :n] = before
+            return None
+        text = f"the motion since the last accepted frame has {factor:.0f} times its modeled covariance added"
+        self.events.append(Event(k, EventKind.MOTION_DOUBTED, text))
+        return innovation, verdict
 
     def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         """Record the NIS of the frame, before kernel and gate, and return the factor of S."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dtrsm, dtrsv
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
@@ -136,8 +136,29 @@ class Innovation:
 
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
         """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance), (n, r) or (r,), px^2."""
+        return squared_norm(self.residual, self.own_covariances(variance))
+
+    def own_covariances(self, variance: FloatArray) -> FloatArray:
+        """Covariances (n, r, r) of each innovation alone, px^2: H P H^T + R, R = diag(variance), (n, r) or (r,)."""
         own = self.H.own_blocks(self.HP)
-        return squared_norm(self.residual, own + np.eye(own.shape[-1]) * variance[..., None, :])
+        return np.asarray(own + np.eye(own.shape[-1]) * variance[..., None, :])
+
+    def nis_given_others(self, variance: FloatArray) -> FloatArray:
+        """NIS (n,) of each observation under its prediction from the state and all other observations.
+
+        With z = S^-1 nu and B_i the i-th block (r, r) on the diagonal of S^-1 it is z_i^T B_i^-1 z_i, because B_i^-1 is
+        the covariance of the i-th innovation given the others and B_i^-1 z_i its mean. R = diag(variance), (n, r) or
+        (r,). Raises NotPositiveDefiniteError.
+        """
+        factor = self.factorize(variance)
+        inverse, failed = dpotri(factor.L, lower=1)
+        if failed:
+            raise NotPositiveDefiniteError
+        z = dtrsv(factor.L, factor.whitened, lower=1, trans=1).reshape(self.residual.shape)
+        n, r = z.shape
+        each = np.arange(n)
+        lower = np.tril(inverse.reshape(n, r, n, r)[each, :, each, :])
+        return squared_norm(z, lower + np.swapaxes(np.tril(lower, -1), 1, 2))
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
         """Factor of S for R = diag(variance), (n, r) or (r,), px^2. Raises NotPositiveDefiniteError."""

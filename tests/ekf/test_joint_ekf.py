@@ -11,8 +11,9 @@ from scipy.stats import chi2
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
+from fgbaseline.data.registry import Estimator
 from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
-from fgbaseline.ekf.joint.gating import gate_observations
+from fgbaseline.ekf.joint.gating import MAX_REJECTED, gate_observations, motion_noise_factor
 from fgbaseline.ekf.joint.landmark_representation import (
     chart,
     coordinates_of,
@@ -296,6 +297,80 @@ def test_the_filter_recovers_from_a_jump_of_all_observations_by_new_landmarks() 
     assert estimate.used[problem.mask][late].mean() > 0.5
 
 
+def disagreeing_frames(estimate: Estimate) -> list[int]:
+    return [event.frame for event in estimate.events if event.kind == EventKind.FRAME_DISAGREES]
+
+
+@pytest.mark.parametrize(
+    "solve", [ekf.joint_ekf, ekf.joint_ekf_ungated, ekf.joint_ekf_bias, ekf.joint_ekf_first_estimate]
+)
+def test_after_two_frames_that_agree_in_themselves_the_motion_is_doubted(solve: Estimator) -> None:
+    clean = matched(drive("town", seconds=10.0, features_per_frame=40.0))
+    increment = clean.increment.copy()
+    increment[49, 5] += 0.05  # rad of yaw to frame 50, with a sigma of 0.001
+    estimate = solve(replace(clean, increment=increment))
+    assert disagreeing_frames(estimate) == [50]
+    (doubted,) = (event for event in estimate.events if event.kind == EventKind.MOTION_DOUBTED)
+    assert doubted.frame == 51
+    assert estimate.used[clean.mask][clean.observations().frame == 51].mean() > 0.8
+    apart = np.linalg.norm(se3.log(se3.inverse(solve(clean).world_T_imu) @ estimate.world_T_imu)[:, 3:], axis=1)
+    assert apart[50] > 0.04
+    assert apart[51:].max() < 0.005
+    assert_covariances(estimate.covariance[1:])  # frame 0 defines the world
+
+
+@pytest.mark.parametrize("n", [2, 5, 9])
+def test_successive_frames_of_wrong_matches_never_make_the_motion_doubtful(n: int) -> None:
+    problem, _ = garbled(0.9, range(50, 50 + n))
+    estimate = ekf.joint_ekf(problem)
+    assert disagreeing_frames(estimate) == list(range(50, 50 + n))
+    assert EventKind.MOTION_DOUBTED not in {event.kind for event in estimate.events}
+    assert estimate.used[problem.mask][problem.observations().frame >= 50 + n].mean() > 0.9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tracks_that_all_move_to_other_points_are_rejected_for_ten_frames_at_most(seed: int) -> None:
+    sequence = drive("handheld", seconds=10.0, features_per_frame=40.0, seed=seed)
+    problem, o = matched(sequence), sequence.observations
+    moving = np.intersect1d(o.landmark[o.frame == 49], o.landmark[o.frame == 50])
+    to = np.arange(sequence.n_landmarks)
+    to[moving] = np.roll(moving, 1)
+    pixel, place = (
+        o.pixel.copy(),
+        {seen: i for i, seen in enumerate(zip(o.frame.tolist(), o.landmark.tolist(), strict=True))},
+    )
+    excluded = problem.excluded.copy()
+    for i in np.flatnonzero((o.frame >= 50) & np.isin(o.landmark, moving)):
+        there = place.get((int(o.frame[i]), int(to[o.landmark[i]])))
+        if there is None:
+            excluded[i] = Excluded.PREDICTION
+        else:
+            pixel[i] = o.pixel[there]
+    estimate = ekf.joint_ekf(replace(problem, sequence=with_pixels(sequence, pixel), excluded=excluded))
+    frames = disagreeing_frames(estimate)
+    assert frames[0] == 50
+    assert len(frames) <= MAX_REJECTED
+    assert estimate.used[(excluded == Excluded.NO) & (o.frame > 60)].mean() > 0.8
+
+
+@given(st.integers(0, 10_000))
+def test_the_nis_given_the_others_is_that_of_the_conditional_gaussian(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n, size = 4, 6 + 3 * 4
+    half = random.normal(size=(size, size))
+    H = StackedJacobian(random.permutation(n), random.normal(size=(n, 3, 6)), random.normal(size=(n, 3, 3)))
+    residual, variance = random.normal(size=(n, 3)), random.uniform(0.5, 2.0, 3)
+    innovation = Innovation.of(H, residual, half @ half.T)
+    S, nu = H.multiply(np.ascontiguousarray(innovation.HP.T)) + np.diag(np.tile(variance, n)), residual.reshape(-1)
+    expected = []
+    for i in range(n):
+        own = np.arange(3 * n) // 3 == i
+        gain = S[np.ix_(own, ~own)] @ np.linalg.inv(S[np.ix_(~own, ~own)])
+        error = nu[own] - gain @ nu[~own]
+        expected.append(error @ np.linalg.solve(S[np.ix_(own, own)] - gain @ S[np.ix_(~own, own)], error))
+    np.testing.assert_allclose(innovation.nis_given_others(variance), expected, rtol=1e-7)
+
+
 def at_infinity(disparity: float) -> Sequence:
     """The scene with two landmarks whose disparity is the given one in every frame."""
     pixel = SCENE.observations.pixel.copy()
@@ -442,6 +517,21 @@ def test_a_frame_is_rejected_where_more_than_half_of_five_or_more_observations_d
     )
     assert always.accepted.all()
     assert (always.weight == 1.0).all()
+
+
+def test_the_motion_noise_factor_is_the_smallest_power_of_two_with_the_median_of_chi_square() -> None:
+    random = np.random.default_rng(0)
+    covariance, of_motion = np.tile(np.eye(3), (101, 1, 1)), np.tile(0.1 * np.eye(3), (101, 1, 1))
+    residual = random.normal(size=(101, 3)) * np.sqrt(1.0 + 0.1 * 1000.0)
+    factor = motion_noise_factor(residual, covariance, of_motion)
+    assert factor in (512.0, 1024.0, 2048.0)
+
+    def median(f: float) -> float:
+        return float(np.median((residual**2).sum(axis=1) / (1.0 + 0.1 * f)))
+
+    assert median(factor) <= chi2.ppf(0.5, 3) < median(factor / 2.0)
+    assert motion_noise_factor(residual, covariance, np.zeros_like(of_motion)) is None
+    assert motion_noise_factor(np.full_like(residual, np.nan), covariance, of_motion) is None
 
 
 def test_nan_residuals_reject_the_frame() -> None:
