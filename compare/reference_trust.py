@@ -240,7 +240,7 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = rms_norm(apart)
-    baselines = rmse / problem.sequence.camera.baseline
+    baselines = rmse / problem.sequence.camera.unit_length
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
     start = " started at isam2's answer" if EventKind.STARTED_AT_ISAM2 in kinds else ""

@@ -55,4 +55,4 @@ def back_project(sequence: Sequence, world_T_imu: FloatArray, chosen: np.ndarray
     """Back-projected world points (n, 3), m, of the chosen observations, each from its own disparity (equation 10)."""
     o = sequence.observations
     world_T_cam = world_T_imu @ sequence.imu_T_cam
-    return se3.transform(world_T_cam[o.frame[chosen]], sequence.camera.triangulate(o.pixel[chosen]))
+    return se3.transform(world_T_cam[o.frame[chosen]], sequence.stereo_camera.triangulate(o.pixel[chosen]))

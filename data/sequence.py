@@ -1,4 +1,4 @@
-"""Recording: velocities, stereo tracks, calibration and, where known, ground truth."""
+"""Recording: velocities or inertial samples, tracks, calibration and, where known, ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3, so3
+from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera, se3, so3
+from fgbaseline.geometry.monocular import require_stereo
 
 from .display import Displayed
 from .finding import Finding
@@ -90,7 +91,10 @@ class Truth(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Sequence(Displayed):
-    """Recording of T frames, as read or repaired: stereo tracks with body velocities or raw inertial samples."""
+    """Recording of T frames, as read or repaired: stereo tracks with body velocities or raw inertial samples.
+
+    One camera has observations [uL, vL, NaN, NaN] and needs inertial samples, which bring the scale.
+    """
 
     name: str
     t: FloatArray
@@ -99,7 +103,7 @@ class Sequence(Displayed):
     """(T, 3) m/s in the IMU's frame; (0, 3) with raw inertial samples"""
     angular_velocity: FloatArray
     """(T, 3) rad/s in the IMU's frame; (0, 3) with raw inertial samples"""
-    camera: StereoCamera
+    camera: Camera
     imu_T_cam: FloatArray
     """(4, 4) pose of the left camera in the IMU frame"""
     observations: Observations
@@ -141,6 +145,16 @@ class Sequence(Displayed):
         return len(self.t)
 
     @property
+    def monocular(self) -> bool:
+        """Whether the recording has one camera."""
+        return isinstance(self.camera, MonocularCamera)
+
+    @property
+    def stereo_camera(self) -> StereoCamera:
+        """The camera of a recording that must be stereo. Raises FgbaselineError where there is one camera."""
+        return require_stereo(self.camera, "this step")
+
+    @property
     def dt(self) -> FloatArray:
         """Intervals between frames (T-1,), s."""
         return np.diff(self.t)
@@ -170,7 +184,8 @@ class Sequence(Displayed):
             length = path_length(self.truth.world_T_imu[:, :3, 3])
             facts["truth"] = f"{self.truth.known.sum():,} frames, path {length:.1f} m ({self.truth.source})"
         camera = self.camera
-        facts["camera"] = f"{camera.fu:.1f} x {camera.fv:.1f} px, baseline {camera.baseline:.3f} m"
+        base = "one camera" if isinstance(camera, MonocularCamera) else f"baseline {camera.baseline:.3f} m"
+        facts["camera"] = f"{camera.fu:.1f} x {camera.fv:.1f} px, {base}"
         return facts | {f"remark {i}": text for i, text in enumerate(self.remarks, 1)}
 
     def to_frame(self) -> "pd.DataFrame":
@@ -205,6 +220,15 @@ class Sequence(Displayed):
         return replace(self, truth=truth)
 
 
+def require_scale(sequence: Sequence) -> None:
+    """Refuses one camera without raw inertial samples: nothing else determines the scale. Raises InputError."""
+    if sequence.monocular and sequence.imu is None:
+        raise InputError(
+            "features: its observations are of one camera (uR and vR are NaN), and only raw inertial samples determine "
+            "their scale; add --imu CSV, or the keys imu_time_stamps, imu_angular_velocity and imu_linear_acceleration"
+        )
+
+
 def check_sequence(s: Sequence) -> None:
     """Checks a sequence. Raises InputError, naming field and value, where estimation is impossible."""
     T = s.n_frames
@@ -235,10 +259,12 @@ def check_sequence(s: Sequence) -> None:
     if not np.array_equal(s.imu_T_cam[3], [0.0, 0.0, 0.0, 1.0]):
         raise InputError(f"imu_T_cam: its last row is {s.imu_T_cam[3].tolist()}, expected [0, 0, 0, 1]")
     camera = s.camera
-    for name, value in (("K[0, 0]", camera.fu), ("K[1, 1]", camera.fv), ("b", camera.baseline)):
+    for name, value in (("K[0, 0]", camera.fu), ("K[1, 1]", camera.fv), ("b", camera.unit_length)):
         if not 0 < value <= LARGEST:
             raise InputError(f"{name}: expected a number above 0 and at most {LARGEST:g}, got {float(value)!r}")
-    _require_finite("features", s.observations.pixel)
+    _require_finite("features", s.observations.pixel[:, :2] if s.monocular else s.observations.pixel)
+    if s.monocular and not np.isnan(s.observations.pixel[:, 2:]).all():
+        raise InputError("features: uR and vR of a recording with one camera are NaN")
     if len(s.observations) and (
         s.observations.frame.max() >= T
         or s.observations.landmark.max() >= s.n_landmarks

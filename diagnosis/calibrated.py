@@ -9,7 +9,7 @@ from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import NoiseSettings, Problem
 from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
-from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.sequence import Sequence, require_scale
 from fgbaseline.geometry import HuberKernel, InputError
 
 from .estimation.pipeline import diagnose
@@ -55,6 +55,7 @@ def calibrated(
     increments, and the noise that the recording states. The number of `processes` does not change the result. Raises
     InputError for impossible repairs, for repairs together with `settings`, and where the units are in doubt.
     """
+    require_scale(sequence)
     if sequence.imu is not None:
         return _inertial(sequence, features, settings, repairs, processes)
     if settings is not None and repairs is not None:
@@ -83,6 +84,11 @@ def _inertial(
     """The problem of a recording with raw inertial samples, whose start takes the place of velocities."""
     if repairs is not None:
         raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
+    if sequence.monocular:
+        raise InputError(
+            f"{sequence.source or sequence.name}: a start of one camera is not found from the recording yet; give the "
+            "estimators a Problem with its start, in Python or by fgbaseline export's files"
+        )
     if settings is not None:
         return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
     return inertial_problem(diagnose_inertial(sequence, processes), features)

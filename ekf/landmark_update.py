@@ -13,6 +13,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import predict, squared_norm
+from fgbaseline.geometry.monocular import require_stereo
 
 
 class IndependentLandmarks:
@@ -46,7 +47,9 @@ class IndependentLandmarks:
         fresh = ~self.known[row]
         if fresh.any():
             world_T_cam = world_T_imu @ self.imu_T_cam
-            self.mean[row[fresh]] = se3.transform(world_T_cam, model.camera.triangulate(pixel[fresh]))
+            self.mean[row[fresh]] = se3.transform(
+                world_T_cam, require_stereo(model.camera, "ekf").triangulate(pixel[fresh])
+            )
             self.known[row[fresh]] = True
         predicted = predict(model.camera, self.cam_T_imu, world_T_imu, self.mean[row])
         residual, rows, variance = model.documented_innovation(pixel, predicted.pixel)

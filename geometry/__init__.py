@@ -6,6 +6,7 @@ if TYPE_CHECKING:
     from . import se3, so3, strapdown
     from .errors import FgbaselineError, InputError
     from .measurement import HuberKernel, StereoMeasurement
+    from .monocular import Camera, MonocularCamera
     from .so3 import FloatArray
     from .stereo import StereoCamera, disparity
 else:
@@ -19,15 +20,18 @@ else:
             "strapdown": "strapdown",
             "errors": "FgbaselineError InputError",
             "measurement": "HuberKernel StereoMeasurement",
+            "monocular": "Camera MonocularCamera",
             "stereo": "StereoCamera disparity",
         },
     )
 
 __all__ = [
+    "Camera",
     "FgbaselineError",
     "FloatArray",
     "HuberKernel",
     "InputError",
+    "MonocularCamera",
     "StereoCamera",
     "StereoMeasurement",
     "disparity",

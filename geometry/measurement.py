@@ -1,8 +1,12 @@
-"""Measurement model of a stereo observation: rows, noise, whitening and robust weight, shared by all estimators.
+"""Measurement model of an observation by a stereo pair or one camera, shared by all estimators.
+
+It has the rows, their noise, whitening and robust weight.
 
 The source paper measures z = [uL, vL, uR, vR] with variance V each. A rectified pair predicts vL = vR = v. The rows
 (uL, uR, (vL + vR) / 2) with variances (V, V, V/2) therefore have the same likelihood: their sum of squared whitened
 residuals is smaller by (vL - vR)^2 / (2 V), which does not depend on the state.
+
+One camera has the rows (uL, vL) with variances (V, V).
 
 All estimators, the diagnosis and the comparison use the three rows. The four rows are used only by the documented
 filter without a kernel. A kernel is a function of the whitened norm of the three rows. The whitening covariance is that
@@ -17,10 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 from . import se3, so3
+from .monocular import Camera, MonocularCamera
 from .so3 import FloatArray
 from .stereo import PIXEL_ROWS, StereoCamera, StereoRows
 
 ROWS = ("uL", "uR", "v")
+MONOCULAR_ROWS = ("uL", "v")
 ROW_VARIANCE = np.array([1.0, 1.0, 0.5])
 """variances of (uL, uR, v), relative to the variance V of one of the four rows"""
 WHITE_SCALE = 1.0 / np.sqrt(ROW_VARIANCE)
@@ -34,7 +40,15 @@ def measured_rows(pixel: FloatArray) -> FloatArray:
 
 
 def squared_norm(residual: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Squared Mahalanobis norms r^T C^-1 r (n,) of residuals (n, 3), px, with covariances (n, 3, 3), px^2."""
+    """Squared Mahalanobis norms r^T C^-1 r (n,) of residuals (n, r), px, with covariances (n, r, r), px^2.
+
+    r is 3, or 2 for one camera.
+    """
+    if residual.shape[1] == 2:
+        a, b = covariance[:, 0].T
+        x, y = residual.T
+        rest: FloatArray = x * x / a + (y - b / a * x) ** 2 / (covariance[:, 1, 1] - b / a * b)
+        return rest
     # C = L D L^T written out takes a third of the time of LAPACK, which is called once per matrix.
     a, b, c = covariance[:, 0].T
     d, e, f = covariance[:, 1, 1], covariance[:, 1, 2], covariance[:, 2, 2]
@@ -79,24 +93,43 @@ class HuberKernel:
 class StereoMeasurement:
     """Measurement model of a problem: camera, noise and robust kernel."""
 
-    camera: StereoCamera
+    camera: Camera
     variance: float
     """px^2, variance V of each of uL, vL, uR, vR"""
     kernel: HuberKernel | None = None
 
     @property
+    def monocular(self) -> bool:
+        """Whether there is one camera: its rows are uL and vL."""
+        return isinstance(self.camera, MonocularCamera)
+
+    @property
+    def n_rows(self) -> int:
+        """Number r of rows of an observation, its degrees of freedom: 3, or 2 for one camera."""
+        return len(MONOCULAR_ROWS if self.monocular else ROWS)
+
+    @property
     def row_variance(self) -> FloatArray:
-        """Variances (3,) of uL, uR and v, px^2."""
-        return self.variance * ROW_VARIANCE
+        """Variances (r,) of the rows, px^2."""
+        return np.full(len(MONOCULAR_ROWS), self.variance) if self.monocular else self.variance * ROW_VARIANCE
 
     @property
     def white_scale(self) -> FloatArray:
-        """Factors (3,) that whiten residuals of uL, uR and v, 1/px."""
-        return np.asarray(WHITE_SCALE / np.sqrt(self.variance), dtype=np.float64)
+        """Factors (r,) that whiten residuals of the rows, 1/px."""
+        scale = np.ones(len(MONOCULAR_ROWS)) if self.monocular else WHITE_SCALE
+        return np.asarray(scale / np.sqrt(self.variance), dtype=np.float64)
+
+    def measured(self, pixel: FloatArray) -> FloatArray:
+        """Rows (..., r) of pixels or residuals uL, vL, uR, vR (..., 4)."""
+        return pixel[..., :2] if self.monocular else measured_rows(pixel)
+
+    def pixel_distance(self, residual: FloatArray) -> FloatArray:
+        """Euclidean norms (n,), px, of what is measured in residuals (n, 4): of uL, vL, uR, vR, or of uL and vL."""
+        return np.asarray(np.linalg.norm(residual[:, :2] if self.monocular else residual, axis=1))
 
     def whitened(self, residual: FloatArray) -> FloatArray:
-        """Whitened residuals (..., 3) of the three rows, in sigmas, from residuals of the four rows (..., 4), px."""
-        return np.asarray(measured_rows(residual) * self.white_scale, dtype=np.float64)
+        """Whitened residuals (..., r) of the rows, in sigmas, from residuals of uL, vL, uR, vR (..., 4), px."""
+        return np.asarray(self.measured(residual) * self.white_scale, dtype=np.float64)
 
     def weight(self, squared: FloatArray) -> FloatArray:
         """Kernel weights of squared whitened norms (...); 1 without a kernel."""
@@ -142,9 +175,9 @@ class DocumentedInnovation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """n world points as observed by a stereo pair from one pose."""
+    """n world points as observed from one pose, in r rows each."""
 
-    camera: StereoCamera
+    camera: Camera
     rows: StereoRows
     cam_T_imu: FloatArray
     """(4, 4)"""
@@ -155,7 +188,7 @@ class Prediction:
 
     @property
     def pixel(self) -> FloatArray:
-        """Predicted rows uL, uR and v (n, 3), px."""
+        """Predicted rows (n, r), px: uL, uR and v, or uL and v."""
         return np.ascontiguousarray(self.rows.pixel.T)
 
     @property
@@ -171,29 +204,30 @@ class Prediction:
 
     @cached_property
     def _by_camera_point(self) -> FloatArray:
-        """Derivatives (3n, 4) by the homogeneous point in the left camera frame, stacked row by row."""
+        """Derivatives (rn, 4) by the homogeneous point in the left camera frame, stacked row by row."""
         along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.rows.inverse_depth.size))
         return np.ascontiguousarray(self.camera.row_derivatives(self.rows, along).transpose(2, 0, 1)).reshape(-1, 4)
 
     def pose_jacobian(self) -> FloatArray:
-        """Jacobian (n, 3, 6) by the right perturbation [v, w] of world_T_imu: H of equation 13.
+        """Jacobian (n, r, 6) by the right perturbation [v, w] of world_T_imu: H of equation 13.
 
         T exp(delta) moves the point s in the IMU frame by -hat(delta) s = [-s4 I, hat(s)] delta.
         """
-        s = self.point_imu
+        s, r = self.point_imu, len(self.rows.pixel)
         # One large matrix product is faster than n small ones.
-        J = (self._by_camera_point[:, :3] @ self.cam_T_imu[:3, :3]).reshape(-1, 3, 3)
-        H = np.empty((len(J), 3, 6))
+        J = (self._by_camera_point[:, :3] @ self.cam_T_imu[:3, :3]).reshape(-1, r, 3)
+        H = np.empty((len(J), r, 6))
         H[:, :, :3] = -s[3, :, None, None] * J
         np.matmul(J, so3.hat3(s[:3].T), out=H[:, :, 3:])
         return H
 
     def point_jacobian(self) -> FloatArray:
-        """Jacobian (n, 3, 4) by the homogeneous world point."""
-        return np.asarray(self._by_camera_point @ (self.cam_T_imu @ self.imu_T_world)).reshape(-1, 3, 4)
+        """Jacobian (n, r, 4) by the homogeneous world point."""
+        r = len(self.rows.pixel)
+        return np.asarray(self._by_camera_point @ (self.cam_T_imu @ self.imu_T_world)).reshape(-1, r, 4)
 
 
-def predict(camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray) -> Prediction:
+def predict(camera: Camera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray) -> Prediction:
     """Predicts the observations of world points, (n, 3) in m or homogeneous (n, 4), from a pose (4, 4)."""
     imu_T_world = se3.inverse(world_T_imu)
     if points.shape[1] == 3:  # subtracting first avoids cancellation far from the origin
@@ -204,10 +238,15 @@ def predict(camera: StereoCamera, cam_T_imu: FloatArray, world_T_imu: FloatArray
     return Prediction(camera, camera.rows(cam_T_imu @ s), cam_T_imu, imu_T_world, s)
 
 
-def back_projected(camera: StereoCamera, rows: FloatArray) -> FloatArray:
-    """Homogeneous points (n, 4) [x/z, y/z, 1, 1/z] in the left camera frame from rows (n, 3); exact at infinity."""
+def back_projected(camera: Camera, rows: FloatArray, inverse_depth: float = np.nan) -> FloatArray:
+    """Homogeneous points (n, 4) [x/z, y/z, 1, 1/z] in the left camera frame from rows (n, r); exact at infinity.
+
+    A stereo pair measures 1/z; for one camera it is `inverse_depth`, 1/m.
+    """
     points = np.ones((len(rows), 4))
     points[:, 0] = (rows[:, 0] - camera.cu) / camera.fu
-    points[:, 1] = (rows[:, 2] - camera.cv) / camera.fv
-    points[:, 3] = (rows[:, 0] - rows[:, 1]) / (camera.fu * camera.baseline)
+    points[:, 1] = (rows[:, -1] - camera.cv) / camera.fv
+    points[:, 3] = inverse_depth
+    if isinstance(camera, StereoCamera):
+        points[:, 3] = (rows[:, 0] - rows[:, 1]) / (camera.fu * camera.baseline)
     return points

@@ -52,6 +52,11 @@ class StereoCamera:
         return np.array([[self.fu, 0.0, self.cu], [0.0, self.fv, self.cv], [0.0, 0.0, 1.0]])
 
     @property
+    def unit_length(self) -> float:
+        """Length (m) that tolerances are multiples of: the baseline."""
+        return self.baseline
+
+    @property
     def min_depth(self) -> float:
         """Smallest depth (m) of a point in front of the camera: `MIN_DEPTH` baselines."""
         return MIN_DEPTH * self.baseline

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .measurement import StereoMeasurement, measured_rows
+from .measurement import StereoMeasurement
+from .monocular import Camera, MonocularCamera
+from .ray_intersection import PointStart, ray_intersections
 from .so3 import FloatArray
 from .stereo import disparity
 
@@ -24,14 +26,14 @@ DAMPED = 1.0
 FEWER = 0.5
 """share of unconverged points below which the converged ones are removed from the iteration"""
 LEAST_PIVOT = 1e-12
-"""1/baseline^2: lower bound of a pivot of an information matrix, against rounding"""
+"""1/unit length^2: lower bound of a pivot of an information matrix, against rounding"""
 
 
 class Triangulated(NamedTuple):
     """m points, in the reference frame of the poses."""
 
     position: FloatArray
-    """(m, 3) m; NaN where no observation has a positive disparity"""
+    """(m, 3) m; NaN where no observation has a positive disparity, or where the rays of one camera do not intersect"""
     information: FloatArray
     """(m, 3, 3) J^T W J at the position, 1/m^2"""
 
@@ -51,7 +53,7 @@ class _Observed(NamedTuple):
     center: FloatArray
     """(3, n) m, camera center relative to the origin of the point"""
     measured: FloatArray
-    """(3, n) uL, uR and v, px"""
+    """(r, n) rows of the measurement model, px"""
 
     def of(self, chosen: NDArray[np.bool_]) -> "_Observed":
         """Observations of the chosen points (m,), renumbered."""
@@ -68,27 +70,20 @@ def triangulate_tracks(
     n_points: int,
     tolerance: float = STEP_TOLERANCE,
 ) -> Triangulated:
-    """Triangulates n stereo observations of m points by minimizing the loss of the measurement model, poses held fixed.
+    """Triangulates n observations of m points by minimizing the loss of the measurement model, poses held fixed.
 
     `world_T_cam` (n, 4, 4) is the left camera pose of each observation, `row` (n,) the index of its point (0..m-1) and
-    `pixel` (n, 4) the measurement. Starts at the back-projection with the largest disparity. A step that raises the
-    cost of a point is rejected and the damping raised. A point has converged when its relative step is at most
-    `tolerance`.
+    `pixel` (n, 4) the measurement. Starts at the back-projection with the largest disparity, or where the rays of one
+    camera intersect. A step that raises the cost of a point is rejected and the damping raised. A point has converged
+    when its relative step is at most `tolerance`.
     """
-    camera = measurement.camera
     position, information = np.full((n_points, 3), np.nan), np.zeros((n_points, 3, 3))
-    nearest = _nearest_observations(row, pixel, n_points)
-    place = np.flatnonzero(nearest >= 0)
-    from_camera = camera.triangulate(pixel[nearest[place]])
-    finite = np.isfinite(from_camera).all(axis=1)
-    place = place[finite]
+    place, nearest, p = _start(measurement.camera, world_T_cam, row, pixel, n_points)
     if len(place) == 0:
         return Triangulated(position, information)
-    reference = world_T_cam[nearest[place]]
-    origin = reference[:, :3, 3]
-    p = np.ascontiguousarray((reference[:, :3, :3] @ from_camera[finite, :, None])[:, :, 0].T)
-    observed = _sorted(world_T_cam, row, pixel, n_points, place, origin)
-    least = LEAST_PIVOT / camera.baseline**2
+    origin = world_T_cam[nearest, :3, 3]
+    observed = _sorted(measurement, world_T_cam, row, pixel, n_points, place, origin)
+    least = LEAST_PIVOT / measurement.camera.unit_length**2
     # Points at a camera plane divide by zero; their cost is infinite and the step is rejected.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         damping = np.full(len(place), 1e-6)
@@ -114,6 +109,21 @@ def triangulate_tracks(
     return Triangulated(position, information)
 
 
+def _start(
+    camera: Camera, world_T_cam: FloatArray, row: NDArray[np.int64], pixel: FloatArray, n_points: int
+) -> PointStart:
+    if isinstance(camera, MonocularCamera):
+        return ray_intersections(camera, world_T_cam, row, pixel, n_points)
+    nearest = _nearest_observations(row, pixel, n_points)
+    place = np.flatnonzero(nearest >= 0)
+    from_camera = camera.triangulate(pixel[nearest[place]])
+    finite = np.isfinite(from_camera).all(axis=1)
+    place = place[finite]
+    axes = world_T_cam[nearest[place], :3, :3]
+    p = np.ascontiguousarray((axes @ from_camera[finite, :, None])[:, :, 0].T)
+    return PointStart(place, nearest[place], p)
+
+
 def _nearest_observations(row: NDArray[np.int64], pixel: FloatArray, n_points: int) -> NDArray[np.int64]:
     """Observation (m,) of each point with the largest positive disparity, the last of equals; -1 where there is
     none."""
@@ -126,6 +136,7 @@ def _nearest_observations(row: NDArray[np.int64], pixel: FloatArray, n_points: i
 
 
 def _sorted(
+    measurement: StereoMeasurement,
     world_T_cam: FloatArray,
     row: NDArray[np.int64],
     pixel: FloatArray,
@@ -142,7 +153,7 @@ def _sorted(
     order, row = order[first:], row[first:]
     axes = np.ascontiguousarray(np.moveaxis(world_T_cam[order, :3, :3], 0, 2))
     center = np.ascontiguousarray((world_T_cam[order, :3, 3] - origin[row]).T)
-    return _Observed(row, _starts(row), axes, center, np.ascontiguousarray(measured_rows(pixel[order]).T))
+    return _Observed(row, _starts(row), axes, center, np.ascontiguousarray(measurement.measured(pixel[order]).T))
 
 
 def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -158,7 +169,7 @@ def _linearized(measurement: StereoMeasurement, observed: _Observed, p: FloatArr
     camera, axes = measurement.camera, observed.axes
     q = (axes * (p[:, observed.row] - observed.center)[:, None]).sum(axis=0)
     seen, white = camera.rows(q), measurement.white_scale[:, None]
-    A = np.empty((3, 4, q.shape[1]))
+    A = np.empty((len(seen.pixel), 4, q.shape[1]))
     A[:, :3] = camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
     A[:, 3] = (observed.measured - seen.pixel) * white
     squared = (A[:, 3] * A[:, 3]).sum(axis=0)

@@ -8,7 +8,6 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import measured_rows
 
 from .frame_update import FrameUpdate
 from .graph.factors import FactorBuilder
@@ -30,7 +29,7 @@ class GraphBuilder:
         self.observations = problem.observations()
         self.frame: list[int] = self.observations.frame.tolist()
         """frame of each observation"""
-        self._rows = list(measured_rows(self.observations.pixel))
+        self._rows = list(problem.measurement.measured(self.observations.pixel))
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
         self.online = FrameStates.unknown(problem)
@@ -87,9 +86,9 @@ class GraphBuilder:
         states.take_all(values, first, k)
         return states
 
-    def stereo(self, observation: int, key: int) -> gtsam.GenericStereoFactor3D:
-        """Stereo factor of one observation of the landmark `key`."""
-        return self.factors.stereo(self.frame[observation], key, self._rows[observation])
+    def observation(self, observation: int, key: int) -> gtsam.NonlinearFactor:
+        """Factor of one observation of the landmark `key`."""
+        return self.factors.observation(self.frame[observation], key, self._rows[observation])
 
     def observed_landmarks(self, observed: range) -> IntArray:
         """Landmarks of a frame's observations."""

@@ -9,7 +9,6 @@ import pandas as pd
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows
 
 from ..residuals.whitening import evaluated_rows
 from ..statistics.chi_square import p_value
@@ -106,7 +105,7 @@ def _significant(gain: FloatArray) -> BoolArray:
 def _observations_of(problem: Problem, estimate: Estimate, rows: pd.DataFrame, row: IntArray) -> _Observations:
     sequence, order = problem.sequence, np.argsort(row, kind="stable")
     row, frame = row[order], rows["frame"].to_numpy()[order]
-    count = np.maximum(np.bincount(row), 1)
+    count, pixel = np.maximum(np.bincount(row), 1), sequence.observations.pixel[rows["observation"].to_numpy()[order]]
     seconds = sequence.t[frame] - sequence.t[0]
     cam_T_world = np.moveaxis(se3.inverse(estimate.world_T_imu @ sequence.imu_T_cam)[:, :3], 0, 2)
     return _Observations(
@@ -114,7 +113,7 @@ def _observations_of(problem: Problem, estimate: Estimate, rows: pd.DataFrame, r
         np.take(cam_T_world[:, :3], frame, axis=2),
         np.take(cam_T_world[:, 3], frame, axis=1),
         row,
-        np.ascontiguousarray(measured_rows(sequence.observations.pixel[rows["observation"].to_numpy()[order]]).T),
+        np.ascontiguousarray(problem.measurement.measured(pixel).T),
         seconds - (np.bincount(row, weights=seconds) / count)[row],
     )
 
@@ -154,7 +153,7 @@ def _linearized(observations: _Observations, state: FloatArray) -> tuple[FloatAr
     front = p_cam[2] > 0.0
     p_cam[:, ~front] = [[0.0], [0.0], [1.0]]
     seen, white = model.camera.rows(p_cam), model.white_scale[:, None]
-    A = np.empty((3, 4, len(s)))  # columns are d/dp, then the residual
+    A = np.empty((model.n_rows, 4, len(s)))  # columns are d/dp, then the residual
     A[:, :3] = model.camera.row_derivatives(seen, R) * white[:, None]
     A[:, 3] = (observations.measured - seen.pixel) * white
     squared = np.where(front, (A[:, 3] * A[:, 3]).sum(axis=0), np.inf)

@@ -110,7 +110,7 @@ def cross_prediction_errors(
         points = triangulate_tracks(measurement, world_T_cam[seen], piece[seen], pixel[seen], n)
         p_cam = se3.transform(se3.inverse(world_T_cam[~seen]), points.position[piece[~seen]])
         with np.errstate(divide="ignore", invalid="ignore"):
-            norm = np.linalg.norm(pixel[~seen] - sequence.camera.project(p_cam), axis=1)
+            norm = measurement.pixel_distance(pixel[~seen] - sequence.camera.project(p_cam))
         error[~seen] = np.where((p_cam[:, 2] > 0.0) & np.isfinite(norm), norm, np.inf)
     return error
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammainc
+from scipy.special import gammainc, gammaincc
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.geometry import FloatArray
@@ -18,10 +18,10 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     """Scale s of Gaussian pixel noise, in units of the model's sigma, that explains the residuals an estimate used.
 
     At s the expected sum of kernel-weighted whitened squares equals the observed one. The residual of an observation
-    is Gaussian over three rows with the variance s^2 (1 - h), h being the leverage of the estimated parameters: of the
-    landmark 1 / n in a track of n observations (zero where it has a prior), of the poses what motion and priors retain
-    of their squares. In a linear least-squares problem the expected squares of pixels, motion and
-    priors add up to 3 n - 3 m for m landmarks without a prior (3 n with one): what motion and priors retain is
+    is Gaussian over its r rows with the variance s^2 (1 - h), h being the leverage of the estimated parameters: of the
+    landmark 3 / (r n) in a track of n observations (zero where it has a prior), of the poses what motion and priors
+    retain of their squares. In a linear least-squares problem the expected squares of pixels, motion and priors add up
+    to r n - 3 m for m landmarks without a prior (r n with one): what motion and priors retain is
     missing from the pixels. NaN for a NaN residual or no degree of freedom, infinite for an infinite residual.
     """
     table = reprojection(problem.sequence, estimate)
@@ -32,18 +32,18 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     if not np.isfinite(observed):
         return observed
     _, track, seen = np.unique(table["landmark"].to_numpy(), return_inverse=True, return_counts=True)
-    prior = problem.landmark_prior is not None
-    freedom = np.ones(len(table)) if prior else 1.0 - 1.0 / seen[track]
+    prior, rows = problem.landmark_prior is not None, problem.measurement.n_rows
+    freedom = np.ones(len(table)) if prior else np.maximum(1.0 - 3.0 / (rows * seen[track]), 0.0)
     kept = np.minimum(motion_squares(problem, estimate), float(motion_degrees(problem))).sum()
     if prior:
         kept += min(prior_squares(problem, estimate, estimate.used), 3.0 * len(seen))
-    freedom *= max(0.0, 1.0 - kept / max(3.0 * freedom.sum(), 1.0))
+    freedom *= max(0.0, 1.0 - kept / max(rows * freedom.sum(), 1.0))
     if not freedom.sum() > 0.0:
         return float("nan")
     width, count = np.unique(np.sqrt(freedom), return_counts=True)
 
     def excess(log_scale: float) -> float:
-        return float(count @ expected_square(np.exp(log_scale) * width, threshold)) - observed
+        return float(count @ expected_square(np.exp(log_scale) * width, threshold, rows)) - observed
 
     low, high = np.log(RANGE)
     if not excess(low) < 0.0 < excess(high):
@@ -59,16 +59,22 @@ def motion_scale(problem: Problem, estimate: Estimate) -> float:
     return float(np.sqrt(np.mean(motion_squares(problem, estimate)) / motion_degrees(problem)))
 
 
-def expected_square(scale: ArrayLike, threshold: float | None) -> FloatArray:
-    """Expectation of `HuberKernel.weighted` for three independent Gaussian rows of standard deviation `scale` (...,).
+def expected_square(scale: ArrayLike, threshold: float | None, rows: int = 3) -> FloatArray:
+    """Expectation of `HuberKernel.weighted` for 3 or 2 independent Gaussian rows of standard deviation `scale` (...,).
 
-    With x = norm / scale, which is chi-distributed with 3 degrees of freedom, and c = threshold / scale:
+    With x = norm / scale, which is chi-distributed with r = `rows` degrees of freedom, and c = threshold / scale:
     scale^2 E[x^2; x < c] + threshold scale E[x; x >= c].
     """
     s = np.asarray(scale, dtype=np.float64)
     if threshold is None:
-        return np.asarray(3.0 * s**2)
+        return np.asarray(rows * s**2)
     with np.errstate(divide="ignore", over="ignore"):
         half = 0.5 * (threshold / s) ** 2
-    beyond = np.where(half < 700.0, (half + 1.0) * np.exp(-np.minimum(half, 700.0)), 0.0)
-    return np.asarray(3.0 * s**2 * gammainc(2.5, half) + threshold * s * np.sqrt(8.0 / np.pi) * beyond)
+    if rows == 3:
+        mean, beyond = (
+            np.sqrt(8.0 / np.pi),
+            np.where(half < 700.0, (half + 1.0) * np.exp(-np.minimum(half, 700.0)), 0.0),
+        )
+    else:
+        mean, beyond = np.sqrt(0.5 * np.pi), gammaincc(1.5, half)
+    return np.asarray(rows * s**2 * gammainc(0.5 * rows + 1.0, half) + threshold * s * mean * beyond)

@@ -22,8 +22,9 @@ def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
     """Residuals of every observation whose landmark and pose the estimate has, one row each, with the columns
 
     `observation` (its index in the sequence), `frame`, `landmark`, `uL vL uR vR` measured minus predicted in px,
-    `error` the Euclidean norm of these four, `depth` in m along the left camera's axis (the projection formula is
-    also applied behind the camera), and `used`, whether the estimator used it. Residuals of a landmark at infinity or
+    `error` the Euclidean norm of these four (of uL and vL for one camera, whose uR and vR are NaN), `depth` in m along
+    the left camera's axis (the projection formula is also applied behind the camera), and `used`, whether the estimator
+    used it. Residuals of a landmark at infinity or
     in the camera's plane are infinite, those of a landmark that is NaN are NaN.
     """
     o = sequence.observations
@@ -39,14 +40,15 @@ def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
         p_cam = se3.transform(cam_T_world[o.frame[chosen]], position[o.landmark[chosen]])
         residual = o.pixel[chosen] - sequence.camera.project(p_cam)
     missing = np.isnan(position[o.landmark[chosen]]).any(axis=1)
-    residual[np.isnan(residual) & ~missing[:, None]] = np.inf
+    measured = residual[:, :2] if sequence.monocular else residual
+    measured[np.isnan(measured) & ~missing[:, None]] = np.inf
     return pd.DataFrame(
         {
             "observation": chosen,
             "frame": o.frame[chosen],
             "landmark": o.landmark[chosen],
             **{row: residual[:, i] for i, row in enumerate(ROWS)},
-            "error": np.linalg.norm(residual, axis=1),
+            "error": np.linalg.norm(measured, axis=1),
             "depth": p_cam[:, 2],
             "used": estimate.used[chosen],
         }

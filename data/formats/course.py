@@ -7,7 +7,7 @@
 | `angular_velocity` | (3, T) rad/s | later, own, unless there are raw inertial samples |
 | `rotational_velocity` | (3, T) rad/s | 2020 |
 | `features` | (4, N, T) px, -1 unobserved; may be absent, or a list (`observation_list`) | all |
-| `K`, `b` | (3, 3) px, scalar m | all |
+| `K`, `b` | (3, 3) px, scalar m; `b` may be absent with observations of one camera (`one_camera`) | all |
 | `imu_T_cam` | (4, 4) | later, own |
 | `cam_T_imu` | (4, 4): rotation IMU to camera, translation the camera's position in the IMU frame | 2020 |
 | `ground_truth` | (T, 4, 4) world_T_imu, a frame all NaN where unknown; may be absent | own |
@@ -19,7 +19,7 @@
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera
+from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera
 
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
@@ -30,6 +30,7 @@ from .imu_arrays import FORCE, RATE, STAMPS, read_imu_arrays, read_state_truth
 from .imu_attachment import attach_imu
 from .npz_archive import NpzArchive
 from .observation_list import FRAME, read_observation_list
+from .one_camera import IGNORED_BASELINE, is_of_one_camera
 
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS, FRAME})
 VELOCITY_KEYS = frozenset({"linear_velocity", "angular_velocity", "rotational_velocity"})
@@ -73,6 +74,9 @@ def read_course(
         findings += zeros
     else:
         remarks.append(_NO_FEATURES)
+    one_camera = is_of_one_camera(observations)
+    if one_camera and "b" in archive.keys:
+        remarks.append(IGNORED_BASELINE)
     if form == "course-2020":
         remarks.append(_ODD_EXTRINSIC)
     truth, moved = _truth(archive, T, n_landmarks, inertial=inertial)
@@ -91,7 +95,7 @@ def read_course(
         t=stamps.t,
         linear_velocity=velocity[stamps.kept],
         angular_velocity=turned[stamps.kept],
-        camera=_camera(archive),
+        camera=_camera(archive, one_camera=one_camera),
         imu_T_cam=_extrinsic(archive, form) if given is None else given,
         observations=stamps.observations(observations),
         n_landmarks=n_landmarks,
@@ -135,7 +139,7 @@ def _shaped(archive: NpzArchive, key: str, shape: tuple[int, ...]) -> FloatArray
     return array
 
 
-def _camera(archive: NpzArchive) -> StereoCamera:
+def _camera(archive: NpzArchive, *, one_camera: bool) -> Camera:
     K = _shaped(archive, "K", (3, 3))
     if not np.isfinite(K).all():
         raise InputError(f"K: it has entries that are not finite: {K.tolist()}; write the calibration in pixels")
@@ -144,6 +148,8 @@ def _camera(archive: NpzArchive) -> StereoCamera:
     if np.abs(K[2] - [0.0, 0.0, 1.0]).max() > EXACT:
         raise InputError(f"K: its last row is {K[2].tolist()}, expected [0, 0, 1]; write the calibration in pixels")
     fu, fv = (positive(f"K[{i}, {i}]", K[i, i], "a focal length in pixels") for i in (0, 1))
+    if one_camera:
+        return MonocularCamera(fu, fv, float(K[0, 2]), float(K[1, 2]))
     b = positive("b", archive.array("b"), "the baseline in meters")
     return StereoCamera(fu, fv, float(K[0, 2]), float(K[1, 2]), b)
 

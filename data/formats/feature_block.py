@@ -8,6 +8,8 @@ image, could not be distinguished from that. Reader and writer reject both cases
 
 An entry whose four rows are exactly 0 is unobserved as well: no stereo pair measures the outermost corner of both
 images with zero disparity. Such entries are counted and reported.
+
+One camera has NaN in the rows uR and vR of every observed entry.
 """
 
 from collections.abc import Iterator
@@ -21,11 +23,13 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..finding import Finding
 from ..observations import IntArray, Observations
 from .array_stream import ArrayStream
+from .one_camera import ROWS, require_one_kind
 
 UNOBSERVED = -1.0
+FIRST_RIGHT = 2
+"""row of the right camera"""
 CHUNK = 2**19
 """values read at a time, a multiple of 8: 4 MB of doubles"""
-ROWS = ("uL", "vL", "uR", "vR")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +142,9 @@ def _pieces(total: int, size: int) -> Iterator[tuple[int, int]]:
 
 
 def _require_finite(index: IntArray, values: FloatArray, layout: _Layout, first_row: int = 0) -> None:
-    """Refuses NaN and infinity among `values` (n, rows) of the entries `index` (n,)."""
-    finite = np.isfinite(values)
+    """Refuses NaN and infinity among `values` (n, rows) of the entries `index` (n,); NaN in uR and vR may be right."""
+    right = first_row + np.arange(values.shape[1]) >= FIRST_RIGHT
+    finite = np.isfinite(values) | (np.isnan(values) & right)
     if finite.all():
         return
     entry, row = (int(i[0]) for i in np.nonzero(~finite))
@@ -158,6 +163,7 @@ def _observations(index: IntArray, pixel: FloatArray, layout: _Layout) -> Observ
         raise InputError(
             f"{layout.key}: landmark {landmark[i]} in frame {frame[i]} is {pixel[i].tolist()}, -1 in some rows only "
             f"({len(half_seen)} such entries); write -1 in all four rows where it was not observed, or four pixel "
-            "coordinates of which none is exactly -1"
+            "coordinates of which none is exactly -1, or NaN in uR and vR of all observations for one camera"
         )
+    require_one_kind(layout.key, frame, landmark, pixel)
     return Observations.sort(frame, landmark, pixel)

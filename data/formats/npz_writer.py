@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera
+from fgbaseline.geometry import Camera, FloatArray, InputError, StereoCamera
 
 from ..observations import IntArray, Observations
 from ..sequence import Sequence
@@ -36,7 +36,7 @@ def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False, force: 
 def write_tracks(
     path: FilePath,
     t: FloatArray,
-    camera: StereoCamera,
+    camera: Camera,
     observations: Observations,
     imu_T_cam: FloatArray | None,
     *,
@@ -58,11 +58,9 @@ def _write(archive: zipfile.ZipFile, arrays: dict[str, FloatArray]) -> None:
         write_member(archive, key, array.shape, [array])
 
 
-def _calibration(camera: StereoCamera) -> dict[str, FloatArray]:
-    return {
-        "K": camera.K,
-        "b": np.array(camera.baseline),
-    }
+def _calibration(camera: Camera) -> dict[str, FloatArray]:
+    b = {"b": np.array(camera.baseline)} if isinstance(camera, StereoCamera) else {}
+    return {"K": camera.K, **b}
 
 
 def _arrays(s: Sequence) -> dict[str, FloatArray]:

@@ -3,7 +3,7 @@
 | key | shape |
 |---|---|
 | `observation_frame`, `observation_landmark` | (n,) whole numbers from 0 |
-| `observation_pixel` | (4, n) px, rows uL, vL, uR, vR |
+| `observation_pixel` | (4, n) px, rows uL, vL, uR, vR; NaN in uR and vR for one camera |
 """
 
 import numpy as np
@@ -12,6 +12,7 @@ from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
 from ..observations import IntArray, Observations
 from .npz_archive import NpzArchive
+from .one_camera import require_one_kind
 
 FRAME, LANDMARK, PIXEL = "observation_frame", "observation_landmark", "observation_pixel"
 LARGEST_INDEX = 2**40
@@ -39,8 +40,7 @@ def read_observation_list(archive: NpzArchive, T: int) -> tuple[Observations, in
         )
     if n and frame.max() >= T:
         raise InputError(f"{FRAME}: frame {int(frame.max())} is named, but there are {T} time stamps")
-    if not np.isfinite(pixel).all():
-        raise InputError(f"{PIXEL}: it has values that are not finite; leave out what was not observed")
+    require_one_kind(PIXEL, frame, landmark, pixel.T)
     try:
         observations = Observations.sort(frame, landmark, pixel.T)
     except FgbaselineError:  # shapes and values are right: what is left is a repeat

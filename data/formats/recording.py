@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..sequence import Sequence
+from ..sequence import Sequence, require_scale
 from ..time_unit import TimeUnit, in_seconds
 from .course import NO_VELOCITIES, read_course
 from .ground_truth import BodyFrame, attach_truth
@@ -61,6 +61,8 @@ def read(
         sequence = sequence if time_unit is not None else in_seconds(sequence)
     elif imu_calibration is not None:
         raise InputError(f"imu-calibration: {shown(imu_calibration)} is given without samples; add --imu FILE")
+    with reading(path):
+        require_scale(sequence)
     return sequence if truth is None else attach_truth(sequence, truth, truth_frame)
 
 

@@ -70,6 +70,17 @@ class NoiseSettings:
     """rad/s, of the rate held over an interval"""
 
 
+@dataclass(frozen=True, slots=True)
+class InverseDepthPrior:
+    """A Gaussian about the inverse depths at which points of the scene are first observed, 1/m.
+
+    A filter with one camera starts landmarks with it; it is no part of the cost. Smoothers wait for parallax instead.
+    """
+
+    mean: float
+    sigma: float
+
+
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class LandmarkPrior(Displayed):
     """An independent Gaussian prior on every chosen landmark, in the world frame."""
@@ -102,7 +113,7 @@ class Problem(Displayed):
     increment_covariance: FloatArray
     """(T-1, 6, 6); (0, 6, 6) with raw inertial data"""
     pixel_variance: float
-    """px^2, of each of uL, vL, uR, vR"""
+    """px^2, of each of uL, vL, uR, vR, or uL, vL"""
     features: IntArray
     """(m,) increasing indices of the chosen landmarks"""
     excluded: NDArray[np.uint8]
@@ -115,6 +126,8 @@ class Problem(Displayed):
     """samples between the frames, where the recording has raw inertial data"""
     start: InertialStart | None = None
     """velocity, biases and covariance (15, 15) at frame 0; given together with `imu`"""
+    inverse_depth_prior: InverseDepthPrior | None = None
+    """of the scene, for one camera"""
     landmark_prior: LandmarkPrior | None = None
     kernel: HuberKernel | None = None
     mapping_pixel_variance: float | None = None

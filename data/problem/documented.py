@@ -7,7 +7,7 @@ from fgbaseline.geometry import FloatArray, InputError, disparity
 from ..motion import Shift, back_project, dead_reckoned_path, increments
 from ..observations import IntArray, Observations
 from ..plural import plural
-from ..sequence import Sequence
+from ..sequence import Sequence, require_scale
 from .definition import Excluded, LandmarkMode, LandmarkPrior, Problem
 
 MOTION_NOISE = np.diag([0.5, 0.5, 0.5, 0.05, 0.05, 0.05])
@@ -26,6 +26,7 @@ def documented(
     W is added once per step; V = I for mapping and 15 I for SLAM. The `features` most observed landmarks (None: all)
     have the prior 0.01 I at the average of their back-projections along the dead-reckoned path.
     """
+    require_scale(sequence)
     if sequence.imu is not None:
         raise InputError(
             "documented: the preset poses the report's problem, which has body velocities and no raw inertial data; "

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..formats.fields import positive
 from ..imu import ImuNoise, ImuSamples
-from ..problem import Problem
+from ..problem import InverseDepthPrior, Problem
 from ..problem.inertial import ImuIntervals, InertialStart, imu_intervals
 from ..sequence import Sequence
 
 START = "start_covariance"
+DEPTHS = "inverse_depth_prior"
 Real = Callable[..., FloatArray]
 """an array of the archive by its key and shape"""
 
@@ -32,6 +34,8 @@ def inertial_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
             "gravity": np.array(imu.gravity),
             "up_imu": np.asarray(problem.sequence.up_imu),
         }
+    if problem.inverse_depth_prior is not None:
+        arrays[DEPTHS] = np.array([problem.inverse_depth_prior.mean, problem.inverse_depth_prior.sigma])
     if cut is not None:
         arrays["interval_noise"] = cut.densities
     if start is not None:
@@ -71,6 +75,12 @@ def interval_noise(real: Real, sequence: Sequence) -> ImuIntervals:
     if (densities[:, [0, 2]] <= 0.0).any() or (densities < 0.0).any():
         raise InputError("interval_noise: densities must be positive, and walks not negative; export the problem again")
     return replace(imu_intervals(sequence.imu, sequence.t), densities=densities)
+
+
+def read_depths(real: Real) -> InverseDepthPrior:
+    """The prior of inverse depths of an exported problem."""
+    mean, sigma = real(DEPTHS, 2).tolist()
+    return InverseDepthPrior(positive(DEPTHS, np.array(mean), "1/m"), positive(DEPTHS, np.array(sigma), "1/m"))
 
 
 def read_start(real: Real, source: str) -> InertialStart:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, HuberKernel, InputError, StereoCamera
+from fgbaseline.geometry import FloatArray, HuberKernel, InputError, MonocularCamera, StereoCamera
 
 from ..formats.fields import extrinsic, positive, time_stamps
 from ..formats.named_file import FilePath, reading, regular_file
@@ -16,7 +16,7 @@ from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from ..sequence import Sequence
 from ..value_range import LARGEST, measurable
 from . import layout
-from .inertial import START, interval_noise, read_samples, read_start
+from .inertial import DEPTHS, START, interval_noise, read_depths, read_samples, read_start
 
 MOST_UNSEEN = 100
 """most landmarks per observation: some landmarks are unobserved, and arrays have their number"""
@@ -120,6 +120,7 @@ def _problem(numbers: _Numbers, words: dict[str, Any]) -> Problem:
         initial_covariance=numbers.real("initial_covariance", 6, 6),
         imu=None if sequence.imu is None else interval_noise(numbers.real, sequence),
         start=read_start(numbers.real, words["start"]) if numbers.has(START) else None,
+        inverse_depth_prior=read_depths(numbers.real) if numbers.has(DEPTHS) else None,
         landmark_prior=prior,
         kernel=None if threshold is None else HuberKernel(threshold),
         mapping_pixel_variance=numbers.optional("mapping_pixel_variance"),
@@ -145,17 +146,19 @@ def _sequence(numbers: _Numbers, words: dict[str, Any]) -> Sequence:
     if np.any(order <= 0):
         raise InputError("frame: observations must be sorted by frame, then landmark, without repeats")
     imu = read_samples(numbers.real) if numbers.has("imu_time_stamps") else None
-    rows = len(t) if imu is None else 0
+    rows, pixel = len(t) if imu is None else 0, numbers.real("pixel", n, 4, finite=False)
+    pair = not (n and np.isnan(pixel[:, 2:]).all())
+    intrinsics = (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
     return Sequence(
         **words["sequence"],
         t=t,
         linear_velocity=numbers.real("linear_velocity", rows, 3),
         angular_velocity=numbers.real("angular_velocity", rows, 3),
-        camera=StereoCamera(
-            float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]), positive("b", numbers.real("b"), "m")
-        ),
+        camera=StereoCamera(*intrinsics, positive("b", numbers.real("b"), "m"))
+        if pair
+        else MonocularCamera(*intrinsics),
         imu_T_cam=extrinsic("imu_T_cam", imu_T_cam[:3, :3], imu_T_cam[:3, 3]),
-        observations=Observations(frame, landmark, numbers.real("pixel", n, 4)),
+        observations=Observations(frame, landmark, numbers.real("pixel", n, 4) if pair else pixel),
         n_landmarks=n_landmarks,
         imu=imu,
         up_imu=numbers.real("up_imu" if numbers.has("up_imu") else "up", 3),

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fgbaseline.geometry import StereoCamera
+
 from ..formats.atomic_write import atomic_write
 from ..formats.npz_member import write_member
 from ..problem import Excluded, Problem
@@ -39,7 +41,7 @@ def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
         "linear_velocity": sequence.linear_velocity,
         "angular_velocity": sequence.angular_velocity,
         "K": camera.K,
-        "b": np.array(camera.baseline),
+        **({"b": np.array(camera.baseline)} if isinstance(camera, StereoCamera) else {}),
         "imu_T_cam": sequence.imu_T_cam,
         "up": sequence.up,
         "increment": problem.increment,
@@ -66,7 +68,7 @@ def arrays(problem: Problem) -> dict[str, NDArray[Any]]:
 def scalars(problem: Problem) -> dict[str, Any]:
     """Scalars and texts, and for readers of the CSV files the small arrays."""
     sequence, prior = problem.sequence, problem.landmark_prior
-    camera = sequence.camera
+    camera, baseline = sequence.camera, getattr(sequence.camera, "baseline", None)
     return {
         "schema": layout.SCHEMA,
         "sequence": {
@@ -82,7 +84,7 @@ def scalars(problem: Problem) -> dict[str, Any]:
         "diagnosed": problem.diagnosed,
         "reading": problem.landmark_mode.value,
         "remarks": [*problem.remarks, *problem.repairs],
-        "camera": {"fu": camera.fu, "fv": camera.fv, "cu": camera.cu, "cv": camera.cv, "baseline": camera.baseline},
+        "camera": {"fu": camera.fu, "fv": camera.fv, "cu": camera.cu, "cv": camera.cv, "baseline": baseline},
         "imu_T_cam": sequence.imu_T_cam.tolist(),
         "up": sequence.up.tolist(),
         "initial_pose": problem.initial_pose.tolist(),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
+from fgbaseline.geometry.monocular import left_of
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
@@ -65,6 +66,8 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
     wrong, offset = wrong_matches(tracks.frame, tracks.track, t, settings)
     pixel = displaced(noisy_pixels(pixel, settings), offset, rig)
 
+    if settings.cameras == "left":
+        pixel[:, 2:] = np.nan
     order = np.lexsort((tracks.track, tracks.frame))
     truth = Truth(poses, tracks.first, "simulated")
     linear = angular = np.empty((0, 3))
@@ -85,7 +88,7 @@ def simulate_with_labels(settings: Simulation) -> tuple[Sequence, Labels]:
         t=t,
         linear_velocity=linear,
         angular_velocity=angular,
-        camera=rig.camera,
+        camera=rig.camera if settings.cameras == "stereo" else left_of(rig.camera),
         imu_T_cam=rig.imu_T_cam.copy(),
         observations=Observations(tracks.frame[order], tracks.track[order], pixel[order]),
         n_landmarks=len(tracks.first),

@@ -48,7 +48,7 @@ class Rig:
 
 def rig_of(sequence: Sequence) -> Rig:
     """The rig that recorded a sequence; images are taken to be as large as its observations or twice its center say."""
-    camera, pixel = sequence.camera, sequence.observations.pixel
+    camera, pixel = sequence.stereo_camera, sequence.observations.pixel
     corner = pixel[:, :2].max(axis=0, initial=0.0)
     return Rig(
         camera=camera,

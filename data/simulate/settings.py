@@ -15,6 +15,7 @@ from .rig import HANDHELD, KITTI, Rig, rig_of
 
 PathName = Literal["town", "loop", "highway", "handheld", "drone", "along"]
 WorldName = Literal["street", "room"]
+Cameras = Literal["stereo", "left"]
 Interval = Literal["after", "before", "mean"]
 Vector = tuple[float, float, float]
 
@@ -93,6 +94,8 @@ class Simulation:
     rig: Rig | None = None
     """camera and extrinsic; by default that of `along`, a small rig for `handheld` and `drone`, else KITTI's car"""
 
+    cameras: Cameras = "stereo"
+    """both cameras of the rig, or the left one alone, which needs `imu`"""
     standing: float = 0.0
     """s that the body stands still before it sets off"""
     imu: SimulatedImu | None = None
@@ -145,6 +148,9 @@ class Simulation:
     def __post_init__(self) -> None:
         _require_choice("path", self.path, get_args(PathName))
         _require_choice("velocity_of_interval", self.velocity_of_interval, get_args(Interval))
+        _require_choice("cameras", self.cameras, get_args(Cameras))
+        if self.cameras == "left" and self.imu is None:
+            raise InputError("cameras: one camera needs raw inertial samples, which bring the scale; give imu as well")
         if self.world is not None:
             _require_choice("world", self.world, get_args(WorldName))
         if (self.along is None) == (self.path == "along"):

@@ -34,14 +34,14 @@ def usual_rig(sequence: Sequence) -> Sequence:
 
     The camera is placed at the IMU where the unit of its position is unknown: with such a baseline, and far away.
     """
-    b = sequence.camera.baseline
+    b = sequence.stereo_camera.baseline
     usual = BASELINES[0] <= b <= BASELINES[1]
     if usual and not is_far(sequence):
         return sequence
     factor = 1.0 if usual else 1000.0 ** -round(np.log(b / 0.2) / np.log(1000.0))
     imu_T_cam = sequence.imu_T_cam.copy()
     imu_T_cam[:3, 3] = 0.0
-    return replace(sequence, camera=replace(sequence.camera, baseline=b * factor), imu_T_cam=imu_T_cam)
+    return replace(sequence, camera=replace(sequence.stereo_camera, baseline=b * factor), imu_T_cam=imu_T_cam)
 
 
 def is_far(sequence: Sequence) -> bool:
@@ -83,7 +83,7 @@ def _factor(sequence: Sequence, usual: Sequence, seen: Odometry | None) -> tuple
         return 1.0, np.inf
     known = seen.known
     linear, angular = np.split(seen.twist(sequence.dt)[known], 2, axis=1)
-    scale = sequence.camera.baseline / usual.camera.baseline
+    scale = sequence.stereo_camera.baseline / usual.stereo_camera.baseline
     camera = (linear + np.cross(angular, usual.imu_T_cam[:3, 3])) * scale
     turning = np.cross(angular, sequence.imu_T_cam[:3, 3])
     found = regress(camera - zero_order_hold(sequence)[known, :3], turning[:, :, None], np.array([LARGEST]))

@@ -100,7 +100,7 @@ def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mappin
     """
     given = ({"time": 1.0} if sequence.time_unit_given else {}) | dict(given or {})
     scale_ratios = _gains(sequence, seen_by_cameras)
-    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    interval, b = float(np.median(sequence.dt)), sequence.stereo_camera.baseline
     ratios = _known(scale_ratios[0]), _known(scale_ratios[1])
     if not given and any(ratio is not None for ratio in ratios) and _fits(Units(), ratios):
         return Units(scale_ratios=scale_ratios, doubt=_unfollowed(sequence, Units(), scale_ratios[0], given))
@@ -177,7 +177,7 @@ def _gains(sequence: Sequence, seen_by_cameras: Odometry | None) -> tuple[ScaleR
     if seen_by_cameras is None or seen_by_cameras.known.sum() < MIN_KNOWN:
         return unknown, unknown
     seen, recorded = seen_by_cameras.twist(sequence.dt), _without_jumps(zero_order_hold(sequence))
-    scale = sequence.camera.baseline / usual_rig(sequence).camera.baseline
+    scale = sequence.stereo_camera.baseline / usual_rig(sequence).stereo_camera.baseline
     angular = scale_ratio(seen[:, 3:], recorded[:, 3:], seen_by_cameras.known, centered=True)
     linear = scale_ratio(seen[:, :3], recorded[:, :3], seen_by_cameras.known, centered=False)
     return angular, linear._replace(ratio=linear.ratio * scale)
@@ -229,14 +229,14 @@ def rescaled(sequence: Sequence, units: Units) -> Sequence:
         rescaled_time(sequence, units.time),
         linear_velocity=sequence.linear_velocity * units.linear,
         angular_velocity=sequence.angular_velocity * units.angular,
-        camera=replace(sequence.camera, baseline=sequence.camera.baseline * units.baseline),
+        camera=replace(sequence.stereo_camera, baseline=sequence.stereo_camera.baseline * units.baseline),
         imu_T_cam=imu_T_cam,
     )
 
 
 def unit_findings(units: Units, sequence: Sequence, seen: str = "") -> tuple[Finding, ...]:
     """A finding for each wrong unit of `sequence`, as recorded; `seen` is evidence other than the scale ratios."""
-    interval, b = float(np.median(sequence.dt)), sequence.camera.baseline
+    interval, b = float(np.median(sequence.dt)), sequence.stereo_camera.baseline
     distance = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
@@ -280,7 +280,7 @@ def _doubt(sequence: Sequence, scale_ratios: tuple[ScaleRatio, ScaleRatio], cand
         fits.append(" with ".join(wrong) or "all units as they should be")
     return (
         f"the units are in doubt: {evidence(Units(scale_ratios=scale_ratios))}, the median interval between frames is "
-        f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.camera.baseline:.6g}, which fits "
+        f"{float(np.median(sequence.dt)):.6g} and the baseline {sequence.stereo_camera.baseline:.6g}, which fits "
         f"{' as well as '.join(fits)}; settle it with --time-unit s, ms, us or ns, or with a table [units] in --repairs"
     )
 

@@ -58,7 +58,7 @@ def _axes_of(sequence: Sequence, seen_by_cameras: Odometry) -> tuple[Axes, Axes]
     )
     angular = angular_axes(seen[:, 3:], recorded[:, 3:], known)
     return angular, linear_axes(
-        seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.camera.baseline
+        seen[:, :3], recorded[:, :3], seen[:, 3:], known, angular.name, sequence.stereo_camera.baseline
     )
 
 

@@ -43,8 +43,8 @@ def baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
 
 
 def _by_accelerations(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
-    b = sequence.camera.baseline
-    usual = usual_rig(sequence).camera.baseline / b
+    b = sequence.stereo_camera.baseline
+    usual = usual_rig(sequence).stereo_camera.baseline / b
     if usual == 1.0 or seen is None:
         return BaselineUnit()
     for factor in (1.0, usual):

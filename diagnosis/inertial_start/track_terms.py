@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows, predict
+from fgbaseline.geometry.measurement import predict
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..odometry.stereo_odometry import Odometry
@@ -56,7 +56,7 @@ class KeyframeTracks:
             at = slice(int(bounds[i]), int(bounds[i + 1]))
             own = self.point[at]
             seen = predict(self.model.camera, cam_T_imu, pose[i], points[own])
-            residual = (measured_rows(self.pixel[at]) - seen.pixel) * white
+            residual = (self.model.measured(self.pixel[at]) - seen.pixel) * white
             front = np.isfinite(points[own]).all(axis=1) & (seen.depth > MIN_FRONT)
             weight = np.where(front, np.sqrt(self.model.weight((residual**2).sum(axis=1))), 0.0)
             scale = weight[:, None, None] * white[:, None]

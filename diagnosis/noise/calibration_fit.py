@@ -69,12 +69,12 @@ def fit_windows(
     windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
     if not windows:
         return None
-    baseline = sequence.camera.baseline
+    baseline = sequence.stereo_camera.baseline
     sigmas = replace(START, linear_velocity=START.linear_velocity * baseline)
     shared = [np.zeros(SHARED)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
+        fits = fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas, baseline)
@@ -114,7 +114,7 @@ def half_cost(
     total = 0.0
     windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
     start = [np.zeros(SHARED)] * len(windows)
-    for fit in fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
+    for fit in fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
     return total
 

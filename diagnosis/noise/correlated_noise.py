@@ -86,7 +86,7 @@ def _ends(
 ) -> list[End]:
     """Last pose of each window from the tracks."""
     common = [shared] * len(windows)
-    fits = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
+    fits = fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
     return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 

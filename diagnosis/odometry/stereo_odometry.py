@@ -56,7 +56,7 @@ class Odometry:
 
 def odometry(sequence: Sequence) -> Odometry:
     """Motions of all pairs of consecutive frames with enough track segments."""
-    links, camera, n_pairs = track_segments(sequence), sequence.camera, sequence.n_frames - 1
+    links, camera, n_pairs = track_segments(sequence), sequence.stereo_camera, sequence.n_frames - 1
     count = np.bincount(links.frame, minlength=n_pairs)
     known = count >= MIN_LINKS
     links = links.select(known[links.frame])

@@ -137,7 +137,7 @@ class TrackConsistency:
 
         Infinite where the predicted point is not in front of the camera.
         """
-        o, camera = self.sequence.observations, self.sequence.camera
+        o, camera = self.sequence.observations, self.sequence.stereo_camera
         motion = se3.inverse(self.world_T_cam[o.frame[after]]) @ self.world_T_cam[o.frame[before]]
         predicted = se3.transform(motion, camera.triangulate(o.pixel[before]))
         residual = camera.project(predicted) - o.pixel[after]

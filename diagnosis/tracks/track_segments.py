@@ -95,7 +95,7 @@ def track_segments(sequence: Sequence) -> TrackSegments:
         before=before,
         after=after,
         frame=o.frame[before],
-        point=sequence.camera.triangulate(o.pixel[before]),
+        point=sequence.stereo_camera.triangulate(o.pixel[before]),
         pixel=measured_rows(o.pixel[after]),
     )
 

@@ -69,7 +69,7 @@ def terms_of(
         information[i, i:] = information[i:, i] = (A[:, i : i + 1] * A[:, i:]).sum(axis=0)
     pull, by_offset = (A * r[:, None]).sum(axis=0), A[1] * (root / sigma)
     by_point = _summed_by_point(np.concatenate([information.reshape(9, n), pull, by_offset]), joined.row, m)
-    factor = _cholesky(by_point[:9].reshape(3, 3, m), DAMPING / model.camera.baseline**2)
+    factor = _cholesky(by_point[:9].reshape(3, 3, m), DAMPING / model.camera.unit_length**2)
     over = _over(factor[:, joined.row], information)
     with_pose = -np.concatenate([over, _crossed(arm, over)]).reshape(18, n)
     landmarks = Landmarks(factor, _over(factor, by_point[9:12]), with_pose, _over(factor, by_point[12:]))

@@ -13,6 +13,7 @@ from fgbaseline.geometry import FgbaselineError
 from ..motion_model import POSE, BodyHistory
 from .filter import JointFilter
 from .gyro_bias import BIAS, GyroBiasPrior
+from .landmark_representation import LandmarkRepresentation
 from .settings import JointSettings, Linearization
 
 BIAS_BLOCK = slice(POSE, POSE + BIAS)
@@ -26,13 +27,16 @@ def joint_ekf(problem: Problem, progress: Progress | None = None, settings: Join
     it. For tracks without longer gaps the poses equal those of the filter that keeps every landmark. A landmark
     observed again later is initialized as a new one. Marginalized landmarks keep their estimate and covariance.
 
-    Raises FgbaselineError for `gyro_bias` in the settings of a problem with raw inertial samples.
+    Raises FgbaselineError for `gyro_bias` in the settings of a problem with raw inertial samples, and for one camera
+    without inverse depth or its prior.
     """
     settings = settings or JointSettings()
     if problem.imu is not None and settings.gyro_bias is not None:
         raise FgbaselineError(
             "joint-ekf-bias takes body velocities only: with raw inertial samples joint-ekf estimates both biases"
         )
+    if problem.sequence.monocular:
+        _require_inverse_depth(problem, settings)
     if len(problem.observations()) == 0:
         return Estimate.failed("joint-ekf", "no observations", problem.n_frames, len(problem.excluded))
     with threadpool_limits(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -62,6 +66,16 @@ def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None)
 def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
     """Joint filter without a gate: outliers are only down-weighted by the kernel."""
     return replace(joint_ekf(problem, progress, JointSettings(gate=None)), name="joint-ekf-ungated")
+
+
+def _require_inverse_depth(problem: Problem, settings: JointSettings) -> None:
+    """Refuses what one camera cannot do. Raises FgbaselineError."""
+    if settings.coordinates is LandmarkRepresentation.WORLD:
+        raise FgbaselineError(
+            "joint-ekf-textbook needs a stereo camera: from one view a point in the world has no position to start at"
+        )
+    if problem.inverse_depth_prior is None:
+        raise FgbaselineError("joint-ekf: with one camera it needs the problem's inverse_depth_prior, which is missing")
 
 
 def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -> Estimate:

@@ -9,22 +9,23 @@ import numpy as np
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.measurement import ROWS
 
 CELL = 64.0
 """Edge of the square image cells, px."""
 
 
 def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> BoolArray:
-    """Mask (n,) of at most `places` selected landmarks, from their measured rows uL, uR, v (n, 3), px.
+    """Mask (n,) of at most `places` selected landmarks, from their measured rows uL, uR, v (n, 3), or uL, v (n, 2), px.
 
-    `inside` (m, 3) holds the rows of observed landmarks already in the state: each counts as a turn of its cell.
+    `inside` (m, r) holds the rows of observed landmarks already in the state: each counts as a turn of its cell.
     """
     n = len(candidates)
     selected: BoolArray = np.ones(n, dtype=np.bool_)
     if n <= max(places, 0):
         return selected
     cell = _cells(np.concatenate([candidates, inside]))
-    nearness = candidates[:, 0] - candidates[:, 1]
+    nearness = candidates[:, 0] - candidates[:, 1] if candidates.shape[1] == len(ROWS) else np.zeros(n)
     order = np.lexsort((-nearness, cell[:n]))
     number = np.bincount(cell[:n])
     turn = np.empty(n, dtype=np.int64)
@@ -35,6 +36,6 @@ def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> 
 
 
 def _cells(rows: FloatArray) -> IntArray:
-    """Index (n,) of the left-image cell of each of the rows (n, 3), counted from 0."""
-    corner = np.floor(rows[:, [0, 2]] / CELL)
+    """Index (n,) of the left-image cell of each of the rows (n, r), counted from 0."""
+    corner = np.floor(rows[:, [0, -1]] / CELL)
     return np.unique(corner, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -8,7 +8,7 @@ from fgbaseline.data.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import back_projected, measured_rows, predict
+from fgbaseline.geometry.measurement import back_projected, predict
 
 from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
@@ -33,7 +33,7 @@ class _LinearizedObservations(NamedTuple):
     """(n,) indices into the problem's observations"""
     H: StackedJacobian
     residual: FloatArray
-    """(n, 3) innovations in uL, uR, v, px"""
+    """(n, r) innovations in the rows of the measurement model, px"""
     cosine: FloatArray
     """(n,) cosines of the angle between optical axis and ray"""
 
@@ -51,7 +51,7 @@ class JointFilter:
         self.measurement = problem.measurement
         self.row_variance = self.measurement.row_variance
         self.feature = problem.feature_row(o.landmark)
-        self.measured = measured_rows(o.pixel)
+        self.measured = self.measurement.measured(o.pixel)
         self.motion: MotionModel = motion_model(problem)
         if settings.gyro_bias is not None:
             self.motion = BiasedVelocityMotion(problem, settings.gyro_bias)
@@ -205,19 +205,29 @@ class JointFilter:
         """Initialize landmarks from one observation each, back-projected from the current pose estimate.
 
         This is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
-        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n.
+        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n. For one camera a third row
+        measures the inverse depth by its prior.
         """
         n, state = len(index), self.state
         first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE
         world_T_cam = state.pose @ self.imu_T_cam
-        points = back_projected(self.camera, self.measured[index]) @ world_T_cam.T
+        prior = self.problem.inverse_depth_prior if self.measurement.monocular else None
+        points = back_projected(self.camera, self.measured[index], np.nan if prior is None else prior.mean)
+        points = points @ world_T_cam.T
         shared = chart(self.settings.coordinates, world_T_cam)
         xi = coordinates_of(shared, points)
         at = state.predicted.pose if first_estimate else state.pose
         seen = predict(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
-        inverse = np.linalg.inv((seen.point_jacobian().reshape(3 * n, 4) @ shared[:, :3]).reshape(n, 3, 3))
-        covariance = (inverse * self.row_variance) @ np.swapaxes(inverse, 1, 2)
-        state.initialize(self.feature[index], shared, xi, -inverse @ seen.pose_jacobian(), covariance)
+        r = self.measurement.n_rows
+        H_xi = (seen.point_jacobian().reshape(r * n, 4) @ shared[:, :3]).reshape(n, r, 3)
+        H_pose, variance = seen.pose_jacobian(), self.row_variance
+        if prior is not None:
+            H_xi, H_pose = (np.concatenate([H, np.zeros((n, 1, H.shape[2]))], axis=1) for H in (H_xi, H_pose))
+            H_xi[:, r, 2] = 1.0
+            variance = np.append(variance, prior.sigma**2)
+        inverse = np.linalg.inv(H_xi)
+        covariance = (inverse * variance) @ np.swapaxes(inverse, 1, 2)
+        state.initialize(self.feature[index], shared, xi, -inverse @ H_pose, covariance)
         self.map.initialized[self.feature[index]] = True
         self.used[index] = True
 

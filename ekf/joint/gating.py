@@ -9,7 +9,6 @@ from scipy.special import chdtri
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement
-from fgbaseline.geometry.measurement import ROWS
 
 from .settings import JointSettings
 
@@ -48,16 +47,16 @@ def gate_observations(
     n = len(squared_norm)
     weight = measurement.weight(squared_norm)
     if settings.disagreeing_share is not None and n >= MIN_VOTES:
-        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(DISAGREEMENT)))
+        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(DISAGREEMENT, measurement.n_rows)))
         if disagreeing > settings.disagreeing_share * n:
             return GatedObservations(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
     if settings.gate is not None:
-        accepted = squared_norm <= chi2_quantile(settings.gate)
+        accepted = squared_norm <= chi2_quantile(settings.gate, measurement.n_rows)
         return GatedObservations(accepted, weight, None if accepted.all() else EventKind.OUTSIDE_GATE)
     return GatedObservations(np.ones(n, dtype=np.bool_), weight)
 
 
 @cache
-def chi2_quantile(probability: float) -> float:
-    """Chi-square quantile with the 3 degrees of freedom of one observation."""
-    return float(chdtri(len(ROWS), 1.0 - probability))
+def chi2_quantile(probability: float, degrees: int) -> float:
+    """Chi-square quantile with the degrees of freedom of one observation, 3 or 2."""
+    return float(chdtri(degrees, 1.0 - probability))

@@ -1,7 +1,7 @@
 """Joint measurement update of the pose and every active landmark.
 
-H has, for an observation, the six columns of the pose and the three of its landmark; nothing else is stored. With
-S = H P H^T + R = L L^T and W = L^-1 H P the update is
+H has, for an observation of r rows, the six columns of the pose and the three of its landmark; nothing else is stored.
+With S = H P H^T + R = L L^T and W = L^-1 H P the update is
 
     delta = W^T L^-1 r    and    P <- P - W^T W,
 
@@ -28,30 +28,30 @@ PANEL = 192
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StackedJacobian:
-    """Measurement Jacobian H (3n, size) of n observations, with nine nonzero columns in each block of three rows."""
+    """Measurement Jacobian H (rn, size) of n observations, with nine nonzero columns in each block of r rows."""
 
     slot: IntArray
     """(n,) slot of the observed landmark"""
     pose_jacobian: FloatArray
-    """(n, 3, 6)"""
+    """(n, r, 6)"""
     landmark_jacobian: FloatArray
-    """(n, 3, 3)"""
+    """(n, r, 3)"""
     n_body: int = POSE
     """offset of the landmarks; columns between pose and landmarks (the bias) are zero"""
 
     def multiply(self, matrix: FloatArray) -> FloatArray:
-        """Product H A (3n, c) with a matrix A (size, c)."""
-        n, c = len(self.slot), matrix.shape[1]
-        product, landmarks = np.empty((n, 3, c)), matrix[self.n_body :].reshape(-1, 3, c)
+        """Product H A (rn, c) with a matrix A (size, c)."""
+        (n, r, _), c = self.pose_jacobian.shape, matrix.shape[1]
+        product, landmarks = np.empty((n, r, c)), matrix[self.n_body :].reshape(-1, 3, c)
         for first in range(0, n, PANEL // 3):
             part = slice(first, first + PANEL // 3)
             np.matmul(self.landmark_jacobian[part], landmarks[self.slot[part]], out=product[part])
-            product[part] += (self.pose_jacobian[part].reshape(-1, POSE) @ matrix[:POSE]).reshape(-1, 3, c)
-        return product.reshape(3 * n, c)
+            product[part] += (self.pose_jacobian[part].reshape(-1, POSE) @ matrix[:POSE]).reshape(-1, r, c)
+        return product.reshape(r * n, c)
 
     def own_blocks(self, HP: FloatArray) -> FloatArray:
-        """Blocks (n, 3, 3) on the diagonal of H P H^T, from H P (3n, size)."""
-        rows = HP.reshape(len(self.slot), 3, -1)
+        """Blocks (n, r, r) on the diagonal of H P H^T, from H P (rn, size)."""
+        rows = HP.reshape(*self.pose_jacobian.shape[:2], -1)
         columns = self.n_body + 3 * self.slot[:, None] + np.arange(3)
         of_landmark = np.take_along_axis(rows, columns[:, None, :], axis=2)
         of_pose = rows[:, :, :POSE] @ np.swapaxes(self.pose_jacobian, 1, 2)
@@ -72,20 +72,20 @@ class CholeskyFactor(NamedTuple):
     """Cholesky factor of the innovation covariance: S = H P H^T + R = L L^T."""
 
     L: FloatArray
-    """(3n, 3n), lower"""
+    """(rn, rn), lower"""
     whitened: FloatArray
-    """(3n,) L^-1 nu"""
+    """(rn,) L^-1 nu"""
 
     @staticmethod
     def of(
         HPHt: FloatArray, residual: FloatArray, variance: FloatArray, *, overwrite: bool = False
     ) -> "CholeskyFactor":
-        """Factorize H P H^T (3n, 3n) plus R of diagonal (n, 3) or (3,), px^2; whiten nu (n, 3), px.
+        """Factorize H P H^T (rn, rn) plus R of diagonal (n, r) or (r,), px^2; whiten nu (n, r), px.
 
         H P H^T is modified only with `overwrite`. Raises NotPositiveDefiniteError.
         """
         S = HPHt if overwrite else HPHt.copy()
-        diagonal = S.reshape(-1)[:: len(S) + 1].reshape(-1, 3)
+        diagonal = S.reshape(-1)[:: len(S) + 1].reshape(residual.shape)
         diagonal += variance
         L, failed = dpotrf(S.T, lower=1, clean=0, overwrite_a=1)
         if failed or not np.isfinite(L[-1, -1]):
@@ -93,9 +93,9 @@ class CholeskyFactor(NamedTuple):
         return CholeskyFactor(L, dtrsv(L, residual.reshape(-1), lower=1))
 
     def reweighted(self, residual: FloatArray, added: FloatArray) -> "CholeskyFactor":
-        """Factor of the first m observations, of nu (m, 3), with more noise in the last k of these: R + diag(added).
+        """Factor of the first m observations, of nu (m, r), with more noise in the last k of these: R + diag(added).
 
-        `added` is (k, 3), px^2. The other columns of L are those of the factor without it, which is overwritten. Raises
+        `added` is (k, r), px^2. The other columns of L are those of the factor without it, which is overwritten. Raises
         NotPositiveDefiniteError.
         """
         last = residual.size
@@ -122,24 +122,25 @@ class Innovation:
 
     H: StackedJacobian
     residual: FloatArray
-    """(n, 3) measured minus predicted, px"""
+    """(n, r) measured minus predicted, px"""
     HP: FloatArray
-    """(3n, size)"""
+    """(rn, size)"""
 
     @staticmethod
     def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
-        """Innovation of residuals (n, 3), px, under the state covariance P (size, size)."""
+        """Innovation of residuals (n, r), px, under the state covariance P (size, size)."""
         return Innovation(H, residual, H.multiply(P))
 
     def __len__(self) -> int:
         return len(self.residual)
 
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
-        """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance (3,))."""
-        return squared_norm(self.residual, self.H.own_blocks(self.HP) + np.diag(variance))
+        """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance), (n, r) or (r,), px^2."""
+        own = self.H.own_blocks(self.HP)
+        return squared_norm(self.residual, own + np.eye(own.shape[-1]) * variance[..., None, :])
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
-        """Factor of S for R = diag(variance), (n, 3) or (3,), px^2. Raises NotPositiveDefiniteError."""
+        """Factor of S for R = diag(variance), (n, r) or (r,), px^2. Raises NotPositiveDefiniteError."""
         HPHt = self.H.multiply(np.ascontiguousarray(self.HP.T))
         return CholeskyFactor.of(HPHt, self.residual, variance, overwrite=True)
 
@@ -152,7 +153,7 @@ class Innovation:
 
     def first(self, n: int) -> "Innovation":
         """Innovation of the first n observations."""
-        return Innovation(self.H.select(slice(n)), self.residual[:n], self.HP[: 3 * n])
+        return Innovation(self.H.select(slice(n)), self.residual[:n], self.HP[: n * self.residual.shape[1]])
 
 
 def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from . import options
 from .options import PATH, Numbers
 
 PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
+CAMERAS = ("stereo", "left")
 INTERVALS = ("after", "before", "mean")
 DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
 
@@ -237,6 +238,9 @@ def export(out: Path, force: bool, topics: str | None, settings: Path | None, **
 @click.option("--seed", help="The same seed gives the same bytes.  [default: 0]", type=int)
 @click.option("--standing", help="Seconds at rest before the motion starts.  [default: 0]", type=float)
 @click.option("--imu", is_flag=True, help="Raw inertial samples in place of body velocities.")
+@click.option(
+    "--cameras", help="Both cameras, or the left one alone with --imu.  [default: stereo]", type=click.Choice(CAMERAS)
+)
 @click.option("--imu-rate", help="Hz, with --imu.  [default: 200]", type=float)
 @click.option(
     "--imu-noise",

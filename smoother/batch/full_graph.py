@@ -4,7 +4,6 @@ import gtsam
 import numpy as np
 
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry.measurement import measured_rows
 
 from ..graph.factors import FactorBuilder
 from ..graph.frame_states import FrameStates
@@ -26,8 +25,8 @@ def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.Non
     for k in range(problem.n_frames - 1):
         graph.push_back(factors.motion(k, states))
     o = problem.observations()
-    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
-        graph.push_back(factors.stereo(k, landmark_key(j), rows))
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), problem.measurement.measured(o.pixel), strict=True):
+        graph.push_back(factors.observation(k, landmark_key(j), rows))
     if problem.landmark_prior is not None:
         for j in np.unique(o.landmark).tolist():
             graph.push_back(factors.landmark_prior(j, landmark_key(j)))

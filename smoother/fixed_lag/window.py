@@ -26,8 +26,9 @@ class FixedLagWindow:
     """Frames and landmarks of the last `lag` seconds; a landmark's time is that of the frame that saw it last."""
 
     def __init__(self, problem: Problem, builder: GraphBuilder, lag: float, settings: ISAM2Settings) -> None:
-        self._problem, self._builder, self._baseline = problem, builder, problem.sequence.camera.baseline
-        self._lag = CheckpointedFixedLag(lag, settings, self._baseline)
+        self._problem, self._builder = problem, builder
+        self._unit_length = problem.sequence.camera.unit_length
+        self._lag = CheckpointedFixedLag(lag, settings, self._unit_length)
         self._seconds = lag
         self._last_seen: dict[int, float] = {}
         """of each landmark in the window"""
@@ -54,16 +55,16 @@ class FixedLagWindow:
         new: dict[int, int] = {}
         for entry in update.new_landmarks:
             j = entry.landmark
-            distance = float(np.linalg.norm(entry.position - update.initial_pose[:3, 3])) / self._baseline
+            distance = float(np.linalg.norm(entry.position - update.initial_pose[:3, 3])) / self._unit_length
             name = j + self._problem.sequence.n_landmarks * self._times_initialized[j]
             new[j] = distance_key(name, distance)
             values.insert(new[j], entry.position)
             if self._problem.landmark_prior is not None:
                 graph.push_back(self._builder.factors.landmark_prior(j, new[j]))
             for i in entry.observations:
-                graph.push_back(self._builder.stereo(i, new[j]))
+                graph.push_back(self._builder.observation(i, new[j]))
         for j, i in update.tracked.items():
-            graph.push_back(self._builder.stereo(i, self.key[j]))
+            graph.push_back(self._builder.observation(i, self.key[j]))
         seen = new | {j: self.key[j] for j in update.tracked}
         times = dict.fromkeys(state_keys(k, self.states.inertial), now) | dict.fromkeys(seen.values(), now)
         forgotten = {self.key[j] for j in dropped if j in self.key}

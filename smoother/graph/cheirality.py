@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.observations import BoolArray, Observations
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, StereoCamera
+from fgbaseline.geometry import Camera, FloatArray
 
 MIN_DISPARITY = 0.05
 """px; a landmark with a smaller disparity makes a system indeterminate, as does one at the plane of a camera that
@@ -28,8 +28,8 @@ def satisfies_cheirality(problem: Problem, o: Observations, world_T_imu: FloatAr
     return in_front(problem.sequence.camera, world_T_cam, points)
 
 
-def in_front(camera: StereoCamera, world_T_cam: FloatArray, points: FloatArray) -> BoolArray:
+def in_front(camera: Camera, world_T_cam: FloatArray, points: FloatArray) -> BoolArray:
     """Mask (n,): world points (n, 3) in front of cameras at poses (n, 4, 4), and not at infinity; NaN is not."""
     depth = np.einsum("ni,ni->n", world_T_cam[:, :3, 2], points - world_T_cam[:, :3, 3])
-    front: BoolArray = (depth > camera.min_depth) & (depth < camera.fu * camera.baseline / MIN_DISPARITY)
+    front: BoolArray = (depth > camera.min_depth) & (depth < camera.fu * camera.unit_length / MIN_DISPARITY)
     return front

@@ -1,13 +1,13 @@
 """GTSAM factors of a problem, with the likelihood of the filters.
 
-`StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances.
+`StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances; one camera has (uL, v).
 """
 
 import gtsam
 import numpy as np
 
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
 from .frame_states import FrameStates
 from .gtsam_conversions import reorder_tangent
@@ -15,7 +15,7 @@ from .inertial_factors import InertialFactors
 from .keys import pose_key
 
 FIXED_POSE_SIGMA = 1e-6
-"""baselines and rad: sigma of a fixed pose in place of zero, so that Cholesky can be used"""
+"""unit lengths of the camera, and rad: sigma of a fixed pose in place of zero, so that Cholesky can be used"""
 
 
 class FactorBuilder:
@@ -24,9 +24,11 @@ class FactorBuilder:
     def __init__(self, problem: Problem) -> None:
         camera = problem.sequence.camera
         self.problem = problem
-        self.calibration = gtsam.Cal3_S2Stereo(camera.fu, camera.fv, 0.0, camera.cu, camera.cv, camera.baseline)
+        pinhole = (camera.fu, camera.fv, 0.0, camera.cu, camera.cv)
+        self._left = gtsam.Cal3_S2(*pinhole)
+        self._stereo = gtsam.Cal3_S2Stereo(*pinhole, camera.baseline) if isinstance(camera, StereoCamera) else None
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
-        self.stereo_noise = stereo_noise(problem)
+        self.pixel_noise = pixel_noise(problem)
         self.steps = se3.exp(problem.increment)
         self.step_covariance = reorder_tangent(problem.increment_covariance)
         self.inertial = (
@@ -38,7 +40,7 @@ class FactorBuilder:
     @property
     def fixed_pose_sigmas(self) -> FloatArray:
         """Standard deviations (6,), rad and m, of a fixed pose."""
-        return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.baseline], 3)
+        return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.unit_length], 3)
 
     def start_prior(self) -> gtsam.NonlinearFactor:
         """Prior factor of frame 0."""
@@ -69,19 +71,13 @@ class FactorBuilder:
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
-    def stereo(self, frame: int, key: int, rows: FloatArray) -> gtsam.GenericStereoFactor3D:
-        """Stereo factor of the rows uL, uR, v (3,), px, of the landmark `key`; does not throw on cheirality."""
-        uL, uR, v = rows.tolist()
-        return gtsam.GenericStereoFactor3D(
-            gtsam.StereoPoint2(uL, uR, v),
-            self.stereo_noise,
-            pose_key(frame),
-            key,
-            self.calibration,
-            False,
-            False,
-            self.imu_P_cam,
-        )
+    def observation(self, frame: int, key: int, rows: FloatArray) -> gtsam.NonlinearFactor:
+        """Factor of the rows uL, uR, v, or uL, v (r,), px, of the landmark `key`; does not throw on cheirality."""
+        noise, pose, no_throw = self.pixel_noise, pose_key(frame), (False, False)
+        if self._stereo is None:
+            return gtsam.GenericProjectionFactorCal3_S2(rows, noise, pose, key, self._left, *no_throw, self.imu_P_cam)
+        point = gtsam.StereoPoint2(*rows.tolist())
+        return gtsam.GenericStereoFactor3D(point, noise, pose, key, self._stereo, *no_throw, self.imu_P_cam)
 
     def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:
         """Prior factor of one landmark with key `key`."""
@@ -92,8 +88,8 @@ class FactorBuilder:
         return gtsam.PriorFactorPoint3(key, prior.mean[row], noise)
 
 
-def stereo_noise(problem: Problem) -> gtsam.noiseModel.Base:
-    """Noise model of (uL, uR, v), under the problem's kernel."""
+def pixel_noise(problem: Problem) -> gtsam.noiseModel.Base:
+    """Noise model of the rows of an observation, under the problem's kernel."""
     gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.sqrt(problem.measurement.row_variance))
     if problem.kernel is None:
         return gaussian

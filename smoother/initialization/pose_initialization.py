@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import measured_rows, predict
+from fgbaseline.geometry.measurement import predict
 
 MAX_STEPS = 4
 SMALL_STEP = 0.1
@@ -45,10 +45,10 @@ class _KnownLandmarks:
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
         self._points, self._model = points, problem.measurement
         self._cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
-        self._measured = measured_rows(pixel)
+        self._measured = problem.measurement.measured(pixel)
 
     def linearize(self, pose: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Jacobian (3m, 6) for a perturbation of the pose and residuals (3m,), whitened and weighted by the kernel, of
+        """Jacobian (rm, 6) for a perturbation of the pose and residuals (rm,), whitened and weighted by the kernel, of
         the m points that are in front of the camera; None if none is."""
         model = self._model
         with np.errstate(divide="ignore", invalid="ignore"):  # at the camera's plane

@@ -10,7 +10,6 @@ import numpy as np
 from fgbaseline.data.observations import Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import measured_rows
 
 from ..graph.factors import FactorBuilder
 from ..graph.frame_states import FrameStates
@@ -53,8 +52,9 @@ def optimize_window(
         graph.push_back(factors.motion(k, states))
     for k in range(first, last + 1):
         states.insert(values, k)
-    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
-        graph.push_back(factors.stereo(k, landmark_key(j), rows))
+    measured = factors.problem.measurement.measured(o.pixel)
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured, strict=True):
+        graph.push_back(factors.observation(k, landmark_key(j), rows))
     for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
         values.insert(landmark_key(j), position)
     params = gtsam.LevenbergMarquardtParams()

@@ -42,7 +42,7 @@ class IncrementalSmoother:
     """iSAM2 with landmark initialization, recovery from indeterminate systems and marginalization of old frames."""
 
     def __init__(self, problem: Problem, settings: ISAM2Settings) -> None:
-        self.solver = MarginalizedISAM2(settings.params(problem.sequence.camera.baseline))
+        self.solver = MarginalizedISAM2(settings.params(problem.sequence.camera.unit_length))
         self._settings = settings
         self.problem = problem
         self._may_lose_frames = settings.qr or problem.landmark_prior is not None
@@ -149,7 +149,7 @@ class IncrementalSmoother:
         graph.push_back(update.motion_factor)
         owner: list[tuple[int, int]] = []
         new = {
-            e.landmark: distance_key(e.landmark, self._baselines(e.position, update.initial_pose))
+            e.landmark: distance_key(e.landmark, self._unit_lengths(e.position, update.initial_pose))
             for e in update.new_landmarks
         }
         for entry in update.new_landmarks:
@@ -159,10 +159,10 @@ class IncrementalSmoother:
                 graph.push_back(factors.landmark_prior(j, key))
                 owner.append((j, PRIOR))
             for i in entry.observations:
-                graph.push_back(self.builder.stereo(i, key))
+                graph.push_back(self.builder.observation(i, key))
                 owner.append((j, i))
         for j, i in update.tracked.items():
-            graph.push_back(self.builder.stereo(i, self.key[j]))
+            graph.push_back(self.builder.observation(i, self.key[j]))
             owner.append((j, i))
         if update.new_landmarks and not update.tracked:
             self._settling_frames = SETTLING_FRAMES
@@ -242,5 +242,5 @@ class IncrementalSmoother:
         index = np.sort(np.fromiter(position, dtype=np.int64))
         return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))
 
-    def _baselines(self, point: FloatArray, world_T_imu: FloatArray) -> float:
-        return float(np.linalg.norm(point - world_T_imu[:3, 3])) / self.problem.sequence.camera.baseline
+    def _unit_lengths(self, point: FloatArray, world_T_imu: FloatArray) -> float:
+        return float(np.linalg.norm(point - world_T_imu[:3, 3])) / self.problem.sequence.camera.unit_length

@@ -6,10 +6,10 @@ import numpy as np
 
 from fgbaseline import data
 from fgbaseline.data.imu import ImuNoise, ImuSamples
-from fgbaseline.data.problem import Problem
+from fgbaseline.data.problem import InverseDepthPrior, Problem
 from fgbaseline.data.problem.inertial import InertialStart, imu_intervals
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
-from fgbaseline.data.simulate.settings import PathName
+from fgbaseline.data.simulate.settings import Cameras, PathName
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, se3, so3, strapdown
 
 CAMERA = StereoCamera(450.0, 450.0, 320.0, 240.0, 0.12)
@@ -18,6 +18,8 @@ IMU_T_CAM[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 NOISE = ImuNoise(2e-3, 2e-5, 2e-2, 3e-3)
 START_SIGMA = np.repeat([0.0, 0.01, 0.05, 2e-3, 2e-2], 3)
 """of the true start about the given one; heading and position are exact"""
+ROOM_DEPTHS = InverseDepthPrior(0.2, 0.1)
+"""1/m, of the points that simulated tracks begin at in a room"""
 MIN_DISPARITY = 6.0
 """px, of the exact pixels"""
 STEP = 1e-4
@@ -67,13 +69,20 @@ def inertial_problem(seed: int = 0, n_frames: int = 50, rate: float = 10.0, imu_
     return _problem(sequence, 1.0, rng)
 
 
-def simulated_problem(path: PathName, seed: int, seconds: float = 10.0) -> Problem:
-    """A simulated recording with 30 stereo tracks a frame and random biases, at its true noise."""
+def simulated_problem(path: PathName, seed: int, seconds: float = 10.0, cameras: Cameras = "stereo") -> Problem:
+    """A simulated recording with 30 tracks a frame and random biases, at its true noise."""
     rng = np.random.default_rng([seed, 7])
     imu = SimulatedImu(accelerometer_bias=tuple(5e-2 * rng.normal(size=3)))
     gyro_bias = tuple(5e-3 * rng.normal(size=3))
     settings = Simulation(
-        path=path, duration=seconds, features_per_frame=30.0, seed=seed, wrong_share=0.0, gyro_bias=gyro_bias, imu=imu
+        path=path,
+        duration=seconds,
+        features_per_frame=30.0,
+        seed=seed,
+        wrong_share=0.0,
+        gyro_bias=gyro_bias,
+        imu=imu,
+        cameras=cameras,
     )
     return _problem(simulate(settings), settings.sigma_pixel**2, rng)
 
@@ -95,6 +104,7 @@ def _problem(sequence: data.Sequence, pixel_variance: float, rng: np.random.Gene
         initial_covariance=np.zeros((6, 6)),
         imu=imu_intervals(sequence.imu, sequence.t),
         start=start,
+        inverse_depth_prior=ROOM_DEPTHS if sequence.monocular else None,
         kernel=HuberKernel(),
     )
 

@@ -85,7 +85,7 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     )
     turned = np.r_[3:6, 0:3]
     for i, j in enumerate(o.landmark[seen]):
-        factor = factors.stereo(k, landmark_key(int(j)), measured_rows(pixel[i]))
+        factor = factors.observation(k, landmark_key(int(j)), measured_rows(pixel[i]))
         np.testing.assert_allclose(-np.asarray(factor.unwhitenedError(values)), residual[i], atol=1e-8)
         A, b = factor.linearize(values).jacobian()
         np.testing.assert_allclose(b, white[i], rtol=1e-7, atol=1e-8)
@@ -126,7 +126,7 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     robust, plain = FactorBuilder(problem), FactorBuilder(replace(problem, kernel=None))
     for i, j in enumerate(o.landmark[seen]):
         weighted, full = (
-            factors.stereo(1, landmark_key(int(j)), measured_rows(pixel[i])).linearize(values).jacobian()[1]
+            factors.observation(1, landmark_key(int(j)), measured_rows(pixel[i])).linearize(values).jacobian()[1]
             for factors in (robust, plain)
         )
         assert weighted @ weighted == pytest.approx(expected[i] * (full @ full), rel=1e-7)

@@ -36,7 +36,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     values.insert(pose_key(k), gtsam.Pose3(TRUTH.world_T_imu[k]))
     o = PROBLEM.observations()
     for i in np.flatnonzero(o.frame == k):
-        graph.push_back(FACTORS.stereo(k, landmark_key(int(o.landmark[i])), measured_rows(o.pixel[i])))
+        graph.push_back(FACTORS.observation(k, landmark_key(int(o.landmark[i])), measured_rows(o.pixel[i])))
     if k == 0:
         for j, point in enumerate(TRUTH.landmarks):
             values.insert(landmark_key(j), point)
@@ -47,7 +47,7 @@ def behind_the_camera(isam: CheckpointedISAM2, k: int) -> None:
     """An update with a new landmark behind the camera, whose Jacobian is zero."""
     assert TRUTH is not None
     graph, values = frame(k)
-    graph.push_back(FACTORS.stereo(k, landmark_key(99), np.array([600.0, 590.0, 180.0])))
+    graph.push_back(FACTORS.observation(k, landmark_key(99), np.array([600.0, 590.0, 180.0])))
     values.insert(landmark_key(99), (TRUTH.world_T_imu[k] @ PROBLEM.sequence.imu_T_cam @ [0.0, 0.0, -20.0, 1.0])[:3])
     isam.update(graph, values)
 
@@ -55,7 +55,7 @@ def behind_the_camera(isam: CheckpointedISAM2, k: int) -> None:
 def unknown_variable(isam: CheckpointedISAM2, k: int) -> None:
     """An update with a factor on a variable that is not there."""
     graph, values = frame(k)
-    graph.push_back(FACTORS.stereo(k, landmark_key(98), np.array([600.0, 590.0, 180.0])))
+    graph.push_back(FACTORS.observation(k, landmark_key(98), np.array([600.0, 590.0, 180.0])))
     isam.update(graph, values)
 
 

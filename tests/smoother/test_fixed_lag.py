@@ -153,7 +153,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values, dict[int, f
     times = {pose_key(k): now}
     for i in np.flatnonzero(o.frame == k):
         key = near_key(int(o.landmark[i]))
-        graph.push_back(FACTORS.stereo(k, key, measured_rows(o.pixel[i])))
+        graph.push_back(FACTORS.observation(k, key, measured_rows(o.pixel[i])))
         times[key] = now
         if k == 0:
             values.insert(key, truth.landmarks[o.landmark[i]])
@@ -172,7 +172,7 @@ def test_after_a_failed_update_the_window_is_restored_and_continues() -> None:
         if k in (3, 8, 9):
             before = everything(troubled)
             graph, values, times = frame(k)
-            graph.push_back(FACTORS.stereo(k, near_key(99), np.array([600.0, 590.0, 180.0])))
+            graph.push_back(FACTORS.observation(k, near_key(99), np.array([600.0, 590.0, 180.0])))
             values.insert(near_key(99), np.array([-500.0, 0.0, 0.0]))
             with pytest.raises(IndeterminateSystemError):
                 troubled.update(graph, values, times | {near_key(99): 0.1 * k})

@@ -1,0 +1,77 @@
+"""One rectified camera without a second one: pixels [uL, vL] of a point in its frame.
+
+It observes the homogeneous point q = (x, y, z, w) at uL = fu x/z + cu, vL = fv y/z + cv: a stereo pair's rows without
+that of the right camera. An observation is written [uL, vL, NaN, NaN]. Nothing in it depends on w, so depth comes from
+motion alone, and scale from inertial samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import FgbaselineError
+from .so3 import FloatArray
+from .stereo import MIN_DEPTH, StereoCamera, StereoRows
+
+UNIT_LENGTH = 0.1
+"""m, that tolerances are multiples of in place of a baseline: that of a small stereo rig"""
+
+
+@dataclass(frozen=True, slots=True)
+class MonocularCamera:
+    """Intrinsics of one camera, px; z points forward, x right, y down."""
+
+    fu: float
+    fv: float
+    cu: float
+    cv: float
+
+    @property
+    def K(self) -> FloatArray:  # noqa: N802
+        """Camera matrix (3, 3)."""
+        return np.array([[self.fu, 0.0, self.cu], [0.0, self.fv, self.cv], [0.0, 0.0, 1.0]])
+
+    @property
+    def unit_length(self) -> float:
+        """Length (m) that tolerances are multiples of."""
+        return UNIT_LENGTH
+
+    @property
+    def min_depth(self) -> float:
+        """Smallest depth (m) of a point in front of the camera."""
+        return MIN_DEPTH * UNIT_LENGTH
+
+    def rows(self, q: FloatArray) -> StereoRows:
+        """Rows uL and v of points q (3, ...) or (4, ...) in the camera frame; see `StereoCamera.rows`."""
+        near = 1.0 / q[2]
+        slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
+        return StereoRows(np.stack([self.fu * slope[0] + self.cu, self.fv * slope[1] + self.cv]), slope, near)
+
+    def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
+        """Directional derivatives (2, k, ...) of the rows; see `StereoCamera.row_derivatives`."""
+        x, y, _ = seen.normalized
+        by_u, by_v = self.fu * seen.inverse_depth, self.fv * seen.inverse_depth
+        return np.stack([by_u * (along[0] - x * along[2]), by_v * (along[1] - y * along[2])])
+
+    def project(self, points: ArrayLike) -> FloatArray:
+        """Pixels uL, vL, NaN, NaN (..., 4) of points (..., 3) in the camera frame, m."""
+        q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
+        pixel = np.full((*q.shape[1:], 4), np.nan)
+        pixel[..., :2] = np.moveaxis(self.rows(q).pixel, 0, -1)
+        return pixel
+
+
+Camera = StereoCamera | MonocularCamera
+
+
+def left_of(camera: Camera) -> MonocularCamera:
+    """Left camera of a stereo pair, alone."""
+    return MonocularCamera(camera.fu, camera.fv, camera.cu, camera.cv)
+
+
+def require_stereo(camera: Camera, what: str) -> StereoCamera:
+    """The stereo camera of a recording. Raises FgbaselineError, naming what needs it, where there is one camera."""
+    if isinstance(camera, StereoCamera):
+        return camera
+    raise FgbaselineError(f"{what} needs a stereo camera, and this recording has one camera")
