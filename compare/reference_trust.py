@@ -105,7 +105,7 @@ class TrustLimits:
     batch_cost: tuple[float, float] = (0.005, 0.05)
     """relative excess of its cost over that of the batch solution"""
     batch_position: tuple[float, float] = (0.1, 2.0)
-    """RMSE of its positions from those of the batch solution, in baselines of the stereo rig"""
+    """RMSE of its positions from those of the batch solution, in baselines of the rig (0.1 m for one camera)"""
     impossible_share: tuple[float, float] = (0.2, 0.5)
     """share of the `expected_observations` without positive disparity"""
 
@@ -213,7 +213,10 @@ def expected_observations(problem: Problem) -> BoolArray:
 
 
 def has_positive_disparity(problem: Problem) -> BoolArray:
-    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has."""
+    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has; one camera has
+    none that is not."""
+    if problem.sequence.monocular:
+        return np.ones(len(problem.excluded), dtype=np.bool_)
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 

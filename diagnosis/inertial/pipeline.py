@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 from fgbaseline.data.plural import plural
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry.monocular import require_stereo
 
 from ..conventions.rig import usual_rig
 from ..conventions.units import Units, rescaled
@@ -30,7 +31,11 @@ MIN_BEGINNING = 5
 
 
 def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnosis:
-    """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth."""
+    """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth.
+
+    Raises FgbaselineError for a recording of one camera.
+    """
+    require_stereo(sequence.camera, "the diagnosis")
     try:
         with threadpool_limits(limits=1, user_api="blas"):
             return _diagnose(sequence, processes)

@@ -44,10 +44,8 @@ def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
         truth=truth_of_landmarks(sequence.truth, tracks.n_landmarks),
     )
     origin = "found in the recording" if found.fit is not None else "assumed, not estimated from the recording"
-    remarks = (f"pixel noise {origin}: {found.pixel:.2f} px", *_imu_remarks(sequence))
-    problem = _with_features(
-        repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks
-    )
+    remarks = (f"pixel noise {origin}: {found.pixel:.2f} px", *imu_remarks(sequence))
+    problem = problem_of(repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks)
     return replace(
         problem,
         diagnosed=True,
@@ -78,9 +76,9 @@ def as_recorded_inertial(
     excluded = exclusions(sequence, path.states.pose, mask)
     remarks = (
         f"not diagnosed: {pixel:g} px is assumed, not estimated from the recording",
-        *_imu_remarks(sequence),
+        *imu_remarks(sequence),
     )
-    return _with_features(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
+    return problem_of(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
 
 
 def _baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
@@ -92,7 +90,8 @@ def _source(sequence: Sequence) -> str:
     return sequence.source or sequence.name
 
 
-def _imu_remarks(sequence: Sequence) -> tuple[str, ...]:
+def imu_remarks(sequence: Sequence) -> tuple[str, ...]:
+    """What is known of the samples' noise and gaps, one sentence each."""
     imu = sequence.imu
     assert imu is not None
     n = imu.noise
@@ -111,7 +110,7 @@ def _imu_remarks(sequence: Sequence) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def _with_features(
+def problem_of(
     sequence: Sequence,
     excluded: NDArray[np.uint8],
     features: int | None,
@@ -121,6 +120,7 @@ def _with_features(
     path: FloatArray,
     remarks: tuple[str, ...],
 ) -> Problem:
+    """The problem from its parts; the truth is tied to `path` (T, 4, 4), where that is known."""
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
     chosen, excluded = choose_features(sequence, excluded, features)

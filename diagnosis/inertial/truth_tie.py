@@ -18,10 +18,15 @@ TIED = 20
 
 
 def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tuple[Truth, str]:
-    """The truth in the world of a path (T, 4, 4) whose z axis points up, and how it was tied, in a sentence."""
-    known = np.flatnonzero(truth.known)
-    if len(known) == 0:
+    """The truth in the world of a path (T, 4, 4) whose z axis points up, and how it was tied, in a sentence.
+
+    The path may be NaN in frames where it is not known.
+    """
+    if not truth.known.any():
         return truth, "the ground truth has no pose in any frame of the problem"
+    known = np.flatnonzero(truth.known & np.isfinite(path).all(axis=(1, 2)))
+    if len(known) == 0:
+        return truth, "the ground truth has no pose at the start of the problem and is not tied to its world"
     up, how = _up(truth, path, known)
     level = np.eye(4)
     level[:3, :3] = so3.rotation_to_z(up)

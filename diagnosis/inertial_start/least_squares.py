@@ -42,6 +42,8 @@ class Solution:
     states: States
     covariance: FloatArray
     """(15, 15) of the first keyframe's error, velocity in world axes"""
+    scale_sigma: float
+    """1-sigma of the distance from the first to the farthest keyframe, as a share of it"""
     whitened: FloatArray
     """(m,) squared whitened residual of each relative pose"""
 
@@ -60,7 +62,7 @@ def solved(
         elif np.abs(step).max() < CONVERGED:
             break
     H, _, whitened, free = _normal_equations(states, motions, imu.gravity_vector, seen, tracks)
-    return Solution(states, _first_covariance(H, free), whitened)
+    return Solution(states, _first_covariance(H, free), _scale_sigma(states, H, free), whitened)
 
 
 def _factorized(H: Any) -> Any:
@@ -74,6 +76,18 @@ def _first_covariance(H: Any, free: Any) -> FloatArray:
     B = free[[*range(STATE)], :].toarray()
     covariance = B @ _factorized(H).solve(np.ascontiguousarray(B.T))
     return np.asarray(0.5 * (covariance + covariance.T), dtype=np.float64)
+
+
+def _scale_sigma(states: States, H: Any, free: Any) -> float:
+    apart = states.pose[:, :3, 3] - states.pose[0, :3, 3]
+    squared = np.sum(apart**2, axis=1)
+    far = int(np.argmax(squared))
+    if not squared[far] > 0.0:
+        return np.inf
+    slope = np.zeros(STATE * len(states))
+    slope[STATE * far :][strapdown.TRANSLATION] = states.pose[far, :3, :3].T @ apart[far] / squared[far]
+    of_free = free.T @ slope
+    return float(np.sqrt(of_free @ _factorized(H).solve(of_free)))
 
 
 def _normal_equations(

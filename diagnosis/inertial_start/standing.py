@@ -18,15 +18,15 @@ LONGEST = 3.0
 KEYFRAMES = 20
 
 
-def standing_frames(sequence: Sequence) -> IntArray:
-    """(k,) the frames from 0 on in which the camera stands as in frame 0, at most `LONGEST` s; frame 0 alone if none.
+def standing_frames(sequence: Sequence, longest: float = LONGEST) -> IntArray:
+    """(k,) the frames from 0 on in which the camera stands as in frame 0, at most `longest` s; frame 0 alone if none.
 
     Frames whose tracks are too few are bridged.
     """
     o = sequence.observations
     starts = o.frame_starts(sequence.n_frames)
     first = slice(int(starts[0]), int(starts[1]))
-    last = int(np.searchsorted(sequence.t, sequence.t[0] + LONGEST, side="right"))
+    last = int(np.searchsorted(sequence.t, sequence.t[0] + longest, side="right"))
     frames = [0]
     for k in range(1, last):
         at = slice(int(starts[k]), int(starts[k + 1]))

@@ -45,7 +45,7 @@ def inertial_start(sequence: Sequence, seen: Odometry, imu: ImuIntervals, pixel:
     standing = float(sequence.t[frames[-1]] - sequence.t[0]) if stands(sequence, frames) else 0.0
     keyframes = keyframes_of(frames) if standing else _window(sequence)
     if standing:
-        initial = _standing_states(imu, keyframes)
+        initial = standing_states(imu, keyframes)
         source = f"standing start of {standing:.2f} s, in which the cameras see no motion"
     else:
         relative = neighbors(seen, keyframes)
@@ -55,7 +55,7 @@ def inertial_start(sequence: Sequence, seen: Odometry, imu: ImuIntervals, pixel:
         span = float(sequence.t[keyframes[-1]] - sequence.t[0])
         source = f"tracks and inertial samples of the first {span:.2f} s, from linear alignment"
     tracks = keyframe_tracks(sequence, seen, keyframes, pixel)
-    return _start(solved(initial, imu, keyframes, NO_POSES, tracks), source, standing)
+    return start_of(solved(initial, imu, keyframes, NO_POSES, tracks), source, standing)
 
 
 def inflated(relative: RelativePoses, factor: float) -> RelativePoses:
@@ -75,7 +75,7 @@ def _window(sequence: Sequence) -> IntArray:
     return np.arange(min(max(last, MIN_INTERVALS + 1), sequence.n_frames), dtype=np.int64)
 
 
-def _standing_states(imu: ImuIntervals, frames: IntArray) -> States:
+def standing_states(imu: ImuIntervals, frames: IntArray) -> States:
     """All keyframes at rest: up is the mean specific force, the bias of the gyroscope its mean."""
     n, at = len(frames), slice(int(imu.starts[frames[0]]), int(imu.starts[frames[-1]]))
     share = imu.dt[at] / imu.dt[at].sum()
@@ -85,7 +85,7 @@ def _standing_states(imu: ImuIntervals, frames: IntArray) -> States:
     return States(pose, none, np.tile(share @ imu.angular_velocity[at], (n, 1)), none)
 
 
-def _start(solution: Solution, source: str, standing: float) -> Start:
+def start_of(solution: Solution, source: str, standing: float) -> Start:
     """The first state in the world in which its rotation is the smallest one."""
     first = solution.states.pose[0]
     turn = np.eye(4)

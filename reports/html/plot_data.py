@@ -218,9 +218,9 @@ def image_data(run: Run, images: Pictures) -> dict[str, list[str]]:
 def _camera(run: Run, size: tuple[int, int] | None) -> dict[str, Any]:
     """Intrinsics, and the size of the image, px; where it is not known, what the observations reach to."""
     camera, pixel = run.problem.sequence.camera, run.problem.sequence.observations.pixel
-    reach = pixel.max(axis=0) if len(pixel) else np.zeros(4)
+    reach = np.nan_to_num(pixel).max(axis=0) if len(pixel) else np.zeros(4)
     width, height = (max(c, float(reach[i::2].max()) + EDGE) for i, c in enumerate((camera.cu, camera.cv)))
-    intrinsics = {name: float(getattr(camera, name)) for name in ("fu", "fv", "cu", "cv", "baseline")}
+    intrinsics = {name: getattr(camera, name, None) for name in ("fu", "fv", "cu", "cv", "baseline")}
     width, height = size or (round(width), round(height))
     return {**intrinsics, "width": width, "height": height}
 

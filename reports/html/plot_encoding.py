@@ -40,8 +40,8 @@ def flags(values: ArrayLike) -> str:
 
 
 def pixels(values: ArrayLike) -> tuple[str, int]:
-    """Signed 16 bit integers, and how many of them make a pixel: a power of two, at most `FINEST`."""
-    array = np.asarray(values, dtype=np.float64)
+    """Signed 16 bit integers, and how many of them make a pixel: a power of two, at most `FINEST`; 0 for NaN."""
+    array = np.nan_to_num(np.asarray(values, dtype=np.float64))
     largest = float(np.abs(array).max()) if array.size else 0.0
     parts = FINEST
     while parts > 1 and largest * parts > 32000.0:

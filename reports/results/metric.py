@@ -20,11 +20,13 @@ NEES, REFERENCE_NEES, RESIDUALS, COST = "NEES", "reference NEES", "residuals of 
 SIGMA, CONSISTENCY = "1-sigma", "consistency"
 VELOCITY, GYROSCOPE_BIAS, ACCELEROMETER_BIAS = "velocity", "gyroscope bias", "accelerometer bias"
 STATE_NEES = "NEES of the state"
+SCALE_ERROR = "scale error"
 INERTIAL_TERMS: Mapping[str, str] = {
     VELOCITY: "Norm of the error of the velocity to ground truth, m/s, in world axes. Aligned: after alignment in yaw "
     "and position. Within 3 sigma: share of the components that are, unaligned; 99.7 % is expected.",
     GYROSCOPE_BIAS: "Norm of the error of the gyroscope's bias to ground truth, rad/s, in the axes of the IMU.",
     ACCELEROMETER_BIAS: "Norm of the error of the accelerometer's bias to ground truth, m/s^2, in the axes of the IMU.",
+    SCALE_ERROR: "Length of the path over its true length, less one, % (Sim(3) alignment), of a run with one camera.",
     STATE_NEES: "NEES of the 15 degrees of freedom of translation, rotation, velocity, gyroscope bias and "
     "accelerometer bias, unaligned: 15 is expected, 14.34 in the median. Of each block alone 3 is expected, 2.37 in "
     "the median.",

@@ -40,6 +40,7 @@ from .metric import (
     Metric,
     Tables,
 )
+from .monocular_metrics import SCALE
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
@@ -122,6 +123,7 @@ METRICS = (
     Metric(("divergence", "max"), DIVERGENCE, "max", "m", LOWER, MAIN),
     Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, EVIDENCE),
     Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    *SCALE,
     *VELOCITY_AND_BIASES,
     Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed 1-sigma"),
     Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),

@@ -35,6 +35,7 @@ from .problem import (
     hold_out_tracks,
     import_estimators,
     read_sequence,
+    with_defaults,
 )
 from .report import RunReport
 from .solution import read_added, solve
@@ -146,6 +147,7 @@ def run(
     )
     check_estimators(chosen.estimators, chosen.functions)
     sequence = read_sequence(chosen)
+    chosen = with_defaults(chosen, sequence)
     added = read_added(chosen)
     kept, held = hold_out_tracks(sequence, chosen)
     problem = build_problem(kept, chosen, processes)

@@ -22,6 +22,7 @@ from .problem import (
     import_estimators,
     preliminary_remarks,
     read_sequence,
+    with_defaults,
 )
 
 FAILED = 1
@@ -36,6 +37,7 @@ def run(
     check_estimators(settings.estimators, settings.functions)
     pictures = Pictures()
     sequence = read_sequence(settings, pictures)
+    settings = with_defaults(settings, sequence)
     place = out or Path("out") / sequence.name
     require_free(place, force=force, mark=MARK)
     if rerun_file is not None:

@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -29,7 +29,7 @@ from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units,
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
-from .defaults import DEFAULT_ESTIMATORS
+from .defaults import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS
 
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
@@ -153,6 +153,14 @@ def _source(function: Callable[..., object]) -> str:
         return f"{inspect.getsourcefile(function)}:{name}"
     except TypeError:  # one written in C, or an object that can be called
         return name
+
+
+def with_defaults(settings: RunSettings, sequence: Sequence) -> RunSettings:
+    """The settings for a recording: with one camera, other default estimators."""
+    named = settings.estimators[: len(DEFAULT_ESTIMATORS)] != DEFAULT_ESTIMATORS or settings.batch_up_to == 0
+    if named or not sequence.monocular:
+        return settings
+    return replace(settings, estimators=(*ONE_CAMERA_ESTIMATORS, *settings.estimators[len(DEFAULT_ESTIMATORS) :]))
 
 
 def check_estimators(names: tuple[str, ...], functions: Mapping[str, Callable[..., object]] | None = None) -> None:

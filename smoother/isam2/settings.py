@@ -1,6 +1,6 @@
 """Settings of iSAM2, for the whole graph and for the fixed-lag window."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import gtsam
 import numpy as np
@@ -13,6 +13,11 @@ from ..initialization.landmark_initialization import InitializationCriterion
 WILDFIRE_THRESHOLD = 1e-5
 """rad, and m for a baseline of half a meter or more: smaller changes are not propagated through the Bayes tree. The
 default of GTSAM, 1e-3, leaves an error of 0.1 mm in the online estimate and saves no time."""
+
+
+PARALLAX_SUFFICES = 0.2
+"""of the deviation of a landmark over its distance, with one camera: poses are held in it, and with little parallax
+their errors are larger than those of the pixels"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,4 +73,9 @@ class ISAM2Settings:
         With raw inertial data a frame bends the path behind it by more than the thresholds, and all of the tree would
         be relinearized again and again: it is shorter, and relinearizes less often.
         """
-        return cls() if problem.imu is None else cls(relinearize_skip=5, tree_frames=100, kept_frames=40)
+        if problem.imu is None:
+            return cls()
+        inertial = cls(relinearize_skip=5, tree_frames=100, kept_frames=40)
+        if not problem.sequence.monocular:
+            return inertial
+        return replace(inertial, initialization=InitializationCriterion(max_relative_deviation=PARALLAX_SUFFICES))

@@ -1,5 +1,6 @@
 """Recordings of one camera: observations [uL, vL, NaN, NaN] in files, in simulation, and what is refused."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +92,25 @@ def test_without_inertial_samples_it_is_refused_in_a_sentence(tmp_path: Path) ->
         Simulation(cameras="left")
 
 
-def test_the_command_simulates_it(tmp_path: Path) -> None:
-    answer = fgbaseline("simulate", "one.npz", "--imu", "--cameras", "left", "--duration", "2", cwd=tmp_path)
+def test_the_commands_simulate_and_solve_it(tmp_path: Path) -> None:
+    options = ("--path", "drone", "--duration", "4", "--features-per-frame", "30")
+    answer = fgbaseline("simulate", "one.npz", "--imu", "--cameras", "left", *options, cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
     assert data.read(tmp_path / "one.npz").monocular
+    answer = fgbaseline("run", "one.npz", "--out", "out/one", cwd=tmp_path, drawing=False)
+    assert answer.returncode == 0, answer.stderr
+    summary = json.loads((tmp_path / "out" / "one" / "summary.json").read_text())
+    assert set(summary["estimators"]) == {"dead-reckoning", "joint-ekf", "isam2", "isam2-online", "batch"}
+    found = summary["estimators"]["isam2"]
+    assert found["ate"]["rmse"] < 0.05
+    assert found["ate_sim3"] <= found["ate_se3"] < 0.05
+    assert abs(found["scale_error"]) < 0.05
+    assert "scale" in answer.stdout
+    assert any("determines the scale to" in remark for remark in summary["problem"]["remarks"])
+    answer = fgbaseline("diagnose", "one.npz", cwd=tmp_path)
+    assert (answer.returncode, answer.stderr.count("\n")) == (2, 1)
+    assert "the diagnosis needs a stereo camera" in answer.stderr
+    assert '"baseline":null' in (tmp_path / "out" / "one" / "report.html").read_text()
 
 
 def test_an_exported_problem_comes_back(tmp_path: Path) -> None:

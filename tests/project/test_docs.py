@@ -47,6 +47,10 @@ ELSEWHERE = {
         for verb, out in (("run", " --out out/drive"), ("diagnose", ""), ("export", " --out out/problem"))
     },
     **{
+        f"fgbaseline {command}": "tests/data/test_one_camera.py::test_the_commands_simulate_and_solve_it"
+        for command in ("simulate one.npz --imu --cameras left --duration 20", "run one.npz --out out/one")
+    },
+    **{
         f"fgbaseline {command}": f"tests/data/test_image_sources.py::{test}"
         for command, test in (
             ("run dataset-room1_512_16 --out out/room1", "test_tum_vi"),

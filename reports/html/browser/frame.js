@@ -1,7 +1,9 @@
 // The observations of one frame in both images: where they were measured and where an estimate has them.
 class FrameView {
   constructor(place) {
-    this.images = ["left", "right"].map(side => {
+    this.sides = run.camera.baseline === null ? ["left"] : ["left", "right"];
+    place.querySelector('[data-side="right"]').parentElement.hidden = this.sides.length === 1;
+    this.images = this.sides.map(side => {
       const image = svg("svg", { role: "img", "aria-label": side + " image: measured and reprojected observations" });
       place.querySelector(`[data-side="${side}"]`).append(image);
       return image;
@@ -25,7 +27,7 @@ class FrameView {
     const trajectory = trajectories.get(this.select.value);
     const seen = [];
     for (let i = observations.starts[chosen.frame]; i < observations.starts[chosen.frame + 1]; i++) {
-      const measured = Array.from(observations.pixel.subarray(4 * i, 4 * i + 4), value => value / observations.parts);
+      const measured = Array.from(observations.pixel.subarray(4 * i, 4 * i + 2 * this.sides.length), value => value / observations.parts);
       const predicted = trajectory ? this.predict(trajectory, observations.landmark[i]) : null;
       const error = predicted ? Math.hypot(...measured.map((value, row) => value - predicted[row])) : NaN;
       const fate = observations.excluded[i] ? "excluded" : trajectory && isBit(trajectory.used, i) ? "used" : "rejected";
@@ -34,7 +36,7 @@ class FrameView {
     return seen;
   }
 
-  // [uL, v, uR, v] of a landmark, from the camera's pose (3, 4) in the picture's world.
+  // [uL, v, uR, v] of a landmark, uR being meaningless with one camera, from the camera's pose (3, 4) in the picture's world.
   predict(trajectory, landmark) {
     const row = trajectory.row.get(landmark);
     const T = trajectory.cameras.subarray(12 * chosen.frame, 12 * chosen.frame + 12);

@@ -1,0 +1,1 @@
+"""Initial state, depths and pixel noise of a recording with one camera, from tracks and inertial samples."""
