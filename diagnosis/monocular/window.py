@@ -35,10 +35,6 @@ SMALLEST_PIXEL = 0.05
 CHI_SQUARE_2_MEDIAN = 1.3863
 FITTING = 100.0
 """median squared residual, in sigmas of `FIRST_PIXEL`, of a solution that is none"""
-WIDEST, NARROWEST = 1.0, 0.5
-"""sigma of the inverse depths as a share of their mean"""
-SCENE = (2.5, 97.5)
-"""percentiles of the inverse depths that are two sigma from the mean of their prior"""
 
 
 class Rest(NamedTuple):
@@ -173,7 +169,7 @@ def _pixel_noise(tracks: KeyframeTracks, solution: Solution) -> float:
 
 
 def _depths(tracks: KeyframeTracks, pose: FloatArray) -> InverseDepthPrior:
+    """Median inverse depth, which is the sigma as well: a narrow prior of many landmarks would determine the scale."""
     inverse = first_inverse_depths(tracks, pose, window_points(tracks, pose))
-    low, high = np.percentile(np.maximum(inverse[np.isfinite(inverse)], 0.0), SCENE)
-    mean = 0.5 * (low + high)
-    return InverseDepthPrior(float(mean), float(np.clip(0.25 * (high - low), NARROWEST * mean, WIDEST * mean)))
+    median = float(np.median(np.maximum(inverse[np.isfinite(inverse)], 0.0)))
+    return InverseDepthPrior(median, median)

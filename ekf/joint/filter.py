@@ -14,8 +14,10 @@ from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
 from .gating import gate_observations
 from .gyro_bias import BiasedVelocityMotion
+from .inverse_depth_prior import inverse_depth_prior
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
+from .second_order import second_order_of
 from .settings import JointSettings, Linearization
 from .state import ABSENT, JointState
 from .unobservable_directions import first_estimate_transition, transform_columns
@@ -122,23 +124,25 @@ class JointFilter:
         if len(seen.observed) == 0:
             return True
         state = self.state
-        innovation = Innovation.of(seen.H, seen.residual, state.P)
-        verdict = gate_observations(innovation.nis_per_observation(self.row_variance), self.measurement, self.settings)
+        residual, variance = self._with_second_order(seen)
+        innovation = Innovation.of(seen.H, residual, state.P)
+        verdict = gate_observations(innovation.nis_per_observation(variance), self.measurement, self.settings)
         order = verdict.order
-        innovation = innovation.in_order(order)
-        factor = self._record_nis(k, innovation)
+        innovation, variance = innovation.in_order(order), variance[order]
+        factor = self._record_nis(k, innovation, variance)
         if verdict.rejection is not None:
             self._reject(k, verdict.rejection, ~verdict.accepted)
             if not verdict.accepted.any():
                 return verdict.rejection is not EventKind.FRAME_DISAGREES
         try:
             weight = verdict.weight[order][: np.count_nonzero(verdict.accepted), None]
-            innovation = innovation.first(len(weight))
+            innovation, variance = innovation.first(len(weight)), variance[: len(weight)]
             if factor is None:
-                factor = innovation.factorize(self.row_variance / weight)
+                factor = innovation.factorize(variance / weight)
             else:
-                lower = weight[weight[:, 0] != 1.0]
-                factor = factor.reweighted(innovation.residual, self.row_variance / lower - self.row_variance)
+                lower = weight[:, 0] != 1.0
+                added = variance[lower] / weight[lower] - variance[lower]
+                factor = factor.reweighted(innovation.residual, added)
             self._apply_correction(kalman_update(innovation, factor, state.P))
         except NotPositiveDefiniteError:
             self._reject(k, EventKind.COVARIANCE_LOST, verdict.accepted)
@@ -149,11 +153,18 @@ class JointFilter:
             self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
 
-    def _record_nis(self, k: int, innovation: Innovation) -> CholeskyFactor | None:
+    def _with_second_order(self, seen: _LinearizedObservations) -> tuple[FloatArray, FloatArray]:
+        """Innovations and variances of their noise, both (n, r), with second-order terms for one camera."""
+        if not self.measurement.monocular:
+            return seen.residual, np.broadcast_to(self.row_variance, seen.residual.shape)
+        terms = second_order_of(self.camera, self.cam_T_imu, self.state, seen.H.slot)
+        return seen.residual - terms.mean, self.row_variance + terms.variance
+
+    def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         """Record the NIS of the frame, before kernel and gate, and return the factor of S."""
         self.innovations.degrees[k] = innovation.residual.size
         try:
-            factor = innovation.factorize(self.row_variance)
+            factor = innovation.factorize(variance)
         except NotPositiveDefiniteError:
             return None
         self.innovations.nis[k] = factor.nis
@@ -211,7 +222,7 @@ class JointFilter:
         n, state = len(index), self.state
         first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE
         world_T_cam = state.pose @ self.imu_T_cam
-        prior = self.problem.inverse_depth_prior if self.measurement.monocular else None
+        prior = inverse_depth_prior(self.problem, self.state, self.cam_T_imu) if self.measurement.monocular else None
         points = back_projected(self.camera, self.measured[index], np.nan if prior is None else prior.mean)
         points = points @ world_T_cam.T
         shared = chart(self.settings.coordinates, world_T_cam)

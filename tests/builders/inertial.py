@@ -18,7 +18,7 @@ IMU_T_CAM[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 NOISE = ImuNoise(2e-3, 2e-5, 2e-2, 3e-3)
 START_SIGMA = np.repeat([0.0, 0.01, 0.05, 2e-3, 2e-2], 3)
 """of the true start about the given one; heading and position are exact"""
-ROOM_DEPTHS = InverseDepthPrior(0.2, 0.1)
+ROOM_DEPTHS = InverseDepthPrior(0.2, 0.2)
 """1/m, of the points that simulated tracks begin at in a room"""
 MIN_DISPARITY = 6.0
 """px, of the exact pixels"""

@@ -47,12 +47,12 @@ def problems() -> list[Problem]:
     return [simulated_problem("drone", seed, cameras="left") for seed in range(SEEDS)]
 
 
-@pytest.mark.parametrize("name", ["isam2", "fixed-lag"])
-def test_smoothers_are_consistent_and_find_the_scale(name: str, problems: list[Problem]) -> None:
-    solve = {"isam2": smoother.isam2, "fixed-lag": smoother.fixed_lag}[name]
+@pytest.mark.parametrize("name", ["isam2", "fixed-lag", "joint-ekf"])
+def test_states_are_consistent_and_the_scale_is_found(name: str, problems: list[Problem]) -> None:
+    solve = {"isam2": smoother.isam2, "fixed-lag": smoother.fixed_lag, "joint-ekf": ekf.joint_ekf}[name]
     answers = [(solve(problem), problem) for problem in problems]
     assert all(answer.status is not Status.FAILED for answer, _ in answers)
-    assert all(abs(scale(answer, problem) - 1.0) < 0.02 for answer, problem in answers)
+    assert all(abs(scale(answer, problem) - 1.0) < 0.03 for answer, problem in answers)
     found = {name: [nees(answer, problem) for answer, problem in answers]}
     if name == "isam2":
         online = [(answer.by_products["isam2-online"], problem) for answer, problem in answers]
@@ -62,16 +62,6 @@ def test_smoothers_are_consistent_and_find_the_scale(name: str, problems: list[P
         mean = np.mean(values, axis=0)
         assert (mean > low).all(), mean
         assert (mean < high).all(), mean
-
-
-def test_the_joint_filter_finds_path_and_scale(problems: list[Problem]) -> None:
-    for problem in problems:
-        answer, truth = ekf.joint_ekf(problem), problem.sequence.truth
-        assert truth is not None
-        assert answer.status is Status.OK
-        assert abs(scale(answer, problem) - 1.0) < 0.05
-        apart = np.linalg.norm(answer.world_T_imu[:, :3, 3] - truth.world_T_imu[:, :3, 3], axis=1)
-        assert apart.max() < 0.2
 
 
 def test_batch_agrees_with_isam2(problems: list[Problem]) -> None:
