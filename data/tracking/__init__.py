@@ -1,13 +1,16 @@
-"""Stereo front end: from images to tracks, with OpenCV (extra `fgbaseline[images]`)."""
+"""Front end: from images of a pair or of one camera to tracks, with OpenCV (extra `fgbaseline[images]`)."""
 
+from .monocular_tracker import MonocularTracker
 from .pictures import Picture, Pictures
 from .pipeline import TrackedRecording, opened_images, track, track_images
 from .settings import TrackerSettings
-from .sources import ImageOptions, has_images
+from .sources import Cameras, ImageOptions, has_images
 from .stereo_tracker import StereoTracker, Tracks
 
 __all__ = [
+    "Cameras",
     "ImageOptions",
+    "MonocularTracker",
     "Picture",
     "Pictures",
     "StereoTracker",

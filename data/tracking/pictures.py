@@ -1,4 +1,4 @@
-"""Images of a recording for its page: downscaled JPEGs of rectified pairs, thinned evenly to a number of bytes."""
+"""Images of a recording for its page: downscaled JPEGs of rectified images, thinned evenly to a number of bytes."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -19,22 +19,22 @@ MOST_BYTES = 12_000_000
 
 
 class Picture(NamedTuple):
-    """Rectified pair of one frame as JPEG."""
+    """Rectified images of one frame as JPEG."""
 
     t: float
     """s, stamp of the frame"""
-    left: bytes
-    right: bytes
+    images: tuple[bytes, ...]
+    """left and, of a pair, right"""
 
     @property
     def n_bytes(self) -> int:
-        """Size of both."""
-        return len(self.left) + len(self.right)
+        """Size of all."""
+        return sum(map(len, self.images))
 
 
 @dataclass(eq=False)
 class Pictures:
-    """Pairs of every `step`-th frame; the step doubles when the pairs outgrow `most_bytes`."""
+    """Images of every `step`-th frame; the step doubles when the pairs outgrow `most_bytes`."""
 
     most_bytes: int = MOST_BYTES
     step: int = 1
@@ -43,12 +43,12 @@ class Pictures:
     pairs: dict[int, Picture] = field(default_factory=dict)
     """by the number of the frame"""
 
-    def add(self, frame: int, t: float, left: Image, right: Image) -> None:
-        """Adds the pair of a frame, if its turn has come."""
-        self.size = left.shape[1], left.shape[0]
+    def add(self, frame: int, t: float, *images: Image) -> None:
+        """Adds the images of a frame, left and right or left alone, if its turn has come."""
+        self.size = images[0].shape[1], images[0].shape[0]
         if frame % self.step:
             return
-        self.pairs[frame] = Picture(t, _jpeg(left), _jpeg(right))
+        self.pairs[frame] = Picture(t, tuple(map(_jpeg, images)))
         self.thin(self.most_bytes)
 
     def thin(self, most_bytes: int) -> None:

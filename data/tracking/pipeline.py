@@ -1,4 +1,4 @@
-"""Images to tracks: pairs are read, rectified and tracked one at a time."""
+"""Images to tracks: pairs, or images of one camera, are read, rectified and tracked one at a time."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
+from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, se3
 
 from ..estimate import Progress
 from ..formats.ground_truth import attach_truth
@@ -17,6 +17,7 @@ from ..formats.npz_writer import write_npz, write_tracks
 from ..observations import BoolArray, Observations
 from ..plural import plural
 from ..sequence import Sequence, Truth
+from .monocular_tracker import MonocularTracker
 from .pictures import Pictures
 from .prediction import rotation_between
 from .rig import Image, rectify
@@ -31,24 +32,24 @@ NAMED = 4
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrackedRecording:
-    """Tracks of a recording of images, over the frames whose pair could be read."""
+    """Tracks of a recording of images, over the frames whose images could be read."""
 
     recording: ImageRecording
     """with t, velocities and truth of these frames"""
-    camera: StereoCamera
+    camera: Camera
     """rectified"""
     imu_T_cam: FloatArray
     """(4, 4) of the rectified left camera, where the recording's extrinsic is known"""
     observations: Observations
     n_landmarks: int
     left_out: tuple[int, ...] = ()
-    """frames without a readable pair"""
+    """frames without readable images"""
 
     @property
     def has_motion(self) -> bool:
         """Whether there is all that a run needs."""
         r = self.recording
-        return r.extrinsic_known and (r.velocities is not None or r.imu is not None)
+        return r.extrinsic_known and (r.imu is not None or (r.velocities is not None and r.right is not None))
 
     def sequence(self, truth: TruthFile | None = None) -> Sequence:
         """The recording with its motion, and the truth of a file or else its own.
@@ -129,35 +130,39 @@ def opened_images(path: Path, options: ImageOptions, *, motion: bool = False) ->
 def track_images(
     recording: ImageRecording, settings: TrackerSettings, progress: Progress | None, pictures: Pictures | None
 ) -> TrackedRecording:
-    """Tracks of a recording of images; `progress` gets the number of pairs done, and of all.
+    """Tracks of a recording of images; `progress` gets the number of frames done, and of all.
 
-    `pictures` gets the rectified pairs. Frames with an unreadable image are left out, counted and named. Raises
+    `pictures` gets the rectified images. Frames with an unreadable image are left out, counted and named. Raises
     InputError for images that do not fit.
     """
-    rectified = rectify(recording.left, recording.right)
-    tracker = StereoTracker(rectified.camera, settings)
-    T = len(recording.t)
+    rectified, T = rectify(recording.left, recording.right), len(recording.t)
+    camera, one = rectified.camera, recording.right is None
+    tracker = (
+        MonocularTracker(camera, settings) if isinstance(camera, MonocularCamera) else StereoTracker(camera, settings)
+    )
     kept: list[int] = []
     unreadable: list[str] = []
     numbers: list[NDArray[np.int32]] = []
     pixels: list[NDArray[np.float32]] = []
     for k, pair in enumerate(recording.pairs()):
-        if pair.left is None or pair.right is None:
+        images = [image for image in pair[:2] if image is not None]
+        if len(images) < (1 if one else 2):
             unreadable.append(pair.name)
             continue
-        _require_size(pair.left, pair.right, recording, pair.name)
-        left, right = rectified(pair.left, pair.right)
+        _require_size(images, recording, pair.name)
+        shown = rectified(*images)
         turn = rotation_between(recording, rectified.imu_T_cam[:3, :3], kept[-1], k) if kept else None
-        points = tracker.step(left, right, turn)
+        points = tracker.step(*shown, rotation=turn)
         if pictures is not None:
-            pictures.add(len(kept), float(recording.t[k]), left, right)
+            pictures.add(len(kept), float(recording.t[k]), *shown)
         kept.append(k)
         numbers.append(points.number.astype(np.int32))
         pixels.append(points.pixel.astype(np.float32))  # as OpenCV gives them
         if progress is not None:
             progress(k + 1, T)
+    unit = "image" if one else "pair"
     if len(kept) < 2:
-        raise InputError(f"{recording.source}: {plural(len(kept), 'pair')} of {T} can be read; check the images")
+        raise InputError(f"{recording.source}: {plural(len(kept), unit)} of {T} can be read; check the images")
     observations, n_landmarks = _observations(numbers, pixels)
     is_kept = np.zeros(T, dtype=np.bool_)
     is_kept[kept] = True
@@ -165,7 +170,7 @@ def track_images(
     recording = _of_frames(recording, is_kept)
     if unreadable:
         names = ", ".join(unreadable[:NAMED]) + (" and more" if len(unreadable) > NAMED else "")
-        text = f"{plural(len(unreadable), 'pair')} of {T} cannot be read and are left out: {names}."
+        text = f"{plural(len(unreadable), unit)} of {T} cannot be read and are left out: {names}."
         recording = replace(recording, remarks=(*recording.remarks, text))
     return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, observations, n_landmarks, left_out)
 
@@ -195,14 +200,19 @@ def _observations(numbers: list[NDArray[np.int32]], pixels: list[NDArray[np.floa
 
 def _require_motion(r: ImageRecording) -> None:
     """Raises InputError where a recording has no motion, or the pose of the camera on the IMU is not known."""
+    if r.right is None and r.imu is None:
+        raise InputError(
+            f"{r.source}: its images are of one camera, and only raw inertial samples determine their scale; add "
+            "--imu CSV"
+        )
     if r.velocities is None and r.imu is None:
         raise InputError(f"{r.source}: it has images and no motion; add --imu CSV or --velocities CSV")
     if not r.extrinsic_known:
         raise InputError(f"{r.source}: the pose of its left camera on the IMU is not known; add --extrinsic FILE")
 
 
-def _require_size(left: Image, right: Image, recording: ImageRecording, name: str) -> None:
-    for image, camera in ((left, recording.left), (right, recording.right)):
+def _require_size(images: list[Image], recording: ImageRecording, name: str) -> None:
+    for image, camera in zip(images, filter(None, (recording.left, recording.right)), strict=True):
         height, width = image.shape
         if (width, height) != camera.size:
             raise InputError(

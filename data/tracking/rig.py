@@ -1,4 +1,4 @@
-"""Stereo rig: camera models with distortion, extrinsics, and the rectification of its images (OpenCV)."""
+"""Cameras with distortion and extrinsics, and the rectification of a stereo pair or of one camera (OpenCV)."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
+from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera, se3
 
 from .opencv import opencv
 
@@ -50,29 +50,30 @@ class CameraModel:
 
 
 class Rectified(NamedTuple):
-    """Rectified pair of a rig."""
+    """Rectified pair of a rig, or the undistorted image of one camera."""
 
-    camera: StereoCamera
+    camera: Camera
     imu_T_cam: FloatArray
     """(4, 4) of the rectified left camera"""
-    maps: tuple[tuple[Any, Any], tuple[Any, Any]] | None
-    """OpenCV's maps of the left and the right image; None where the images are rectified already"""
+    maps: tuple[tuple[Any, Any], ...] | None
+    """OpenCV's maps of each image, the left one first; None where the images are rectified already"""
 
-    def __call__(self, left: Image, right: Image) -> tuple[Image, Image]:
-        """Rectified images of a pair."""
+    def __call__(self, *images: Image) -> tuple[Image, ...]:
+        """Rectified images of a pair, or of one camera."""
         if self.maps is None:
-            return left, right
+            return images
         cv2 = opencv()
-        return tuple(
-            cv2.remap(image, *maps, cv2.INTER_LINEAR) for image, maps in zip((left, right), self.maps, strict=True)
-        )
+        return tuple(cv2.remap(image, *maps, cv2.INTER_LINEAR) for image, maps in zip(images, self.maps, strict=True))
 
 
-def rectify(left: CameraModel, right: CameraModel) -> Rectified:
+def rectify(left: CameraModel, right: CameraModel | None) -> Rectified:
     """Rectification of a pair (Bouguet's, `cv2.stereoRectify`). Raises InputError for what is no stereo pair.
 
-    A pair without distortion, with equal cameras displaced along x only, is used as it is.
+    A pair without distortion, with equal cameras displaced along x only, is used as it is. Without a right camera the
+    distortion of the left one is removed.
     """
+    if right is None:
+        return _undistorted(left)
     if left.size != right.size:
         raise InputError(f"images: the left camera has {left.size} px, the right one {right.size}; they must be equal")
     if left.distortion is not right.distortion:
@@ -110,6 +111,22 @@ def rectify(left: CameraModel, right: CameraModel) -> Rectified:
     turn = np.eye(4)
     turn[:3, :3] = R1.T
     return Rectified(camera, left.imu_T_cam @ turn, maps)
+
+
+def _undistorted(model: CameraModel) -> Rectified:
+    """One camera without distortion, with the largest image whose pixels are all known."""
+    if not any(model.coefficients):
+        return Rectified(MonocularCamera(*model.intrinsics), model.imu_T_cam, None)
+    cv2, D = opencv(), np.array(model.coefficients)
+    if model.distortion is Distortion.EQUIDISTANT:
+        K = cv2.fisheye.estimateNewCameraMatrixForUndistortRectify(model.K, D, model.size, np.eye(3), balance=0.0)
+        init = cv2.fisheye.initUndistortRectifyMap
+    else:
+        K, _ = cv2.getOptimalNewCameraMatrix(model.K, D, model.size, 0.0)
+        init = cv2.initUndistortRectifyMap
+    maps = init(model.K, D, np.eye(3), K, model.size, cv2.CV_16SC2)
+    camera = MonocularCamera(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+    return Rectified(camera, model.imu_T_cam, (maps,))
 
 
 def _is_rectified(left: CameraModel, right: CameraModel, right_T_left: FloatArray, baseline: float) -> bool:

@@ -14,6 +14,7 @@ from ..observations import BoolArray, IntArray
 from .corners import detect_corners
 from .local_contrast import equalized
 from .opencv import opencv
+from .optical_flow import OpticalFlow
 from .rig import Image
 from .settings import TrackerSettings
 
@@ -33,7 +34,7 @@ class Tracks:
     number: IntArray
     """(n,) of each track, unique in a recording"""
     pixel: FloatArray
-    """(n, 4) uL, vL, uR, vR, px, in the rectified pair"""
+    """(n, 4) uL, vL, uR, vR, px, in the rectified pair; NaN in uR and vR with one camera"""
 
     def select(self, chosen: BoolArray) -> "Tracks":
         """The chosen points (n,)."""
@@ -62,8 +63,9 @@ class StereoTracker:
         self._next = 0
         self._cv2 = opencv()
         self._cv2.setRNGSeed(SEED)
+        self._flow = OpticalFlow(self.settings)
 
-    def step(self, left: Image, right: Image, rotation: FloatArray | None = None) -> Tracks:
+    def step(self, left: Image, right: Image, *, rotation: FloatArray | None = None) -> Tracks:
         """Tracks in the next rectified pair of gray images (height, width).
 
         `rotation` (3, 3), new_R_previous of the left camera, predicts the pixels with the translation of the last
@@ -84,7 +86,7 @@ class StereoTracker:
             motion[:3, :3] = rotation
         points = self.camera.triangulate(old.pixel)
         predicted = self._projected(motion, points, old.pixel)
-        new, found = self._flow_and_back(before, left, old.pixel[:, :2], predicted[:, :2])
+        new, found = self._flow.forth_and_back(before, left, old.pixel[:, :2], predicted[:, :2])
         old, points, new, predicted = old.select(found), points[found], new[found], predicted[found]
         offset = predicted[:, 2:] - predicted[:, :2]
         other, matched = self._match(left, right, new, offset)
@@ -130,35 +132,9 @@ class StereoTracker:
         pixel[ahead] = self.camera.project(moved[ahead])
         return pixel
 
-    def _flow(self, first: Image, second: Image, points: FloatArray, guess: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Points (n, 2) of the second image, and which were found, of points (n, 2) of the first."""
-        cv2, n = self._cv2, len(points)
-        if n == 0:
-            return np.empty((0, 2)), np.zeros(0, dtype=np.bool_)
-        new, status, _ = cv2.calcOpticalFlowPyrLK(
-            first,
-            second,
-            points.astype(np.float32).reshape(n, 1, 2),
-            guess.astype(np.float32).reshape(n, 1, 2),
-            winSize=(self.settings.window, self.settings.window),
-            maxLevel=self.settings.pyramid_levels,
-            criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01),
-            flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-        )
-        return new.reshape(n, 2).astype(np.float64), status.reshape(n).astype(np.bool_)
-
-    def _flow_and_back(
-        self, first: Image, second: Image, points: FloatArray, guess: FloatArray
-    ) -> tuple[FloatArray, BoolArray]:
-        """Points (n, 2) of the second image, and those of them that flow back to where they were."""
-        new, found = self._flow(first, second, points, guess)
-        back, returned = self._flow(second, first, new, points)
-        apart = np.linalg.norm(back - points, axis=1)
-        return new, found & returned & (apart < self.settings.forward_backward) & _inside(new, second)
-
     def _match(self, left: Image, right: Image, points: FloatArray, offset: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Points (n, 2) of the right image of points (n, 2) of the left one, searched at an offset (n, 2), px."""
-        other, found = self._flow_and_back(left, right, points, points + offset)
+        other, found = self._flow.forth_and_back(left, right, points, points + offset)
         found &= np.abs(other[:, 1] - points[:, 1]) < self.settings.row_gate
         found &= points[:, 0] - other[:, 0] > self.settings.min_disparity
         return other, found
@@ -185,10 +161,3 @@ class StereoTracker:
         number = np.arange(self._next, self._next + len(pixel))
         self._next += len(pixel)
         return Tracks(np.concatenate([tracks.number, number]), np.concatenate([tracks.pixel, pixel]))
-
-
-def _inside(points: FloatArray, image: Image) -> BoolArray:
-    """Points (n, 2) at least a pixel within the image."""
-    height, width = image.shape
-    x, y = points[:, 0], points[:, 1]
-    return np.asarray((x >= 1.0) & (x <= width - 2.0) & (y >= 1.0) & (y <= height - 2.0), dtype=np.bool_)

@@ -9,6 +9,7 @@ then held to its magnitude.
 
 import numpy as np
 
+from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
@@ -39,12 +40,12 @@ def closed_form(imu: ImuIntervals, rays: Rays, motions: Motions, lever: FloatArr
     weight = np.ones(len(rays.point))
     direction = (R[rays.keyframe] @ rays.direction[:, :, None])[:, :, 0]
     across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
-    y = np.zeros(UNKNOWN)
+    y: FloatArray = np.zeros(UNKNOWN)
     for k in range(ROUNDS):
         scale = weight / (ray_sigma * np.maximum(depth, NEAREST)) ** 2
         H, b = _without_points(rays, across, center, by, scale)
         H[BIAS, BIAS] += np.eye(3) * ACCELEROMETER_BIAS_SIGMA**-2
-        y = np.linalg.solve(H, b) if k == 0 else _held(H, b, y)
+        y = _held(H, b, y) if k else np.asarray(np.linalg.solve(H, b), dtype=np.float64)
         y[GRAVITY] *= imu.gravity / max(float(np.linalg.norm(y[GRAVITY])), 1e-9)
         moved = center + by @ y
         point = _points(rays, across, moved, scale)
@@ -86,7 +87,7 @@ def _scatter(rays: Rays, across: FloatArray, scale: FloatArray) -> FloatArray:
 def _solvable(A: FloatArray) -> FloatArray:
     """Inverses (m, 3, 3) of the information; zero for points without parallax. Raises ValueError where none has any."""
     eigenvalue = np.linalg.eigvalsh(A)
-    good = eigenvalue[:, 0] > PARALLEL * eigenvalue[:, 2]
+    good: BoolArray = np.asarray(eigenvalue[:, 0] > PARALLEL * eigenvalue[:, 2], dtype=np.bool_)
     if not good.any():
         raise ValueError("no track has parallax")
     inverse = np.zeros_like(A)
@@ -99,7 +100,7 @@ def _without_points(
 ) -> tuple[FloatArray, FloatArray]:
     """Normal equations (9, 9), (9,) after the elimination of the points."""
     inverse = _solvable(_scatter(rays, across, scale))
-    good = inverse.any(axis=(1, 2))[rays.point]
+    good = np.asarray(inverse.any(axis=(1, 2)))[rays.point]
     scaled = (scale * good)[:, None, None] * across
     C, c = by[rays.keyframe], center[rays.keyframe]
     PC, Pc = scaled @ C, (scaled @ c[:, :, None])[:, :, 0]

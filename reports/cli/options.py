@@ -136,7 +136,12 @@ _IMAGES = (
         "--calibration", type=PATH, metavar="YAML", help="Images: cameras of two folders or a bag, Kalibr or OpenCV."
     ),
     click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of two folders, a line for each image."),
-    click.option("--topics", metavar="LEFT,RIGHT[,IMU]", help="Images: topics of a bag.  [default: by their types]"),
+    click.option("--topics", metavar="LEFT[,RIGHT][,IMU]", help="Images: topics of a bag.  [default: by their types]"),
+    click.option(
+        "--cameras",
+        type=click.Choice(["stereo", "left"]),
+        help="Images: a pair, or the left camera alone, which needs raw inertial samples.  [default: what there is]",
+    ),
     click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )
 _MOTION = (

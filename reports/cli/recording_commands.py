@@ -91,7 +91,7 @@ def run(
 ) -> int:
     """Run all estimators on SEQUENCE, compare them and write a report.
 
-    SEQUENCE is a recording of tracks, or a folder or ROS bag of stereo images: their tracks are written into the
+    SEQUENCE is a recording of tracks, or a folder or ROS bag of images: their tracks are written into the
     folder of the run, tracks.npz.
 
     Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
@@ -128,10 +128,11 @@ def run(
 @options.imu_calibration
 @options.images
 def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
-    """Track the stereo images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
+    """Track the images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
 
-    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. The
-    npz is a recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
+    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. With
+    one camera (--cameras left, cam0 alone, one topic of images) the epipolar constraint is that check. The npz is a
+    recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
     """
     from fgbaseline.data.tracking import ImageOptions
 

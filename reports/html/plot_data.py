@@ -208,9 +208,9 @@ def _position_covariance(estimate: Estimate, axes: FloatArray) -> str | None:
 
 
 def image_data(run: Run, images: Pictures) -> dict[str, list[str]]:
-    """Left and right image by the number of their frame, as data URIs."""
+    """Images of the left and, of a pair, the right camera by the number of their frame, as data URIs."""
     return {
-        str(k): [f"data:image/jpeg;base64,{b64encode(image).decode('ascii')}" for image in (pair.left, pair.right)]
+        str(k): [f"data:image/jpeg;base64,{b64encode(image).decode('ascii')}" for image in pair.images]
         for k, pair in images.by_frame(run.problem.sequence.t).items()
     }
 

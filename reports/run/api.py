@@ -63,6 +63,7 @@ def run(
     imu_calibration: FilePath | None = None,
     velocities: FilePath | None = None,
     extrinsic: FilePath | None = None,
+    cameras: Literal["stereo", "left"] | None = None,
     right: FilePath | None = None,
     calibration: FilePath | None = None,
     times: FilePath | None = None,
@@ -99,6 +100,7 @@ def run(
         imu_calibration: YAML of their noise; by default assumed.
         velocities: CSV of body velocities, in place of the recording's motion.
         extrinsic: File with imu_T_cam of the left camera, a line of 12 numbers.
+        cameras: Of images: a pair, or the left camera alone with raw inertial samples; by default what there is.
         right: Folder of the right images, where the recording is the folder of the left ones.
         calibration: YAML of the cameras of two folders or a bag, Kalibr or OpenCV.
         times: Stamps of the images of two folders, a line for each.
@@ -133,6 +135,7 @@ def run(
         imu_calibration=as_path(imu_calibration),
         velocities=as_path(velocities),
         extrinsic=as_path(extrinsic),
+        cameras=cameras,
         right=as_path(right),
         calibration=as_path(calibration),
         times=as_path(times),

@@ -69,7 +69,9 @@ def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path 
         f"{found.recording.name}: {plural(T, 'frame')}, {plural(found.n_landmarks, 'track')}, "
         f"{len(o) / T:.0f} observations a frame, {len(o) / max(found.n_landmarks, 1):.1f} frames a track"
     )
-    if not found.has_motion:
+    if not found.has_motion and found.recording.right is None:
+        click.echo("fgbaseline run needs --imu, and --extrinsic where the pose of the camera on the IMU is not known.")
+    elif not found.has_motion:
         click.echo("It has no motion of an IMU: fgbaseline run needs --imu or --velocities, and --extrinsic where the "
                    "pose of the camera on the IMU is not known.")  # fmt: skip
     click.echo(f"The tracks are in {out}")

@@ -24,7 +24,7 @@ from fgbaseline.data import (
 from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame, ParsedTrajectory
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.tracking import ImageOptions, Pictures, has_images
+from fgbaseline.data.tracking import Cameras, ImageOptions, Pictures, has_images
 from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
@@ -34,7 +34,7 @@ from .defaults import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS
 MIN_TRUTH_SHARE = 0.5
 """smallest share of frames with ground truth that is not remarked on"""
 BESIDE = ("velocities", "extrinsic")
-IMAGES = ("right", "calibration", "times", "tracker")
+IMAGES = ("cameras", "right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
 TRACKS = "tracks.npz"
 """of a run on images, in its folder"""
@@ -72,6 +72,8 @@ class RunSettings:
     """CSV of body velocities, in place of the recording's motion"""
     extrinsic: Path | None = None
     """imu_T_cam of the left camera, in place of the recording's"""
+    cameras: Cameras | None = None
+    """of a recording of images: a pair, or the left one alone; None for a pair where there is one"""
     right: Path | None = None
     """folder of right images, where the sequence is that of the left ones"""
     calibration: Path | None = None
@@ -256,7 +258,7 @@ def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
     if settings.time_unit is not None:
         raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
     assert isinstance(settings.sequence, Path)
-    names = ("right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
+    names = ("cameras", "right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
     options = ImageOptions(**{name: getattr(settings, name) for name in names})
     truth = settings.truth if isinstance(settings.truth, Path) else None
     return image_sequence(settings.sequence, options, settings.tracker, truth, settings.truth_frame, pictures)

@@ -30,6 +30,8 @@ SPEED = 0.6
 """m/s along x"""
 YAW = 0.08
 """rad, of a slow swing of the heading"""
+SWAY, SWAY_RATE = 0.15, 5.0
+"""m and rad/s, of the swaying rig, to the side; half as much upward"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,7 @@ class Room:
 
     @staticmethod
     def poses_at(t: FloatArray) -> FloatArray:
+        """Poses (n, 4, 4) at times t (n,), s, since the first frame."""
         poses = np.tile(np.eye(4), (len(t), 1, 1))
         poses[:, :3, :3] = so3.exp_so3(np.stack([0 * t, 0 * t, YAW * np.sin(2.0 * t)], axis=1))
         poses[:, 0, 3] = SPEED * t
@@ -104,12 +107,12 @@ class Room:
         noise = np.random.default_rng((self.seed, k, right)).normal(0.0, 1.0, image.shape)
         return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8).reshape(HEIGHT, WIDTH)
 
-    def write_euroc(self, folder: Path) -> Path:
+    def write_euroc(self, folder: Path, n_cameras: int = 2) -> Path:
         """A EuRoC folder with images, inertial samples and truth."""
         import cv2
 
         mav = folder / "mav0"
-        for i in (0, 1):
+        for i in range(n_cameras):
             place = mav / f"cam{i}"
             (place / "data").mkdir(parents=True)
             for k, stamp in enumerate(self.stamps):
@@ -133,6 +136,24 @@ class Room:
         lines = [",".join(map(repr, [stamp, *row])) for stamp, row in zip(stamps, samples.tolist(), strict=True)]
         (folder / "data.csv").write_text("\n".join([IMU_HEADER, *lines, ""]))
         (folder / "sensor.yaml").write_text(IMU_YAML)
+
+
+@dataclass(frozen=True, eq=False)
+class SwayingRoom(Room):
+    """Frames of a rig that sways from side to side, so that its accelerometer feels the motion."""
+
+    @staticmethod
+    def poses_at(t: FloatArray) -> FloatArray:
+        poses = Room.poses_at(t)
+        poses[:, 1:3, 3] = SWAY * np.sin(SWAY_RATE * t)[:, None] * [1.0, 0.5]
+        return poses
+
+    def imu(self) -> tuple[list[int], FloatArray]:
+        stamps, samples = super().imu()
+        t = np.arange(len(stamps)) / IMU_RATE
+        force = -(SWAY_RATE**2) * SWAY * np.sin(SWAY_RATE * t)[:, None] * [0.0, 1.0, 0.5]
+        samples[:, 3:] += np.einsum("tji,tj->ti", self.poses_at(t)[:, :3, :3], force)
+        return stamps, samples
 
 
 IMU_HEADER = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y,w_RS_S_z,a_RS_S_x [m s^-2],a_RS_S_y,a_RS_S_z"

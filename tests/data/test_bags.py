@@ -191,6 +191,38 @@ def test_topics_are_given_where_types_leave_them_open(room: Room, tmp_path: Path
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_one_topic_of_images_is_one_camera(kind: str, room: Room, tmp_path: Path) -> None:
+    bag = BagWriter(kind, tmp_path)
+    with bag.writer:
+        for k, stamp in enumerate(room.stamps):
+            bag.image("/cam0/image_raw", stamp, room.image(k))
+        for stamp, row in zip(*room.imu(), strict=True):
+            bag.imu("/imu0", stamp, row)
+    file = calibration(tmp_path)
+    recording = open_recording(bag.path, ImageOptions(calibration=file))
+    assert "Topics: /cam0/image_raw, /imu0." in recording.remarks
+    assert recording.right is None
+    images = [pair.left for pair in recording.pairs()]
+    assert all((image == room.image(k)).all() for k, image in enumerate(images) if image is not None)
+    assert len(images) == N
+    assert track(bag.path, ImageOptions(calibration=file)).sequence().monocular
+
+
+def test_the_left_topic_of_a_pair_alone(room: Room, tmp_path: Path) -> None:
+    path, file = stereo_bag("ros1", tmp_path, room), calibration(tmp_path)
+    for options in (
+        ImageOptions(calibration=file, cameras="left"),
+        ImageOptions(calibration=file, topics=("/cam/left/image_raw", "/imu0")),
+    ):
+        recording = open_recording(path, options)
+        assert recording.right is None
+        assert recording.imu is not None
+        assert "Topics: /cam/left/image_raw, /imu0." in recording.remarks
+    with pytest.raises(InputError, match="topics: expected LEFT,RIGHT or LEFT, and IMU after them if any"):
+        open_recording(path, ImageOptions(calibration=file, topics=("/imu0", "/cam/left/image_raw")))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("topic", ["/odom", "/pose", "/covariant", "/vicon/body", "/path"])
 def test_trajectories_of_a_bag(kind: str, topic: str, room: Room, tmp_path: Path) -> None:
     bag = BagWriter(kind, tmp_path)

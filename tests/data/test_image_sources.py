@@ -62,6 +62,7 @@ def kitti_odometry(euroc: Path, folder: Path) -> Path:
 def check(recording: ImageRecording, room: Room) -> None:
     np.testing.assert_allclose(recording.t, np.array(room.stamps) / 1e9, atol=1e-6)
     np.testing.assert_allclose(recording.left.imu_T_cam, IMU_T_CAM, atol=1e-9)
+    assert recording.right is not None
     np.testing.assert_allclose(recording.right.imu_T_cam, displaced(1), atol=1e-9)
     pairs = list(recording.pairs())
     assert len(pairs) == N
@@ -209,6 +210,7 @@ def test_two_folders(euroc: Path, room: Room, tmp_path: Path, form: str) -> None
     left, right = (euroc / "mav0" / f"cam{i}" / "data" for i in (0, 1))
     recording = open_recording(left, ImageOptions(right=right, calibration=file))
     assert recording.extrinsic_known == (form == "kalibr")
+    assert recording.right is not None
     baseline = np.linalg.inv(recording.left.imu_T_cam) @ recording.right.imu_T_cam
     np.testing.assert_allclose(baseline[:3, 3], [CAMERA.baseline, 0, 0], atol=1e-12)
     assert len(list(recording.pairs())) == N
@@ -249,7 +251,7 @@ def test_up_is_that_of_the_first_frame_that_can_be_read(euroc: Path, room: Room)
 @pytest.mark.parametrize(
     ("missing", "sentence"),
     [
-        ("cam1", "the folder cam1 is missing"),
+        ("cam0", "the folder cam0 is missing"),
         ("cam0/sensor.yaml", r"cam0/sensor.yaml: the file is missing; add it, or Kalibr's camchain.yaml"),
         ("cam1/data", "cam1/data: it cannot be read"),
         ("imu0", "images and no motion; add --imu"),

@@ -91,7 +91,7 @@ def test_a_gyroscope_predicts_through_a_fast_turn(room: Room) -> None:
     for given in (rotation, None):
         tracker = StereoTracker(CAMERA, TrackerSettings(pyramid_levels=2))
         start = tracker.step(turned.image(0), turned.image(0, right=True))
-        end = tracker.step(turned.image(1), turned.image(1, right=True), given)
+        end = tracker.step(turned.image(1), turned.image(1, right=True), rotation=given)
         common = np.isin(end.number, start.number)
         true = turned.project(1, turned.points(0, start.pixel[:, :2])[0])
         at = np.searchsorted(start.number, end.number[common])
@@ -161,7 +161,9 @@ def test_pictures_are_thinned_evenly_to_their_size(images: list[tuple[FloatArray
         some.add(k, float(t[k]), *pair)
     assert some.step == 4
     assert sum(pair.n_bytes for pair in some.pairs.values()) <= most
-    assert {k: pair.left for k, pair in some.by_frame(t[2:]).items()} == {k - 2: whole.pairs[k].left for k in (4, 8)}
+    assert {k: pair.images for k, pair in some.by_frame(t[2:]).items()} == {
+        k - 2: whole.pairs[k].images for k in (4, 8)
+    }
 
 
 def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:

@@ -1,6 +1,6 @@
-"""Recordings of stereo images: EuRoC, TUM-VI, KITTI, two folders with a calibration, and ROS bags."""
+"""Recordings of images: EuRoC, TUM-VI, KITTI, folders with a calibration, and ROS bags."""
 
-from .detection import ImageOptions, has_images, open_recording
+from .detection import Cameras, ImageOptions, has_images, open_recording
 from .image_recording import ImagePair, ImageRecording
 
-__all__ = ["ImageOptions", "ImagePair", "ImageRecording", "has_images", "open_recording"]
+__all__ = ["Cameras", "ImageOptions", "ImagePair", "ImageRecording", "has_images", "open_recording"]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from fgbaseline.geometry import InputError, se3
 
@@ -18,16 +19,20 @@ from .kitti_odometry import open_kitti_odometry
 from .kitti_raw import open_kitti_raw
 from .two_folders import open_two_folders
 
+Cameras = Literal["stereo", "left"]
 FORMS = (
     "expected a EuRoC folder (mav0 or its parent), a KITTI odometry folder (image_0, image_1, calib.txt, times.txt), a "
-    "KITTI raw drive (image_00, image_01, oxts), a ROS bag, or two folders: LEFT --right RIGHT --calibration YAML"
+    "KITTI raw drive (image_00, image_01, oxts), a ROS bag, two folders (LEFT --right RIGHT --calibration YAML) or one "
+    "(LEFT --cameras left --calibration YAML)"
 )
 
 
 @dataclass(frozen=True, slots=True)
 class ImageOptions:
-    """Files given beside a recording of images."""
+    """Files given beside a recording of images, and which of its cameras are used."""
 
+    cameras: Cameras | None = None
+    """the left one alone, or a pair; None for a pair where there is one"""
     right: Path | None = None
     """folder of the right images, of two folders"""
     calibration: Path | None = None
@@ -35,7 +40,7 @@ class ImageOptions:
     times: Path | None = None
     """stamps of images whose names are none"""
     topics: tuple[str, ...] = ()
-    """of a bag: left, right and, if any, the IMU"""
+    """of a bag: left, right (without it, one camera) and, if any, the IMU"""
     imu: Path | None = None
     imu_calibration: Path | None = None
     velocities: Path | None = None
@@ -50,28 +55,34 @@ def has_images(path: Path) -> bool:
 
 def open_recording(path: Path, options: ImageOptions = ImageOptions()) -> ImageRecording:
     """The recording of images at `path`. Raises InputError that names what is missing."""
-    return _with_motion(_open(path, options), options)
+    recording = _open(path, options)
+    if options.cameras == "stereo" and recording.right is None:
+        raise InputError(f"cameras: {shown(path)} has one camera; leave out --cameras stereo")
+    return _with_motion(recording, options)
 
 
 def _open(path: Path, options: ImageOptions) -> ImageRecording:
+    left_alone = options.cameras == "left"
     if is_bag(path):
-        return open_bag(path, options.calibration, options.topics)
+        return open_bag(path, options.calibration, options.topics, left_alone=left_alone)
     if options.topics:
         raise InputError(f"topics: {shown(path)} is no ROS bag")
     if not path.is_dir():
         raise InputError(f"{shown(path)}: there is no such folder of images or bag; {FORMS}")
-    if options.right is not None:
+    if options.right is not None and left_alone:
+        raise InputError(f"right: {shown(options.right)} is given with --cameras left; leave out one of the two")
+    if options.right is not None or (left_alone and options.calibration is not None):
         return open_two_folders(path, options.right, options.calibration, options.times)
     for name in ("calibration", "times"):
         if getattr(options, name) is not None:
-            raise InputError(f"{name}: it belongs to two folders of images; add --right FOLDER")
+            raise InputError(f"{name}: it belongs to folders of images; add --right FOLDER, or --cameras left for one")
     if any((path / name).is_dir() for name in ("mav0", "cam0", "cam1")):
-        return open_euroc(path)
+        return open_euroc(path, left_alone=left_alone)
     if any((path / name).is_dir() for name in ("image_0", "image_1")):
-        return open_kitti_odometry(path)
+        return open_kitti_odometry(path, left_alone=left_alone)
     inside = [folder.name for folder in path.iterdir() if folder.is_dir()]
     if {"image_00", "image_01"} & set(inside) or any("_drive_" in name for name in inside):
-        return open_kitti_raw(path)
+        return open_kitti_raw(path, left_alone=left_alone)
     raise InputError(f"{shown(path)}: there is no recording in this folder; {FORMS}")
 
 
@@ -82,14 +93,9 @@ def _with_motion(recording: ImageRecording, options: ImageOptions) -> ImageRecor
         recording = _with_noise(recording, options.imu_calibration)
     if options.extrinsic is not None:
         imu_T_left = read_extrinsic(options.extrinsic)
-        left_T_right = se3.inverse(recording.left.imu_T_cam) @ recording.right.imu_T_cam
-        left, right = (
-            replace(camera, imu_T_cam=imu_T_cam)
-            for camera, imu_T_cam in (
-                (recording.left, imu_T_left),
-                (recording.right, imu_T_left @ left_T_right),
-            )
-        )
+        imu_T_before = imu_T_left @ se3.inverse(recording.left.imu_T_cam)
+        right = None if recording.right is None else recording.right.on(imu_T_before)
+        left = replace(recording.left, imu_T_cam=imu_T_left)
         recording = replace(recording, left=left, right=right, extrinsic_known=True)
     if options.velocities is not None:
         velocities = read_velocity_csv(options.velocities, recording.t)

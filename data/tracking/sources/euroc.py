@@ -3,13 +3,14 @@
 ```text
 mav0/
   cam0/data/STAMP.png, data.csv, sensor.yaml    (TUM-VI: camchain.yaml beside mav0 or under dso/)
-  cam1/                                         the same
+  cam1/                                         the same; absent with one camera
   imu0/data.csv, sensor.yaml                    (TUM-VI: dso/imu_config.yaml)
   state_groundtruth_estimate0/data.csv          or mocap0/data.csv
 ```
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from ...observations import IntArray
 from ...plural import plural
 from .camera_yaml import Rig, read_rig, read_sensor_yaml
 from .image_files import file_pairs, image_files
-from .image_recording import ImageRecording, TruthFile
-from .pairing import pair, stamps_of_names
+from .image_recording import ONE_CAMERA, ImageRecording, TruthFile
+from .pairing import pair, seconds, stamps_of_names
 
 CHAINS = ("camchain.yaml", "camchain-imucam.yaml", "dso/camchain.yaml")
 IMU_CONFIGS = ("imu_config.yaml", "dso/imu_config.yaml")
@@ -31,26 +32,46 @@ IMU = "imu0/data.csv"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "gt0")
 
 
-def open_euroc(folder: Path) -> ImageRecording:
-    """The recording in `folder`, `mav0` or its parent. Raises InputError that names what is missing."""
+class _Images(NamedTuple):
+    """Images of a camera."""
+
+    stamp: IntArray
+    """(n,) ns"""
+    file: list[Path]
+    remarks: tuple[str, ...] = ()
+
+
+def open_euroc(folder: Path, *, left_alone: bool = False) -> ImageRecording:
+    """The recording in `folder`, `mav0` or its parent; one camera where `left_alone`, or where there is no cam1.
+
+    Raises InputError that names what is missing.
+    """
     mav = folder / "mav0" if (folder / "mav0").is_dir() else folder
-    for name in ("cam0", "cam1"):
-        if not (mav / name).is_dir():
-            raise InputError(f"{shown(mav)}: the folder {name} is missing; a EuRoC folder has cam0 and cam1")
+    if not (mav / "cam0").is_dir():
+        raise InputError(f"{shown(mav)}: the folder cam0 is missing; a EuRoC folder has cam0, and cam1 for a pair")
+    left_alone |= not (mav / "cam1").is_dir()
     calibration = _imu_calibration(mav)
     body_T_imu = None if calibration is None else calibration.body_T_imu
-    rig = _rig(mav, body_T_imu)
-    stamps, files, remarks = zip(*(_images(mav / name) for name in ("cam0", "cam1")), strict=True)
-    paired = pair(stamps[0], stamps[1], shown(mav))
-    both = [(files[0][a], files[1][b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)]
+    rig = _rig(mav, body_T_imu, left_alone=left_alone)
+    left = _images(mav / "cam0")
+    files: list[tuple[Path, ...]]
+    if left_alone:
+        t, files, remarks = seconds(left.stamp), [(file,) for file in left.file], (ONE_CAMERA, *left.remarks)
+    else:
+        right = _images(mav / "cam1")
+        paired = pair(left.stamp, right.stamp, shown(mav))
+        files = [
+            (left.file[a], right.file[b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)
+        ]
+        t, remarks = paired.t, (*left.remarks, *right.remarks, *paired.remarks)
     truth = next((file for name in TRUTHS if (file := mav / name / "data.csv").is_file()), None)
     samples, place = mav / IMU, folder.resolve()
     return ImageRecording(
         name=place.parent.name if place.name == "mav0" else place.name,
         form="euroc",
         source=shown(folder),
-        t=paired.t + rig.time_shift,
-        pairs=file_pairs(both),
+        t=t + rig.time_shift,
+        pairs=file_pairs(files),
         left=rig.left,
         right=rig.right,
         extrinsic_known=rig.extrinsic_known,
@@ -58,26 +79,26 @@ def open_euroc(folder: Path) -> ImageRecording:
         imu_source=shown(samples),
         truth=None if truth is None else TruthFile(truth, "imu"),
         body_T_imu=body_T_imu,
-        remarks=(*rig.remarks, *remarks[0], *remarks[1], *paired.remarks),
+        remarks=(*rig.remarks, *remarks),
     )
 
 
-def _rig(mav: Path, body_T_imu: FloatArray | None) -> Rig:
+def _rig(mav: Path, body_T_imu: FloatArray | None, *, left_alone: bool) -> Rig:
     chain = next((file for place in (mav, mav.parent) for name in CHAINS if (file := place / name).is_file()), None)
-    sensors = [mav / name / "sensor.yaml" for name in ("cam0", "cam1")]
+    sensors = [mav / name / "sensor.yaml" for name in (("cam0",) if left_alone else ("cam0", "cam1"))]
     missing = next((file for file in sensors if not file.is_file()), None)
     if missing is None:
-        left, right = (read_sensor_yaml(file) for file in sensors)
+        cameras = [read_sensor_yaml(file) for file in sensors]
         if body_T_imu is not None:
-            left, right = (camera.on(se3.inverse(body_T_imu)) for camera in (left, right))
-        return Rig(left, right, extrinsic_known=True)
+            cameras = [camera.on(se3.inverse(body_T_imu)) for camera in cameras]
+        return Rig(cameras[0], None if left_alone else cameras[1], extrinsic_known=True)
     if chain is None:
         raise InputError(f"{shown(missing)}: the file is missing; add it, or Kalibr's camchain.yaml beside mav0")
-    return read_rig(chain, None)
+    return read_rig(chain, None, left_alone=left_alone)
 
 
-def _images(folder: Path) -> tuple[IntArray, list[Path], tuple[str, ...]]:
-    """Stamps, ns, and files of a camera's images, and a remark on those that are listed and missing."""
+def _images(folder: Path) -> _Images:
+    """Images of a camera, with a remark on those that are listed and missing."""
     table = folder / "data.csv"
     if not table.is_file():
         files = image_files(folder / "data")
@@ -93,16 +114,16 @@ def _images(folder: Path) -> tuple[IntArray, list[Path], tuple[str, ...]]:
             raise InputError(f"expected lines `stamp in ns,file name`, got {','.join(wrong or [])[:60]!r}")
     there = {file.name for file in image_files(folder / "data")}
     kept = [(int(row[0]), folder / "data" / row[1].strip()) for row in rows if row[1].strip() in there]
-    stamps, files, _ = _rising(np.array([stamp for stamp, _ in kept], np.int64), [file for _, file in kept], folder)
+    found = _rising(np.array([stamp for stamp, _ in kept], np.int64), [file for _, file in kept], folder)
     missing = len(rows) - len(kept)
     text = f"{shown(table)} lists {plural(missing, 'image')} that are not there: skipped."
-    return stamps, files, (text,) if missing else ()
+    return found._replace(remarks=(text,)) if missing else found
 
 
-def _rising(stamps: IntArray, files: list[Path], folder: Path) -> tuple[IntArray, list[Path], tuple[str, ...]]:
+def _rising(stamps: IntArray, files: list[Path], folder: Path) -> _Images:
     if len(stamps) < 2 or not (np.diff(stamps) > 0).all():
         raise InputError(f"{shown(folder)}: expected two images or more with rising stamps, got {len(stamps)}")
-    return stamps, files, ()
+    return _Images(stamps, files)
 
 
 def _imu_calibration(mav: Path) -> ImuCalibration | None:

@@ -74,15 +74,15 @@ def size_of(file: Path) -> tuple[int, int]:
             raise InputError("it is no image; check the file") from None
 
 
-def file_pairs(files: Sequence[tuple[Path, Path]]) -> Callable[[], Iterator[ImagePair]]:
-    """Reader of pairs of files."""
+def file_pairs(files: Sequence[tuple[Path, ...]]) -> Callable[[], Iterator[ImagePair]]:
+    """Reader of pairs of files, or of the files of one camera."""
 
     def pairs() -> Iterator[ImagePair]:
         convert = EightBits(), EightBits()
         for both in files:
-            left, right = (to(_image(file)) for to, file in zip(convert, both, strict=True))
-            name = shown(both[0] if left is None or right is not None else both[1])
-            yield ImagePair(left, right, name)
+            images = [to(_image(file)) for to, file in zip(convert, both, strict=False)]
+            broken = next((file for file, image in zip(both, images, strict=True) if image is None), both[0])
+            yield ImagePair(images[0], images[1] if len(images) == 2 else None, shown(broken))
 
     return pairs
 

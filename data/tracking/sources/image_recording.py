@@ -1,4 +1,4 @@
-"""Recording of stereo images: stamps, cameras and motion, with pairs that are read one at a time."""
+"""Recording of images: stamps, cameras and motion, with pairs, or images of one camera, read one at a time."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,12 +12,15 @@ from ...formats.imu_samples import RawSamples
 from ...sequence import Truth
 from ..rig import CameraModel, Image
 
+ONE_CAMERA = "One camera: its tracks have no right pixels, and raw inertial samples determine their scale."
+
 
 class ImagePair(NamedTuple):
     """Grey images of one instant; None where one cannot be read."""
 
     left: Image | None
     right: Image | None
+    """None with one camera"""
     name: str
     """of the pair in messages"""
 
@@ -31,7 +34,7 @@ class TruthFile(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ImageRecording:
-    """T stereo pairs with their calibration and, where it is known, the motion of the IMU."""
+    """T stereo pairs, or images of one camera, with their calibration and, where it is known, the motion of the IMU."""
 
     name: str
     form: str
@@ -41,7 +44,8 @@ class ImageRecording:
     pairs: Callable[[], Iterator[ImagePair]]
     """reads the T pairs in order, one at a time"""
     left: CameraModel
-    right: CameraModel
+    right: CameraModel | None
+    """None with one camera"""
     extrinsic_known: bool = True
     """whether `left.imu_T_cam` is that of an IMU; otherwise both poses are relative to the left camera"""
     velocities: tuple[FloatArray, FloatArray] | None = None

@@ -20,28 +20,29 @@ from ...formats.named_file import reading, regular_file, shown
 from ...plural import plural
 from ..rig import CameraModel, Distortion
 from .image_files import file_pairs, image_files, size_of
-from .image_recording import ImageRecording, TruthFile
+from .image_recording import ONE_CAMERA, ImageRecording, TruthFile
 
 
-def open_kitti_odometry(folder: Path) -> ImageRecording:
-    """The recording in `folder`. Raises InputError that names what is missing."""
-    for name in ("image_0", "image_1", "calib.txt", "times.txt"):
+def open_kitti_odometry(folder: Path, *, left_alone: bool = False) -> ImageRecording:
+    """The recording in `folder`, or that of its left camera. Raises InputError that names what is missing."""
+    folders = ("image_0",) if left_alone else ("image_0", "image_1")
+    for name in (*folders, "calib.txt", "times.txt"):
         if not (folder / name).exists():
             raise InputError(f"{shown(folder / name)} is missing; a KITTI odometry folder has image_0, image_1, "
                              "calib.txt and times.txt")  # fmt: skip
     t = read_times(folder / "times.txt")
-    left, right = (_numbered(folder / name) for name in ("image_0", "image_1"))
-    last = max(left | right)
+    numbered = [_numbered(folder / name) for name in folders]
+    last = max(map(max, numbered))
     if last >= len(t):
         raise InputError(f"{shown(folder / 'times.txt')}: it has {len(t)} stamps, but image {last} has none")
-    common = sorted(left.keys() & right.keys())
+    common = sorted(set.intersection(*map(set, numbered)))
     if len(common) < 2:
         raise InputError(f"{shown(folder)}: {plural(len(common), 'pair')} of images; a recording needs at least 2")
-    files = [(left[k], right[k]) for k in common]
+    files = [tuple(each[k] for each in numbered) for k in common]
     size = size_of(files[0][0])
     P0, P1 = _projections(folder / "calib.txt")
-    alone = len(left) + len(right) - 2 * len(common)
-    remarks = [f"{plural(alone, 'image')} have no partner: skipped."] if alone else []
+    alone = sum(map(len, numbered)) - len(folders) * len(common)
+    remarks = [ONE_CAMERA] if left_alone else [f"{plural(alone, 'image')} have no partner: skipped."] if alone else []
     cameras = rectified_cameras(P0, P1, size, np.eye(4))
     poses = _poses(folder) if len(common) == last + 1 else None  # line k is frame k
     return ImageRecording(
@@ -51,7 +52,7 @@ def open_kitti_odometry(folder: Path) -> ImageRecording:
         t=t[common],
         pairs=file_pairs(files),
         left=cameras[0],
-        right=cameras[1],
+        right=None if left_alone else cameras[1],
         extrinsic_known=False,
         truth=None if poses is None else TruthFile(poses, "camera"),
         remarks=tuple(remarks),

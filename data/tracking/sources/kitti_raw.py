@@ -21,7 +21,7 @@ from ...observations import IntArray
 from ...plural import plural
 from ...sequence import Truth
 from .image_files import file_pairs, image_files, size_of
-from .image_recording import ImageRecording
+from .image_recording import ONE_CAMERA, ImageRecording
 from .kitti_odometry import rectified_cameras
 
 CALIBRATIONS = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt")
@@ -37,12 +37,16 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 """linear and angular velocity (T, 3) in the body, poses (T, 4, 4)"""
 
 
-def open_kitti_raw(folder: Path) -> ImageRecording:
-    """The drive in `folder`, or the only one inside it. Raises InputError that names what is missing."""
+def open_kitti_raw(folder: Path, *, left_alone: bool = False) -> ImageRecording:
+    """The drive in `folder`, or the only one inside it, with both cameras or the left one.
+
+    Raises InputError that names what is missing.
+    """
     drive = _drive(folder)
     if drive.name.endswith("_extract"):
         raise InputError(f"{shown(drive)}: these images are not rectified; use the drive that ends in _sync")
-    needed = [drive / name / part for name in ("image_00", "image_01") for part in ("data", "timestamps.txt")]
+    folders = ("image_00",) if left_alone else ("image_00", "image_01")
+    needed = [drive / name / part for name in folders for part in ("data", "timestamps.txt")]
     missing = next((path for path in needed if not path.exists()), None)
     if missing is not None:
         raise InputError(f"{shown(missing)} is missing; a KITTI raw drive has image_00 and image_01 with it")
@@ -50,13 +54,14 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
     if calibration is None:
         raise InputError(f"{shown(drive.parent / CALIBRATIONS[0])} is missing; KITTI has it beside its drives")
     stamps = _stamps(drive / "image_00" / "timestamps.txt")
-    left, right = (_numbered(drive / name / "data") for name in ("image_00", "image_01"))
-    frames = np.array(sorted(k for k in left.keys() & right.keys() if k < len(stamps)))
+    numbered = [_numbered(drive / name / "data") for name in folders]
+    frames = np.array(sorted(k for k in set.intersection(*map(set, numbered)) if k < len(stamps)))
     if len(frames) < 2:
         raise InputError(f"{shown(drive)}: {plural(len(frames), 'pair')} of images; a recording needs at least 2")
-    alone = len(left) + len(right) - 2 * len(frames)
-    remarks = [f"{plural(alone, 'image')} have no partner or stamp: skipped."] if alone else []
-    files = [(left[k], right[k]) for k in frames.tolist()]
+    alone = sum(map(len, numbered)) - len(folders) * len(frames)
+    remarks = [ONE_CAMERA] if left_alone else []
+    remarks += [f"{plural(alone, 'image')} have no partner or stamp: skipped."] if alone else []
+    files = [tuple(each[k] for each in numbered) for k in frames.tolist()]
     values = _values(calibration / CALIBRATIONS[0])
     P0, P1 = (_matrix(values, f"P_rect_0{i}", 4, calibration / CALIBRATIONS[0]) for i in (0, 1))
     imu_T_cam = _extrinsic(calibration, values)
@@ -77,7 +82,7 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
         t=stamps[frames] / 1e9,
         pairs=file_pairs(files),
         left=cameras[0],
-        right=cameras[1],
+        right=None if left_alone else cameras[1],
         extrinsic_known=imu_T_cam is not None,
         velocities=None if motion is None else motion[:2],
         up_imu=None if motion is None else motion[2][0, 2, :3] / np.linalg.norm(motion[2][0, 2, :3]),

@@ -31,7 +31,12 @@ class Paired(NamedTuple):
     @property
     def t(self) -> FloatArray:
         """(T,) stamps in s."""
-        return np.array([stamp / 10**9 for stamp in self.stamp.tolist()])
+        return seconds(self.stamp)
+
+
+def seconds(stamp: IntArray) -> FloatArray:
+    """Stamps (n,), s, of stamps in ns."""
+    return np.array([each / 10**9 for each in stamp.tolist()])
 
 
 def pair(left: IntArray, right: IntArray, source: str) -> Paired:
