@@ -1,6 +1,6 @@
 """Graph builder: turns the observations of each frame into a frame update for an incremental solver."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import gtsam
 import numpy as np
@@ -36,6 +36,9 @@ class GraphBuilder:
         """as estimated online; filled by the solver, as is `landmark_position`"""
         self.landmark_position: dict[int, FloatArray] = {}
         """landmark -> position (3,), m, as estimated at its latest observation"""
+        self.current_poses: Callable[[IntArray], FloatArray] | None = None
+        """poses (n, 4, 4) of frames (n,) as the graph has them now: set for one camera, whose landmarks wait for
+        parallax that is small beside what later frames move the path by"""
 
     def frame_update(
         self, k: int, observed: range, known: Collection[int], dropped: Collection[int], first_frame: int = 0
@@ -51,7 +54,7 @@ class GraphBuilder:
         motion_factor = self._predict(k, tracked)
         candidates = self.uninitialized.candidates([landmark for landmark, _ in uninitialized], first_frame)
         states = self._windowed_states(k, first_frame) if candidates and not tracked else self.online
-        new_landmarks = self.uninitialized.initialize(candidates, states.world_T_imu)
+        new_landmarks = self.uninitialized.initialize(candidates, self._path(candidates, states))
         values = gtsam.Values()
         states.insert(values, k)
         return FrameUpdate(k, states.world_T_imu[k], values, motion_factor, tuple(new_landmarks), tracked)
@@ -85,6 +88,15 @@ class GraphBuilder:
         states = self.online.copy()
         states.take_all(values, first, k)
         return states
+
+    def _path(self, candidates: list[int], states: FrameStates) -> FloatArray:
+        """Poses (T, 4, 4) along which candidates are triangulated: those of `states`, or of the graph as it is now."""
+        if self.current_poses is None or states is not self.online or not candidates:
+            return states.world_T_imu
+        frames, path = self.uninitialized.frames(candidates), states.world_T_imu.copy()
+        frames = frames[:-1]  # the new frame is not in the graph
+        path[frames] = self.current_poses(frames)
+        return path
 
     def observation(self, observation: int, key: int) -> gtsam.NonlinearFactor:
         """Factor of one observation of the landmark `key`."""

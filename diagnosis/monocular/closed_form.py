@@ -41,12 +41,14 @@ def closed_form(imu: ImuIntervals, rays: Rays, motions: Motions, lever: FloatArr
     direction = (R[rays.keyframe] @ rays.direction[:, :, None])[:, :, 0]
     across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
     y: FloatArray = np.zeros(UNKNOWN)
-    for k in range(ROUNDS):
+    # Bias and gravity differ by the turning of the body only: at first gravity is what the specific force is against.
+    y[GRAVITY] = -_direction(np.einsum("nij,nj->i", R[:-1], motions.velocity)) * imu.gravity
+    for _ in range(ROUNDS):
         scale = weight / (ray_sigma * np.maximum(depth, NEAREST)) ** 2
         H, b = _without_points(rays, across, center, by, scale)
         H[BIAS, BIAS] += np.eye(3) * ACCELEROMETER_BIAS_SIGMA**-2
-        y = _held(H, b, y) if k else np.asarray(np.linalg.solve(H, b), dtype=np.float64)
-        y[GRAVITY] *= imu.gravity / max(float(np.linalg.norm(y[GRAVITY])), 1e-9)
+        y = _held(H, b, y)
+        y[GRAVITY] = _direction(y[GRAVITY]) * imu.gravity
         moved = center + by @ y
         point = _points(rays, across, moved, scale)
         apart = point[rays.point] - moved[rays.keyframe]
@@ -55,6 +57,10 @@ def closed_form(imu: ImuIntervals, rays: Rays, motions: Motions, lever: FloatArr
         bulk = max(ray_sigma, 1.4826 * float(np.nanmedian(miss)))
         weight = np.nan_to_num(np.minimum(1.0, HUBER * bulk / np.maximum(miss, 1e-12)))
     return _states(motions, R, y)
+
+
+def _direction(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9), dtype=np.float64)
 
 
 def _linear_positions(motions: Motions) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -26,8 +26,9 @@ LONGEST_STAND = 10.0
 """s that are used of a standing start: without points nothing else holds the path"""
 STANDING_POSITION, STANDING_ROTATION = 5e-3, 4e-3
 """m and rad, by which a standing body moves and turns"""
-LOOSENED = 4.0
-"""factor of the deviations of a start in motion: what it says then counts a sixteenth"""
+LOOSENED = 2.0
+"""factor of the deviations of a start in motion: what it says then counts a quarter. Larger factors make filters less
+consistent: what is linear within the errors is not within what is claimed"""
 EXCITED = 0.1
 """1-sigma of the scale, as a share of it, above which the motion does not excite it"""
 UNKNOWN_DEPTHS = InverseDepthPrior(0.25, 0.25)

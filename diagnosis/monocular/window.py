@@ -23,7 +23,7 @@ from .window_tracks import first_inverse_depths, keyframe_tracks, rays_of, squar
 
 SPANS = (2.0, 4.0, 8.0, 16.0)
 """s of a window; the first that determines the scale is taken"""
-LASTING = 8.0
+LASTING = 16.0
 """s over which the pixel noise is found"""
 KEYFRAMES = 20
 DETERMINED = 0.05
@@ -33,6 +33,8 @@ FIRST_PIXEL = 1.0
 SMALLEST_PIXEL = 0.05
 """px"""
 CHI_SQUARE_2_MEDIAN = 1.3863
+NEAR = 97.5
+"""percentile of the inverse depths that are those of the nearest points"""
 FITTING = 100.0
 """median squared residual, in sigmas of `FIRST_PIXEL`, of a solution that is none"""
 
@@ -169,7 +171,7 @@ def _pixel_noise(tracks: KeyframeTracks, solution: Solution) -> float:
 
 
 def _depths(tracks: KeyframeTracks, pose: FloatArray) -> InverseDepthPrior:
-    """Median inverse depth, which is the sigma as well: a narrow prior of many landmarks would determine the scale."""
+    """Median inverse depth; the nearest points are within two sigma, and infinity within one."""
     inverse = first_inverse_depths(tracks, pose, window_points(tracks, pose))
-    median = float(np.median(np.maximum(inverse[np.isfinite(inverse)], 0.0)))
-    return InverseDepthPrior(median, median)
+    median, near = np.percentile(np.maximum(inverse[np.isfinite(inverse)], 0.0), [50.0, NEAR])
+    return InverseDepthPrior(float(median), float(max(median, 0.5 * (near - median))))

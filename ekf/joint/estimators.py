@@ -30,7 +30,7 @@ def joint_ekf(problem: Problem, progress: Progress | None = None, settings: Join
     Raises FgbaselineError for `gyro_bias` in the settings of a problem with raw inertial samples, and for one camera
     without inverse depth or its prior.
     """
-    settings = settings or JointSettings()
+    settings = settings or JointSettings.of(problem)
     if problem.imu is not None and settings.gyro_bias is not None:
         raise FgbaselineError(
             "joint-ekf-bias takes body velocities only: with raw inertial samples joint-ekf estimates both biases"

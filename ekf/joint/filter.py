@@ -14,12 +14,12 @@ from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
 from .gating import gate_observations
 from .gyro_bias import BiasedVelocityMotion
-from .inverse_depth_prior import inverse_depth_prior
+from .inverse_depth_prior import inverse_depths, scene_depth
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
 from .second_order import second_order_of
 from .settings import JointSettings, Linearization
-from .state import ABSENT, JointState
+from .state import ABSENT, CommonError, JointState
 from .unobservable_directions import first_estimate_transition, transform_columns
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 
@@ -124,8 +124,8 @@ class JointFilter:
         if len(seen.observed) == 0:
             return True
         state = self.state
-        residual, variance = self._with_second_order(seen)
-        innovation = Innovation.of(seen.H, residual, state.P)
+        variance = self._variance(seen)
+        innovation = Innovation.of(seen.H, seen.residual, state.P)
         verdict = gate_observations(innovation.nis_per_observation(variance), self.measurement, self.settings)
         order = verdict.order
         innovation, variance = innovation.in_order(order), variance[order]
@@ -153,12 +153,12 @@ class JointFilter:
             self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
 
-    def _with_second_order(self, seen: _LinearizedObservations) -> tuple[FloatArray, FloatArray]:
-        """Innovations and variances of their noise, both (n, r), with second-order terms for one camera."""
+    def _variance(self, seen: _LinearizedObservations) -> FloatArray:
+        """Variances (n, r) of the noise of innovations, with the squares of second-order terms for one camera."""
         if not self.measurement.monocular:
-            return seen.residual, np.broadcast_to(self.row_variance, seen.residual.shape)
+            return np.broadcast_to(self.row_variance, seen.residual.shape)
         terms = second_order_of(self.camera, self.cam_T_imu, self.state, seen.H.slot)
-        return seen.residual - terms.mean, self.row_variance + terms.variance
+        return self.row_variance + terms.variance + terms.mean**2
 
     def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         """Record the NIS of the frame, before kernel and gate, and return the factor of S."""
@@ -217,13 +217,14 @@ class JointFilter:
 
         This is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
         pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n. For one camera a third row
-        measures the inverse depth by its prior.
+        measures the inverse depth by that of the scene, whose error is common to the new landmarks.
         """
         n, state = len(index), self.state
         first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE
         world_T_cam = state.pose @ self.imu_T_cam
-        prior = inverse_depth_prior(self.problem, self.state, self.cam_T_imu) if self.measurement.monocular else None
-        points = back_projected(self.camera, self.measured[index], np.nan if prior is None else prior.mean)
+        prior = self.problem.inverse_depth_prior if self.measurement.monocular else None
+        scene = None if prior is None else scene_depth(prior, state, self.cam_T_imu)
+        points = back_projected(self.camera, self.measured[index], np.nan if scene is None else scene.mean)
         points = points @ world_T_cam.T
         shared = chart(self.settings.coordinates, world_T_cam)
         xi = coordinates_of(shared, points)
@@ -231,14 +232,16 @@ class JointFilter:
         seen = predict(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
         r = self.measurement.n_rows
         H_xi = (seen.point_jacobian().reshape(r * n, 4) @ shared[:, :3]).reshape(n, r, 3)
-        H_pose, variance = seen.pose_jacobian(), self.row_variance
-        if prior is not None:
-            H_xi, H_pose = (np.concatenate([H, np.zeros((n, 1, H.shape[2]))], axis=1) for H in (H_xi, H_pose))
-            H_xi[:, r, 2] = 1.0
-            variance = np.append(variance, prior.sigma**2)
+        H_pose, variance, common = seen.pose_jacobian(), self.row_variance, None
+        if scene is not None:
+            _, by_pose, by_xi = inverse_depths(at, self.cam_T_imu, np.broadcast_to(shared, (n, 4, 4)), xi)
+            H_pose, H_xi = (np.concatenate(H, axis=1) for H in ((H_pose, by_pose[:, None]), (H_xi, by_xi[:, None])))
+            variance = np.append(variance, (scene.spread * scene.mean) ** 2)
         inverse = np.linalg.inv(H_xi)
         covariance = (inverse * variance) @ np.swapaxes(inverse, 1, 2)
-        state.initialize(self.feature[index], shared, xi, -inverse @ H_pose, covariance)
+        if scene is not None:
+            common = CommonError(np.asarray(scene.mean * inverse[:, :, r]), scene.covariance, scene.variance)
+        state.initialize(self.feature[index], shared, xi, -inverse @ H_pose, covariance, common)
         self.map.initialized[self.feature[index]] = True
         self.used[index] = True
 

@@ -1,10 +1,20 @@
-"""Prior of the inverse depths of landmarks that one camera sees for the first time, from the scene as it is known."""
+"""Prior of the inverse depths of landmarks that one camera sees for the first time.
+
+Depths of a scene resemble each other: ln(rho) = c + e, with rho the inverse depth in the camera, c common to the scene
+and e of each landmark. c is the mean over the known landmarks of the state, and has their errors. So a landmark begins
+as far away as its scene *in the state's own scale*: a constant in place of c would be information about the scale, the
+more the more landmarks begin. In the same way rho is that of the camera as it is, which the error of the pose moves.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.problem import InverseDepthPrior, Problem
+from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.problem import InverseDepthPrior
 from fgbaseline.geometry import FloatArray, se3
 
+from ..motion_model import POSE
 from .landmark_representation import homogeneous
 from .state import JointState
 
@@ -12,19 +22,53 @@ KNOWN = 0.3
 """relative sigma below which a landmark's inverse depth is known"""
 MIN_KNOWN = 5
 """known landmarks that make a scene"""
+UNKNOWN_SCALE = 1.0
+"""sigma of c where no landmark is known"""
 
 
-def inverse_depth_prior(problem: Problem, state: JointState, cam_T_imu: FloatArray) -> InverseDepthPrior | None:
-    """Prior at the median inverse depth of the known landmarks in front of the camera, or else that of the problem.
+class SceneDepth(NamedTuple):
+    """Inverse depth of a scene, of which the state knows some landmarks."""
 
-    Its sigma is its mean. An error of the mean is common to all landmarks, so that a narrow prior of many landmarks
-    would determine the scale.
+    mean: float
+    """1/m, exp(c)"""
+    spread: float
+    """sigma of e"""
+    covariance: FloatArray
+    """(size,) of the error of c with that of the state"""
+    variance: float
+    """of c"""
+
+
+def scene_depth(prior: InverseDepthPrior, state: JointState, cam_T_imu: FloatArray) -> SceneDepth:
+    """The depth of the known landmarks in front of the camera, or else that of the problem."""
+    spread = prior.sigma / prior.mean
+    rho, H_pose, H_xi = inverse_depths(state.pose, cam_T_imu, state.charts, state.xi)
+    sigma = np.sqrt(np.diagonal(state.P)[state.n_body + 2 :: 3])
+    known: BoolArray = (sigma < KNOWN * state.xi[:, 2]) & (rho > 0.0)
+    n = int(np.count_nonzero(known))
+    if n < MIN_KNOWN:
+        return SceneDepth(prior.mean, spread, np.zeros(state.size), UNKNOWN_SCALE**2)
+    share = np.where(known, 1.0 / (n * np.where(known, rho, 1.0)), 0.0)
+    slope = np.zeros(state.size)
+    slope[:POSE] = share @ H_pose
+    slope[state.n_body :] = (share[:, None] * H_xi).reshape(-1)
+    covariance = state.P @ slope
+    mean = float(np.exp(np.mean(np.log(rho[known]))))
+    return SceneDepth(mean, spread, covariance, float(slope @ covariance))
+
+
+def inverse_depths(
+    pose: FloatArray, cam_T_imu: FloatArray, charts: FloatArray, xi: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Inverse depths (n,), 1/m, of landmarks xi (n, 3) in charts (n, 4, 4), with Jacobians (n, 6) and (n, 3).
+
+    They are by the right perturbation of the pose (4, 4) and by xi.
     """
-    inverse, sigma = state.xi[:, 2], np.sqrt(np.diagonal(state.P)[state.n_body + 2 :: 3])
-    known = sigma < KNOWN * inverse
-    points = homogeneous(state.charts[known], state.xi[known]) @ (cam_T_imu @ se3.affine_inverse(state.pose)).T
-    points = points[points[:, 2] > 0.0]
-    if len(points) < MIN_KNOWN:
-        return problem.inverse_depth_prior
-    median = float(np.median(points[:, 3] / points[:, 2]))
-    return InverseDepthPrior(median, median)
+    imu_T_world = se3.affine_inverse(pose)
+    in_imu = homogeneous(charts, xi) @ imu_T_world.T
+    camera = in_imu @ cam_T_imu.T
+    z, w = camera[:, 2], camera[:, 3]
+    by_pose = -np.einsum("a,iab,nb->ni", cam_T_imu[2], se3.hat(np.eye(POSE)), in_imu)  # of z
+    by_xi = (cam_T_imu @ imu_T_world)[2:] @ charts[:, :, :3]  # (n, 2, 3) of z and w
+    slope = -w / z**2
+    return w / z, slope[:, None] * by_pose, by_xi[:, 1] / z[:, None] + slope[:, None] * by_xi[:, 0]

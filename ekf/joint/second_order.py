@@ -1,7 +1,8 @@
-"""Second-order terms of the observations of one camera: their mean and variance, added to the innovation.
+"""Second-order terms of the observations of one camera: their mean square is noise of the innovation.
 
 A prediction h(x) is expanded to h + H e + e^T C e / 2. For a Gaussian error e with the covariance P the last term has
-the mean tr(C P) / 2 and the variance tr(C P C P) / 2 (Bar-Shalom, Li and Kirubarajan 2001, section 10.3.2). A stereo
+the mean tr(C P) / 2 and the variance tr(C P C P) / 2 (Bar-Shalom, Li and Kirubarajan 2001, section 10.3.2). The mean
+is not subtracted, since inverse depths are less Gaussian than that: its square is added to the variance. A stereo
 pair measures inverse depth, so that these are small. With one camera a landmark starts with an inverse depth known to
 a factor of two, and its product with the motion is quadratic: without these terms the filter is overconfident in
 the first seconds.

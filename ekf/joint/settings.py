@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FgbaselineError
 
 from .gyro_bias import GyroBiasPrior
@@ -46,6 +47,14 @@ class JointSettings:
     that long"""
     max_landmarks: int = 512
     """most landmarks in the state; further ones are deferred (`feature_selection`), with an event"""
+
+    @classmethod
+    def of(cls, problem: Problem) -> "JointSettings":
+        """Default settings for a problem.
+
+        With one camera no frame is rejected as a whole: depths and scale are found from frames that disagree at first.
+        """
+        return cls(disagreeing_share=None) if problem.sequence.monocular else cls()
 
     def __post_init__(self) -> None:
         if self.gate is not None and not 0.0 < self.gate < 1.0:

@@ -6,7 +6,7 @@ its chart. The covariance lives in one square array that grows by doubling. A ma
 the last one, so the active part is always the upper left square.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,17 @@ from .landmark_representation import WorldPoints, generators, motion_jacobian, w
 from .update import subtract_symmetric
 
 ABSENT = -1
+
+
+class CommonError(NamedTuple):
+    """Error c that n new landmarks have in common."""
+
+    jacobian: FloatArray
+    """(n, 3) of their coordinates by c"""
+    covariance: FloatArray
+    """(size,) of c with the error state"""
+    variance: float
+    """of c"""
 
 
 class JointState:
@@ -118,9 +129,15 @@ class JointState:
         P[:POSE, :POSE] = 0.5 * (turned + turned.T)
 
     def initialize(
-        self, row: IntArray, chart: FloatArray, xi: FloatArray, pose_jacobian: FloatArray, covariance: FloatArray
+        self,
+        row: IntArray,
+        chart: FloatArray,
+        xi: FloatArray,
+        pose_jacobian: FloatArray,
+        covariance: FloatArray,
+        common: CommonError | None = None,
     ) -> None:
-        """Initialize n landmarks in one chart (4, 4), with the error G delta + e each.
+        """Initialize n landmarks in one chart (4, 4), with the error G delta + e each, and B c where it is `common`.
 
         G = `pose_jacobian` (n, 3, 6) maps the pose error delta, `covariance` (n, 3, 3) is that of e.
         """
@@ -134,9 +151,14 @@ class JointState:
         self.slot_of[row] = np.arange(self.count, self.count + n)
         P, G = self._P, pose_jacobian.reshape(3 * n, POSE)
         cross = G @ P[:POSE, :old]
+        own = cross[:, :POSE] @ G.T
+        if common is not None:
+            B = common.jacobian.reshape(3 * n)
+            by_pose = G @ common.covariance[:POSE]
+            own += np.outer(B, by_pose) + np.outer(by_pose + B * common.variance, B)
+            cross += np.outer(B, common.covariance)
         P[old:new, :old] = cross
         P[:old, old:new] = cross.T
-        own = cross[:, :POSE] @ G.T
         each = np.arange(n)
         own.reshape(n, 3, n, 3)[each, :, each, :] += covariance
         P[old:new, old:new] = 0.5 * (own + own.T)

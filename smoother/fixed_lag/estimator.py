@@ -9,8 +9,9 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Progress, Status
 from fgbaseline.data.problem import Problem
+from fgbaseline.geometry import FloatArray
 
-from ..errors import UnrecoverableError
+from ..errors import FAILURES, failure_reason
 from ..frame_update import add_with_recovery
 from ..graph.cheirality import CHEIRALITY_VIOLATION
 from ..graph.gtsam_conversions import in_solver_frame
@@ -45,26 +46,11 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
     builder = GraphBuilder(problem, settings.isam2.initialization)
     if len(builder.observations) == 0:
         return Estimate.failed("fixed-lag", "no observations", T, len(problem.excluded))
-    window = FixedLagWindow(problem, builder, settings.lag, settings.isam2)
-    seconds, dropped, events = np.zeros(T), set[int](), list[Event]()
-    for k, observed in enumerate(builder.observations.by_frame(T)):
-        begin = time.perf_counter()
-        update = builder.frame_update(k, range(observed.start, observed.stop), window.key, dropped, window.oldest)
-        window.store_marginalized(float(problem.sequence.t[k]), update.tracked.keys())
-        try:
-            cost = add_with_recovery(window, update)
-        except UnrecoverableError as error:
-            return Estimate.failed("fixed-lag", str(error), T, len(problem.excluded))
-        dropped |= cost.landmarks
-        events += cost.events
-        window.take_newest(builder.online)
-        for j in builder.observations.landmark[observed].tolist():
-            if j in window.key:
-                builder.landmark_position[j] = window.position(j)
-        seconds[k] = time.perf_counter() - begin
-        if progress is not None:
-            progress(k + 1, T)
-    window.store_marginalized(np.inf, ())
+    window, seconds = FixedLagWindow(problem, builder, settings.lag, settings.isam2), np.zeros(T)
+    try:
+        events = _run(builder, window, seconds, progress)
+    except FAILURES as error:
+        return Estimate.failed("fixed-lag", failure_reason(error), T, len(problem.excluded))
     events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in window.lost]
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
     estimate = Estimate(
@@ -79,3 +65,25 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         events=tuple(events),
     )
     return window.states.answer(estimate)
+
+
+def _run(builder: GraphBuilder, window: FixedLagWindow, seconds: FloatArray, progress: Progress | None) -> list[Event]:
+    """Run over all frames; fill `seconds` (T,) and return the events. Raises one of FAILURES."""
+    T, t = len(seconds), builder.problem.sequence.t
+    dropped, events = set[int](), list[Event]()
+    for k, observed in enumerate(builder.observations.by_frame(T)):
+        begin = time.perf_counter()
+        update = builder.frame_update(k, range(observed.start, observed.stop), window.key, dropped, window.oldest)
+        window.store_marginalized(float(t[k]), update.tracked.keys())
+        cost = add_with_recovery(window, update)
+        dropped |= cost.landmarks
+        events += cost.events
+        window.take_newest(builder.online)
+        for j in builder.observations.landmark[observed].tolist():
+            if j in window.key:
+                builder.landmark_position[j] = window.position(j)
+        seconds[k] = time.perf_counter() - begin
+        if progress is not None:
+            progress(k + 1, T)
+    window.store_marginalized(np.inf, ())
+    return events

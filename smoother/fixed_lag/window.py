@@ -7,6 +7,7 @@ import gtsam
 import numpy as np
 
 from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
@@ -15,7 +16,7 @@ from ..frame_update import FrameUpdate
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
 from ..graph.frame_states import FrameStates
 from ..graph.gtsam_conversions import landmarks_from_values, poses_from_values
-from ..graph.keys import distance_key, landmark_of, state_keys, width
+from ..graph.keys import distance_key, landmark_of, pose_key, state_keys, width
 from ..graph.marginal_covariances import joint_covariance
 from ..graph_builder import GraphBuilder
 from ..isam2.settings import ISAM2Settings
@@ -45,6 +46,13 @@ class FixedLagWindow:
         self.lost: list[int] = []
         """landmarks that violated cheirality when they were marginalized"""
         self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}
+        if problem.sequence.monocular:
+            builder.current_poses = self._current_poses
+
+    def _current_poses(self, frames: IntArray) -> FloatArray:
+        """Poses (n, 4, 4) of frames (n,) of the window by its last solution."""
+        tree = self._lag.smoother.getISAM2()
+        return np.array([tree.calculateEstimatePose3(pose_key(k)).matrix() for k in frames.tolist()]).reshape(-1, 4, 4)
 
     def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
         """See `IncrementalGraph.add`."""

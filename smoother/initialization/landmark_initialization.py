@@ -65,6 +65,10 @@ class UninitializedLandmarks:
             return seen
         return [j for j in seen if len(self._observed[j]) >= self._criterion.min_observations]
 
+    def frames(self, candidates: list[int]) -> IntArray:
+        """Frames (n,) of the observations of candidates, rising."""
+        return np.unique(self._observations.frame[np.concatenate([self._observed[j] for j in candidates])])
+
     def initialize(self, candidates: list[int], world_T_imu: FloatArray) -> list[NewLandmark]:
         """Initialize the candidates whose position is determined along the poses (T, 4, 4).
 

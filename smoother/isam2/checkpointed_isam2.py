@@ -63,7 +63,6 @@ class CheckpointedISAM2:
             self._take_checkpoint()
         try:
             result = self._apply(step)
-            self.tree.calculateEstimatePose3(self._first)  # solves: a pivot of zero may show only here
         except (RuntimeError, IndexError) as error:
             self.tree = gtsam.ISAM2(self._checkpoint)
             for past in self._since_checkpoint:
@@ -75,13 +74,16 @@ class CheckpointedISAM2:
         return result
 
     def _apply(self, step: Update) -> gtsam.ISAM2Result:
-        return self.tree.update(
+        """Update and solve the tree: a pivot of zero may show only then, and the next update starts at the solution."""
+        result = self.tree.update(
             step.factors,
             step.values,
             list(step.removed),
             constrainedKeys=None if step.groups is None else self._groups.with_those_of(step.groups),
             force_relinearize=step.relinearize,
         )
+        self.tree.calculateEstimatePose3(self._first)
+        return result
 
 
 class _Groups:

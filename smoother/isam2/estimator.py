@@ -12,7 +12,7 @@ from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Prog
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
-from ..errors import IndeterminateSystemError, UnrecoverableError
+from ..errors import FAILURES, failure_reason
 from ..graph.frame_states import FrameStates
 from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
 from ..graph.gtsam_conversions import in_solver_frame, landmarks_from_values
@@ -53,8 +53,8 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         smoother = _run(problem, settings, seconds, progress)
         smoother.settle()
         graph, values = _final_solution(smoother, settings.relinearize_at_end)
-    except (UnrecoverableError, IndeterminateSystemError) as error:
-        return Estimate.failed("isam2", str(error), T, len(problem.excluded))
+    except FAILURES as error:
+        return Estimate.failed("isam2", failure_reason(error), T, len(problem.excluded))
     states, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
     status, reason = _status(events)
@@ -82,7 +82,7 @@ def _run(
     try:
         quick.run(seconds, progress)
         return quick
-    except (FrameLostError, UnrecoverableError):
+    except (FrameLostError, *FAILURES):
         if settings.qr or problem.landmark_prior is not None:
             raise
     where = quick.n_frames

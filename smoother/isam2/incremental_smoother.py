@@ -7,7 +7,7 @@ import gtsam
 import numpy as np
 
 from fgbaseline.data.estimate import Event, EventKind, Landmarks, Progress
-from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
@@ -15,7 +15,7 @@ from ..errors import IndeterminateSystemError
 from ..frame_update import FrameUpdate, add_with_recovery
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
 from ..graph.gtsam_conversions import landmarks_from_values, poses_from_values
-from ..graph.keys import distance_key, landmark_of, state_keys
+from ..graph.keys import distance_key, landmark_of, pose_key, state_keys
 from ..graph.marginal_covariances import joint_covariance
 from ..graph_builder import GraphBuilder
 from .elimination_ordering import EliminationOrdering
@@ -48,6 +48,8 @@ class IncrementalSmoother:
         self._may_lose_frames = settings.qr or problem.landmark_prior is not None
         self.builder = GraphBuilder(problem, settings.initialization)
         self._inertial = problem.imu is not None
+        if problem.sequence.monocular:
+            self.builder.current_poses = self._current_poses
         self.key: dict[int, int] = {}
         """key of each landmark in the graph"""
         self._slots: dict[int, dict[int, int]] = {}
@@ -140,6 +142,13 @@ class IncrementalSmoother:
         ]
         self._dropped |= new
         return update.without(back)
+
+    def _current_poses(self, frames: IntArray) -> FloatArray:
+        """Poses (n, 4, 4) of frames (n,) by the last solution of the tree; marginalized ones as estimated online."""
+        poses = self.builder.online.world_T_imu[frames]
+        for i in np.flatnonzero(frames >= self._first).tolist():
+            poses[i] = self.solver.tree.calculateEstimatePose3(pose_key(int(frames[i]))).matrix()
+        return poses
 
     def add(self, update: FrameUpdate, dropped: Collection[int]) -> None:
         """See `IncrementalGraph.add`."""

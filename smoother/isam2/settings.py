@@ -18,6 +18,8 @@ default of GTSAM, 1e-3, leaves an error of 0.1 mm in the online estimate and sav
 PARALLAX_SUFFICES = 0.2
 """of the deviation of a landmark over its distance, with one camera: poses are held in it, and with little parallax
 their errors are larger than those of the pixels"""
+ONE_CAMERA_SKIP = 1
+"""updates from one relinearization to the next, with one camera: depths start far off, and the path with them"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,4 +80,5 @@ class ISAM2Settings:
         inertial = cls(relinearize_skip=5, tree_frames=100, kept_frames=40)
         if not problem.sequence.monocular:
             return inertial
-        return replace(inertial, initialization=InitializationCriterion(max_relative_deviation=PARALLAX_SUFFICES))
+        parallax = InitializationCriterion(max_relative_deviation=PARALLAX_SUFFICES)
+        return replace(inertial, relinearize_skip=ONE_CAMERA_SKIP, initialization=parallax)
