@@ -13,7 +13,7 @@ from ..tracks.track_segments import BLOCK, TrackSegments
 HYPOTHESES = 48
 """per pair of frames; with half of the segments wrong, one of them is right with probability 0.998"""
 TRUNCATION = 16.0
-"""of a squared whitened residual of three rows"""
+"""limit of a squared whitened residual of three rows"""
 SEED = 20260
 
 

@@ -36,7 +36,7 @@ class MarginalizedISAM2:
         self._isam = CheckpointedISAM2(params)
         self._graph = gtsam.NonlinearFactorGraph()
         self._marginalized = gtsam.Values()
-        """of the variables that are not in the tree any more"""
+        """values of the variables that are no longer in the tree"""
         self._tree_slot: list[int] = []
         """tree slot of the factor in each slot of the graph"""
         self._frame: list[int] = []

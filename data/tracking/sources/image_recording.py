@@ -19,7 +19,7 @@ class ImagePair(NamedTuple):
     left: Image | None
     right: Image | None
     name: str
-    """of the pair in messages"""
+    """name of the pair in messages"""
 
 
 class TruthFile(NamedTuple):
