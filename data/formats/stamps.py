@@ -30,7 +30,7 @@ class Stamps:
     value: FloatArray
     """(n,)"""
     whole: tuple[int, ...] | None
-    """the same, exactly, where all of them are whole numbers"""
+    """exact values, where all of them are whole numbers"""
     unit: TimeUnit | None
     """where the header has it"""
     words: Sequence[str] = ()

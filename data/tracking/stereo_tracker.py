@@ -1,7 +1,7 @@
 """Stereo tracker: Lucas-Kanade from frame to frame and from left to right, with checks that end a track.
 
-A track keeps its point or ends: what the forward-backward check, the gate on vL - vR, the disparity or the motion of
-the rig rejects is not tracked on, and a corner found there later is a new track.
+A track keeps its point or ends. It ends where the forward-backward check, the gate on vL - vR, the disparity or the
+motion of the rig rejects it; a corner found there later begins a new track.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ class Tracks:
     """Points tracked into one frame."""
 
     number: IntArray
-    """(n,) of each track, unique in a recording"""
+    """(n,) number of each track, unique in a recording"""
     pixel: FloatArray
     """(n, 4) uL, vL, uR, vR, px, in the rectified pair"""
 
@@ -47,7 +47,7 @@ class Tracks:
 
 @dataclass(eq=False)
 class StereoTracker:
-    """Tracks of a recording, pair by pair; results depend on nothing but images, predictions and settings.
+    """Tracks of a recording, pair by pair; results depend only on images, predictions and settings.
 
     Corners are found in the images, and tracked and matched in images of equalized local contrast.
     """
@@ -150,7 +150,7 @@ class StereoTracker:
     def _flow_and_back(
         self, first: Image, second: Image, points: FloatArray, guess: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Points (n, 2) of the second image, and those of them that flow back to where they were."""
+        """Points (n, 2) of the second image, and which of them pass the forward-backward check."""
         new, found = self._flow(first, second, points, guess)
         back, returned = self._flow(second, first, new, points)
         apart = np.linalg.norm(back - points, axis=1)
