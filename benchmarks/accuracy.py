@@ -1,4 +1,4 @@
-"""How accurate and consistent every estimator is on the recordings that have truth: `python benchmarks/accuracy.py`.
+"""Accuracy and consistency of every estimator on the recordings that have truth: `python benchmarks/accuracy.py`.
 
 ATE is the RMSE of position after SE(3) alignment, NEES the mean over frames of the pose's (6 expected of a consistent
 estimator). Each recording is posed as the diagnosis repairs it and as it was recorded. Figures of two versions of the

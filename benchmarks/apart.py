@@ -1,4 +1,4 @@
-"""What a function takes in a process of its own: seconds and memory, with nothing of the caller's in them.
+"""Time and memory of a function in a separate process, with none of the caller's in them.
 
 `python -m benchmarks.apart MODULE FUNCTION JSON` is that process; it answers in one line of JSON.
 """
@@ -31,7 +31,7 @@ class StoppedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What one call took."""
+    """Cost of one call."""
 
     answer: Any
     seconds: float
@@ -82,7 +82,7 @@ def memory() -> float:
 
 
 def forget_peak() -> None:
-    """What was held so far counts no more, where the system allows that."""
+    """Resets the peak of the memory, where the system allows that."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 

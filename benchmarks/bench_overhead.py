@@ -1,4 +1,4 @@
-"""What `bench` adds to the runs: many short ones on two workers of Dask, beside the seconds that they took themselves.
+"""Overhead of `bench` over its runs: many short ones on two workers of Dask, beside their own seconds.
 
 `python -m benchmarks.bench_overhead --runs 1000` prints JSON. A worker that does nothing but runs is always busy, so
 the seconds of two workers from the first job to the last, less those of the runs, are what it costs to plan, to send,

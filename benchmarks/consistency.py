@@ -37,11 +37,11 @@ from fgbaseline.reports.figures.style import ESTIMATOR_COLORS
 
 FRAMES = 20
 PARTS = 5
-"""of the drive, over which growth is shown"""
+"""parts of the drive, over which growth is shown"""
 EVERYTHING = MaskSettings(min_disparity=-np.inf, max_row_mismatch=np.inf, prediction_gate=np.inf, min_track=1)
 """There are no wrong matches to find, and a gate along noisy velocities would keep what agrees with their noise."""
 INVERSE_DEPTH = JointSettings(linearization=Linearization.TEXTBOOK)
-COLOURS = ESTIMATOR_COLORS | {
+COLORS = ESTIMATOR_COLORS | {
     "joint-ekf-first-estimate": "#56B4E9",
     "textbook, inverse depth": "#882255",
     "joint-ekf-textbook": "#D55E00",
@@ -50,7 +50,7 @@ COLOURS = ESTIMATOR_COLORS | {
 
 @dataclass(frozen=True)
 class Study:
-    """Which drives, and what their problems leave out or soften."""
+    """Drives, and what their problems leave out or soften."""
 
     drive: Simulation
     preset_mask: bool
@@ -71,7 +71,7 @@ class Study:
 
 
 def answers(problem: Problem) -> list[Estimate]:
-    """Of every estimator; the smoothers' from one run."""
+    """Estimates of every estimator; the smoothers' from one run."""
     reference = smoother.isam2(problem)
     return [
         smoother.batch(problem, given={"isam2": reference}),
@@ -148,11 +148,9 @@ def draw(tables: dict[str, pd.DataFrame], seconds_a_frame: float, title: str, pa
         for name in filter(chosen, tables):
             table = tables[name]
             style = "--" if name == "isam2" else "-"
-            ax.plot(
-                table.index * seconds_a_frame, table["anees"], style, label=name, color=COLOURS[name], linewidth=1.3
-            )
+            ax.plot(table.index * seconds_a_frame, table["anees"], style, label=name, color=COLORS[name], linewidth=1.3)
             at = table.loc[fixed_frames(len(table)), "anees"]
-            ax.plot(at.index * seconds_a_frame, at, "o", color=COLOURS[name], markersize=3.5)
+            ax.plot(at.index * seconds_a_frame, at, "o", color=COLORS[name], markersize=3.5)
         ax.axhspan(table["low"].iloc[-1], table["high"].iloc[-1], color="#d7e8d9", zorder=0, label="95 % bounds")
         ax.axhline(6.0, color="#6b9a72", linewidth=0.9, zorder=0.5)
         ax.set_ylabel("mean NEES of the pose")

@@ -1,4 +1,4 @@
-"""How often the diagnosis is right, on simulated recordings whose faults are known: `python benchmarks/diagnosis.py`.
+"""Hit rate of the diagnosis on simulated recordings with known faults: `python benchmarks/diagnosis.py`.
 
 Seed k has the k-th of the 24 axis conventions for its angular velocity and another for its linear velocity, a bias and
 a delay of its own. The table is in docs/diagnosis.md.
@@ -39,7 +39,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Faults:
-    """What was done to a recording."""
+    """Faults that a recording was given."""
 
     angular: str
     linear: str
@@ -88,7 +88,7 @@ def hand_held(recording: Recording) -> dict[str, bool]:
 
 
 def car(recording: Recording) -> dict[str, bool]:
-    """Which axis of the linear velocity is forward, and that the others are not identifiable."""
+    """Finding that names the forward axis of the linear velocity; the others are not identifiable."""
     d, faults = faulty(recording)
     return {
         "axes of the angular velocity": d.angular.name == faults.angular,

@@ -1,4 +1,4 @@
-"""How fast the estimators are, one against another: `python benchmarks/estimators.py drive.npz --repeat 5`.
+"""Speed of the estimators relative to each other: `python benchmarks/estimators.py drive.npz --repeat 5`.
 
 The runs alternate, so that a machine that gets slower does so for all of them alike; what is compared is each one's
 fastest run, which other work on the machine disturbs least. A figure is worth as much as the machine was idle.
@@ -25,7 +25,7 @@ from fgbaseline.reports.run.problem import RunSettings, build_problem, check_est
 
 
 def seconds_taken(problem: Problem, name: str) -> float:
-    """Of one answer, by the clock on the wall. Raises ClickException where there is none."""
+    """Wall-clock time of one answer. Raises ClickException where there is none."""
     solve = find_estimator(name)
     start = time.perf_counter()
     estimate = solve(problem, None)

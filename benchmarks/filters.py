@@ -1,4 +1,4 @@
-"""How fast the filters are, as ratios: `python -m benchmarks.filters 03.npz --runs 5`.
+"""Speed of the filters, as ratios: `python -m benchmarks.filters 03.npz --runs 5`.
 
 The seconds are CPU time of this process with BLAS held to one thread, and every ratio is of two measurements that
 follow each other: other work on the machine slows both. The literal filter of tests/builders/dense_filter.py, which
@@ -28,7 +28,7 @@ from fgbaseline.data import Problem, Sequence
 from tests.builders.dense_filter import DenseFilter
 
 FEATURES = 1000
-"""of the documented filter where it is held against the literal one"""
+"""features of the documented filter where it is compared with the literal one"""
 DENSE_FRAMES = 2
 """on which each run times the literal filter"""
 

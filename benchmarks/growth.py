@@ -1,4 +1,4 @@
-"""How time and memory grow, `python -m benchmarks.growth`: with frames, features a frame and landmarks.
+"""Growth of time and memory with frames, features a frame and landmarks: `python -m benchmarks.growth`.
 
 Every estimator answers in a process of its own, after a small problem that has brought all imports. A size that would
 take it too long, going by the sizes before, is left out, and said to be.
@@ -33,7 +33,7 @@ LEAST_SECONDS, LEAST_MB = 0.02, 2.0
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """What is varied, the rest being held."""
+    """Quantity that is varied; the others are fixed."""
 
     name: str
     held: str
@@ -48,7 +48,7 @@ class Point:
     estimator: str
     size: float
     seconds: float | None
-    """of the processor; None where it was left out"""
+    """CPU time; None where it was left out"""
     megabytes: float | None
     """held at most, beyond what the process held before"""
     spent: float = 0.0
@@ -134,7 +134,7 @@ def _expected(before: Iterable[Point], size: float) -> float:
 
 
 def solve(name: str, place: str) -> dict[str, float]:
-    """What a process of its own does: one answer, after a small one; of batch, the time without iSAM2's run."""
+    """Work of a separate process: one answer, after a small one; of batch, the time without iSAM2's run."""
     estimator, given = find_estimator(name), {}
     problem = data.read_problem(place)
     estimator(posed(_drive(WARM_FRAMES, 20.0)), None)
@@ -182,7 +182,7 @@ def _table(axis: Axis, points: list[Point]) -> str:
 
 
 def exponents(line: list[Point]) -> Mapping[str, float]:
-    """Of time and memory along one line."""
+    """Exponents of time and memory along one line."""
     there = [(p.size, p.seconds, p.megabytes) for p in line if p.seconds is not None and p.megabytes is not None]
     sizes = [size for size, _, _ in there]
     return {

@@ -74,9 +74,7 @@ def _round(size: float) -> float:
 def _label(axes: Axes, ends: list[tuple[float, float, str, str]]) -> None:
     """The powers right of the lines' ends, pushed apart where they would lie on one another."""
     apart, last = 1.35, 0.0
-    for x, y, text, colour in sorted(ends, key=lambda end: end[1]):
+    for x, y, text, color in sorted(ends, key=lambda end: end[1]):
         place = max(y, last * apart)
         last = place
-        axes.annotate(
-            text, (x, place), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8, color=colour
-        )
+        axes.annotate(text, (x, place), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8, color=color)

@@ -1,4 +1,4 @@
-"""How well a ranking by held-out tracks agrees with the truth: `python benchmarks/held_out.py drive.mat ...`.
+"""Agreement of a ranking by held-out tracks with the truth: `python benchmarks/held_out.py drive.mat ...`.
 
 A fifth of the tracks is kept from diagnosis and estimators (seed 0), and the four paths are ranked by their errors on
 it. Beside that stand, against the truth, the relative error over 1 and 2 seconds and the error of the aligned path, and

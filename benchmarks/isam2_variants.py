@@ -1,4 +1,4 @@
-"""What was tried to make iSAM2 faster, and what it does to the answer: `python -m benchmarks.isam2_variants FILE...`.
+"""Variants of iSAM2 for speed, with their effect on the answer: `python -m benchmarks.isam2_variants FILE...`.
 
 Each variant solves the same problem in turn. Printed are processor time, the share of it in GTSAM's updates, and how
 far final and online paths are from those of the variant that relinearizes at every update.

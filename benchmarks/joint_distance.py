@@ -1,4 +1,4 @@
-"""How far the joint filter is from iSAM2, and what of it is what: `python benchmarks/joint_distance.py FILE...`.
+"""Distance of the joint filter from iSAM2, by its causes: `python benchmarks/joint_distance.py FILE...`.
 
 Each row changes one thing. `isam2-online` has the same data as a filter: the rest of the way to `isam2` is what only
 later frames add. iSAM2 that never moves a linearization point is a filter as far as linearization goes, on the very
@@ -44,7 +44,7 @@ class Step:
 
 
 def online(problem: Problem, settings: ISAM2Settings | None = None) -> tuple[Estimate, Estimate]:
-    """What iSAM2 knew online, and in the end."""
+    """Estimates of iSAM2 online and in the end."""
     final = smoother.isam2(problem, settings=settings)
     if final.status is Status.FAILED:
         raise click.ClickException(f"{problem.sequence.name}: isam2 failed: {final.reason}")

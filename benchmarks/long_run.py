@@ -32,7 +32,7 @@ def rows(frames: int = FRAMES) -> list[Row]:
 
 
 def run(frames: int) -> tuple[float, float]:
-    """What a process of its own does: MB that the run held at most, and MB of its page."""
+    """Work of a separate process: MB that the run held at most, and MB of its page."""
     with tempfile.TemporaryDirectory() as folder:
         recording, out = Path(folder) / "long.npz", Path(folder) / "out"
         drive = ("--path", "town", "--duration", str(frames / 10.0), "--features-per-frame", str(FEATURES))

@@ -1,4 +1,4 @@
-"""What a benchmark found of a claim: one row each, and the table of them."""
+"""Claims of a benchmark with their measured values, and their table."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ def row(
     least: float | None = None,
     most: float | None = None,
 ) -> Row:
-    """Of values over runs, whose median is to be at least or at most something."""
+    """Claim on the median of values over runs: at least or at most a bound."""
     middle = float(np.median(values))
     met = (
         None

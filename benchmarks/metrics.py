@@ -1,4 +1,4 @@
-"""How fast trajectory metrics are beside evo's, in one run: `python -m benchmarks.metrics --repeat 3`.
+"""Speed of trajectory metrics beside evo's, in one run: `python -m benchmarks.metrics --repeat 3`.
 
 Each row is one metric from arrays to its statistics, as a user of either library calls it. evo and this project take
 turns, so that a machine that gets slower does so for both; both have to give the same figures to 1e-9, or the row
@@ -33,7 +33,7 @@ from fgbaseline.compare import PoseRelation as Relation
 from fgbaseline.geometry import FloatArray, se3
 from tests.builders.evo_metrics import OF_MOTIONS, OF_POSES, UNITS
 
-DELTA = {Unit.FRAMES: 10, Unit.METRES: 10.0, Unit.DEGREES: 10.0}
+DELTA = {Unit.FRAMES: 10, Unit.METERS: 10.0, Unit.DEGREES: 10.0}
 
 
 @dataclass(frozen=True)

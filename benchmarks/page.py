@@ -1,4 +1,4 @@
-"""What a benchmark writes into a page of docs/: between its mark and the next end, the rest being written by hand."""
+"""Writes the output of a benchmark into a page of docs/, between its mark and the next end mark."""
 
 from collections.abc import Iterable
 from pathlib import Path

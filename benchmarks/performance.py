@@ -29,7 +29,7 @@ QUICK_DRIVE, QUICK_RUN = 600, 100
 
 
 def parts(recording: Path | None, runs: int, quick: bool) -> Iterator[tuple[str, Callable[[], list[Row]]]]:
-    """What is measured, one after another, and under which name."""
+    """Benchmarks, in order, by name."""
     drive, run = (QUICK_DRIVE, QUICK_RUN) if quick else (reference_speed.DRIVE_FRAMES, long_run.FRAMES)
     if recording is not None:
         yield "filters", lambda: filters.rows(recording, runs)
@@ -41,7 +41,7 @@ def parts(recording: Path | None, runs: int, quick: bool) -> Iterator[tuple[str,
 
 
 def machine() -> str:
-    """What it was measured on, in a sentence."""
+    """Machine and versions, in a sentence."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "gtsam"))
     return (
         f"Measured on {os.cpu_count()} cores of {_processor()}, {_memory()}, Python {platform.python_version()}, "

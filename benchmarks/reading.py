@@ -1,4 +1,4 @@
-"""How lean reading is, `python -m benchmarks.reading`: a file of the shape of 10.npz, read in a process of its own.
+"""Time and memory of reading a file of the shape of 10.npz, in a separate process: `python -m benchmarks.reading`.
 
 10.npz itself is at hand nowhere but at its course. What is written here has its shape, and tracks as long as its.
 """
@@ -50,7 +50,7 @@ def rows(runs: int) -> list[Row]:
 
 
 def read(path: str) -> dict[str, float]:
-    """What a process of its own does."""
+    """Work of a separate process."""
     import time
 
     start = time.perf_counter()
@@ -107,7 +107,7 @@ def _write(
 
 
 def _refused(path: Path) -> Row:
-    """Of a file whose header claims twice the memory of this machine."""
+    """Cost of refusing a file whose header claims twice the memory of this machine."""
     frames = 1000
     claimed = 2 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     landmarks = claimed // (4 * frames * 8)

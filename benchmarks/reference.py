@@ -1,4 +1,4 @@
-"""How near iSAM2 comes to batch, with and without the final relinearization: `python benchmarks/reference.py FILE...`.
+"""Distance of iSAM2 from batch, with and without the final relinearization: `python benchmarks/reference.py FILE...`.
 
 Costs are those of `compare.cost`, over the observations that batch used, so that they compare. Exits 1 where a limit
 is passed: 0.05 m between the paths, and a cost above batch's by 0.01 % without a kernel, by 0.5 % with one.
@@ -29,7 +29,7 @@ from fgbaseline.smoother import ISAM2Settings
 MAX_RMSE = 0.05
 """m"""
 MAX_EXCESS = {True: 5e-3, False: 1e-4}
-"""of the cost over batch's, with and without a kernel"""
+"""largest excess of the cost over batch's, as a share, with and without a kernel"""
 DRIVES = ("town", "loop", "highway", "handheld")
 
 
@@ -42,7 +42,7 @@ def recordings(files: tuple[Path, ...]) -> Iterator[Sequence]:
 
 
 def row(problem: Problem) -> tuple[list[str], bool]:
-    """What the three answers come to, and whether iSAM2 holds the limits before and after its relinearization."""
+    """Figures of the three answers, and whether iSAM2 holds the limits before and after its relinearization."""
     before = smoother.isam2(problem, settings=ISAM2Settings(relinearize_at_end=False))
     after = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": after})
@@ -65,12 +65,12 @@ def row(problem: Problem) -> tuple[list[str], bool]:
 
 
 def rmse(estimate: Estimate, batch: Estimate) -> float:
-    """Of position, m, without alignment."""
+    """RMSE of position, m, without alignment."""
     return compare.divergence_summary(compare.divergence(estimate, batch))["rmse"]
 
 
 def two_starts(batch: Estimate) -> str:
-    """What batch says of its two starts."""
+    """Event of batch on its two starts."""
     texts = {data.EventKind.SAME_COST: "same", data.EventKind.DIFFERENT_COSTS: "differ"}
     return next((texts[event.kind] for event in batch.events if event.kind in texts), "one only")
 

@@ -1,4 +1,4 @@
-"""How fast the reference is, `python -m benchmarks.reference_speed drive.npz`: and how much of that is GTSAM's own."""
+"""Speed of the reference, and the share of GTSAM in it: `python -m benchmarks.reference_speed drive.npz`."""
 
 # ruff: noqa: E402
 
@@ -34,7 +34,7 @@ FEATURES = 30.0
 
 
 def rows(recording: Path | None, runs: int, frames: int = DRIVE_FRAMES) -> list[Row]:
-    """What was asked of `isam2`: on a recording, where there is one, and on simulated drives, a new one each run."""
+    """Requirements on `isam2`: on a recording, where there is one, and on simulated drives, a new one each run."""
     return [*([] if recording is None else on_recording(recording, runs)), late_against_early(runs, frames)]
 
 
@@ -60,7 +60,7 @@ def on_recording(recording: Path, runs: int) -> list[Row]:
 
 
 def _shares(problem: Problem) -> tuple[float, float]:
-    """Of iSAM2's updates and estimates, and of GTSAM's other calls, in the processor time of a whole answer."""
+    """Shares of iSAM2's updates and estimates, and of GTSAM's other calls, in the CPU time of a whole answer."""
     with gtsam_timed() as spent:
         start = time.process_time()
         solved(problem)

@@ -29,8 +29,8 @@ def outcome(result: Result) -> str:
     if kind is Cell.FAILED:
         return f"failed: {result.estimate.reason}"
     off = sigmas(result)
-    metres = f"{error(result):.2g}" if error(result) < 100 else f"{error(result):.0f}"
-    figures = f"{metres} m, {off:.1f} σ" if off < 100 else f"{metres} m, {off:.0f} σ"
+    meters = f"{error(result):.2g}" if error(result) < 100 else f"{error(result):.0f}"
+    figures = f"{meters} m, {off:.1f} σ" if off < 100 else f"{meters} m, {off:.0f} σ"
     return f"**{figures}**" if kind is Cell.OVERCONFIDENT else figures
 
 

@@ -1,4 +1,4 @@
-"""What a run takes beside its estimators: `python -m benchmarks.rest_of_run drive.npz --runs 3`.
+"""Time of a run outside its estimators: `python -m benchmarks.rest_of_run drive.npz --runs 3`.
 
 Each run is a process of its own, so that imports count. What is wanted is asked of all that is not an estimator:
 imports, reading, posing (the diagnosis), comparison, figures, tables and page, in the order and with the forks of
@@ -94,7 +94,7 @@ def rest(taken: Mapping[str, float]) -> float:
 
 
 def rows(recording: Path, runs: int, estimators: str = ",".join(DEFAULT_ESTIMATORS)) -> list[Row]:
-    """What is wanted of all that is not an estimator, and each stage with its share of the whole."""
+    """Requirement on the part that is not an estimator, and the share of each stage in the whole."""
     every = measured(recording, runs, estimators)
     whole = statistics.median(sum(taken.values()) for taken in every)
     rests = [rest(taken) for taken in every]

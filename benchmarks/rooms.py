@@ -1,5 +1,5 @@
 """The folders whose packages are measured."""
 
 TOP = "package"
-"""of the package itself"""
+"""folder of the package itself"""
 ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports")

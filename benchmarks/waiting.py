@@ -1,4 +1,4 @@
-"""What people wait for, as ratios within one run: `python -m benchmarks.waiting --only compare-3000 --runs 9`.
+"""Waiting times of users, as ratios within one run: `python -m benchmarks.waiting --only compare-3000 --runs 9`.
 
 Two sides take turns, A B A B, so that a machine that gets slower does so for both; a ratio is of two neighbors. A side
 is a number of commands, one after another, in processes of their own. The peers are evo, `--help`, and revision
@@ -32,7 +32,7 @@ PLACE = Path("docs/performance.md")
 SHORT, MIDDLE, LONG = 600, 3000, 100_000
 """poses"""
 JOBS = 250
-"""of a bench: workers are busy with more of them in the same way"""
+"""jobs of a bench: workers are busy with more of them in the same way"""
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
 
 

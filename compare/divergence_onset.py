@@ -1,14 +1,13 @@
-"""Onset of divergence: the first frame at which an estimate leaves the reference, and the share of wrong matches
-there."""
+"""Onset of divergence: the first frame beyond a threshold from the reference, and suspected errors of tracks there."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fgbaseline.data import Problem
+from fgbaseline.data import Excluded, Problem
+from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem import WRONG_MATCH
-from fgbaseline.geometry import FloatArray
 
 if TYPE_CHECKING:
     from .estimate_comparison import Result, Run
@@ -30,7 +29,7 @@ class DivergenceOnset:
     beyond: float
     """share of the later frames with a pose that are beyond the threshold"""
     wrong: float | None
-    """share of the matches within `AROUND` that the mask excluded as wrong; None without a mask"""
+    """`wrong_share` within `AROUND`; None without a mask"""
 
 
 def divergence_threshold(result: "Result") -> float:
@@ -40,7 +39,7 @@ def divergence_threshold(result: "Result") -> float:
 
 def path_length(result: "Result") -> float:
     """Length of the reference's path, m."""
-    return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["travelled"].to_numpy()))
+    return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["traveled"].to_numpy()))
 
 
 def divergence_onset(run: "Run", result: "Result") -> DivergenceOnset | None:
@@ -58,24 +57,41 @@ def divergence_onset(run: "Run", result: "Result") -> DivergenceOnset | None:
     return DivergenceOnset(k, float(t[k] - t[0]), share, wrong_share(run.problem, near))
 
 
-def wrong_share(problem: Problem, frames: FloatArray | np.ndarray) -> float | None:
-    """Share of wrong matches, as excluded by the mask, in the chosen frames (T,); None without mask or match."""
+class MaskShare(NamedTuple):
+    """Observations of the chosen features, and how many of them the mask excluded, for whatever reason."""
+
+    observations: int
+    excluded: int
+
+
+def mask_share(problem: Problem) -> MaskShare:
+    """Counts of the mask over the observations of the chosen features."""
+    chosen = _chosen(problem)
+    return MaskShare(int(chosen.sum()), int((chosen & (problem.excluded != Excluded.NO)).sum()))
+
+
+def wrong_share(problem: Problem, frames: BoolArray) -> float | None:
+    """Share of the observations that the mask excluded as `WRONG_MATCH` in frames (T,); None where it excluded none.
+
+    All shares of this module are of the observations of the chosen features.
+    """
     wrong = np.isin(problem.excluded, WRONG_MATCH)
-    there = frames[problem.sequence.observations.frame]
+    there = frames[problem.sequence.observations.frame] & _chosen(problem)
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
 
 
-class WrongSecond(NamedTuple):
-    """One second of the recording, with its share of wrong matches."""
+class WorstSecond(NamedTuple):
+    """One second of the recording, with its share of observations excluded as `WRONG_MATCH`."""
 
     second: float
     """s from the first frame"""
     share: float
-    """share of its matches that the mask excluded as wrong"""
+    frame: int
+    """frame of this second with the most of them"""
 
 
-def worst_second(problem: Problem) -> WrongSecond | None:
-    """Second with the largest share of wrong matches (the first of equals); None without a mask or a match.
+def worst_second(problem: Problem) -> WorstSecond | None:
+    """Second with the largest share of suspected errors (the first of equals); None where the mask excluded none.
 
     Only seconds that contain a frame are visited, because stamps in wrong units may span billions of seconds.
     """
@@ -84,7 +100,14 @@ def worst_second(problem: Problem) -> WrongSecond | None:
         return None
     t, frame = problem.sequence.t, problem.sequence.observations.frame
     seconds, place = np.unique(np.floor(t - t[0]), return_inverse=True)
-    every = np.bincount(place[frame], minlength=len(seconds))
+    every = np.bincount(place[frame[_chosen(problem)]], minlength=len(seconds))
     share = np.bincount(place[frame[wrong]], minlength=len(seconds)) / np.maximum(every, 1)
     worst = int(np.argmax(share))
-    return WrongSecond(float(seconds[worst]), float(share[worst]))
+    by_frame = np.bincount(frame[wrong], minlength=len(t))
+    return WorstSecond(
+        float(seconds[worst]), float(share[worst]), int(np.argmax(np.where(place == worst, by_frame, -1)))
+    )
+
+
+def _chosen(problem: Problem) -> BoolArray:
+    return np.asarray(problem.excluded != Excluded.FEATURE_NOT_CHOSEN, dtype=np.bool_)

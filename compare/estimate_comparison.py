@@ -84,7 +84,7 @@ class InertialEvidence(Displayed):
     divergence: pd.DataFrame | None
     """from the reference; None for the reference itself"""
     nees: pd.DataFrame | None
-    """of the 15 and of each block: see `compare.state_nees`"""
+    """NEES of the 15 and of each block: see `compare.state_nees`"""
 
     @property
     def series(self) -> pd.DataFrame:
@@ -131,7 +131,7 @@ class Result(Displayed):
     divergence_common: CommonRmse | None = None
     """what ranks it: over the frames that all estimators have; None where it is not ranked"""
     ate_common: CommonRmse | None = None
-    """the same of `truth_aligned`"""
+    """RMSE of `truth_aligned` over the common frames"""
 
     @property
     def name(self) -> str:
@@ -166,7 +166,7 @@ class Run(Displayed):
     common: BoolArray | None
     """(n,) the observations that every estimator used which uses any"""
     settings: Mapping[str, object]
-    """of the user, for the record"""
+    """settings of the user, for the record"""
     held_out: HeldOutReport | None = None
     """None where no tracks were held out"""
     added: Mapping[str, str] = field(default_factory=dict)

@@ -1,4 +1,7 @@
-"""Trust in the reference: a verdict from its residuals and its agreement with a batch solution, never from truth."""
+"""Trust in the reference: a verdict by its residuals, its data and its agreement with a batch solution.
+
+Ground truth is never used.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +13,7 @@ import numpy as np
 from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import percent
+from fgbaseline.data.plural import distance, per_cent, plural
 from fgbaseline.geometry import disparity
 
 from .residuals.cost import cost
@@ -25,18 +28,21 @@ NOTABLE_INFLATION = 1.1
 """factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
 """share of observations without positive disparity above which it is reported"""
+SHARE = "share"
+"""unit of a part of a whole, which tables print in percent"""
 CRITERIA = {
     "pixel_scale": ("normalized pixel residual RMS", ""),
     "motion_scale": ("normalized motion residual RMS", ""),
-    "used_share": ("share of observations used", ""),
-    "weak_frames": ("share of weakly determined frames", ""),
-    "given_up_frames": ("share of frames without their observations", ""),
-    "impossible_share": ("share of observations without positive disparity", ""),
-    "untied_intervals": ("share of intervals without a common landmark", ""),
-    "batch_cost": ("cost above the batch solution, relative", ""),
+    "used_share": ("observations used, of those recorded that are not too far", SHARE),
+    "weak_frames": ("frames with too few used observations", SHARE),
+    "given_up_frames": ("frames whose observations were dropped", SHARE),
+    "impossible_share": ("observations without positive disparity", SHARE),
+    "untied_intervals": ("intervals without a landmark observed on both sides", SHARE),
+    "batch_cost": ("negative log-likelihood above that of the batch solution", SHARE),
     "batch_position": ("position RMSE from the batch solution", "baselines"),
 }
 """name and unit of each criterion, by the field of `TrustLimits` that has its limits"""
+BATCH_CRITERIA = ("batch_cost", "batch_position")
 AT_LEAST = frozenset({"used_share"})
 """criteria whose value must not fall below their limits"""
 
@@ -58,7 +64,7 @@ class Criterion:
     name: str
     value: float
     unit: str
-    """empty for ratios"""
+    """`SHARE`, `baselines`, or empty for a ratio"""
     doubtful: float
     """limit beyond which the reference is doubtful"""
     untrusted: float
@@ -67,7 +73,7 @@ class Criterion:
     """whether the value must not fall below its limits; else it must not exceed them"""
     verdict: Verdict
     remark: str = ""
-    """what the value rests on beside the reference; empty where nothing needs to be said"""
+    """circumstance without which the value is misread; empty where there is none"""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -90,16 +96,16 @@ class TrustLimits:
     """Limits of each finding: doubtful, untrusted."""
 
     pixel_scale: tuple[float, float] = (1.6, 3.0)
-    """estimated over modeled sigma of the pixel noise: see `pixel_scale`"""
+    """normalized pixel residual RMS: see `noise_scale.pixel_scale`"""
     motion_scale: tuple[float, float] = (1.4, 2.4)
-    """estimated over modeled sigma of the motion increments: see `motion_scale`"""
+    """normalized motion residual RMS: see `noise_scale.motion_scale`"""
     used_share: tuple[float, float] = (0.6, 0.3)
     """share of the `expected_observations` that were used"""
     weak_frames: tuple[float, float] = (0.05, 0.25)
     """share of frames with fewer than `weak_below` used observations"""
     weak_below: int = 6
     untied_intervals: tuple[float, float] = (0.25, 0.6)
-    """share of the intervals between frames across which no used landmark is tracked"""
+    """share of the intervals between frames that no used landmark is observed on both sides of"""
     given_up_frames: tuple[float, float] = (0.0, 0.05)
     """share of frames whose observations were dropped"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
@@ -113,9 +119,9 @@ class TrustLimits:
 def trust(
     problem: Problem, reference: Estimate, batch: Estimate | None = None, limits: TrustLimits | None = None
 ) -> Trust:
-    """Verdict on a reference from its whitened residuals, share of observations used, weak frames and `batch`.
+    """Verdict on a reference by up to nine criteria, each with its limits: see `CRITERIA` and `TrustLimits`.
 
-    Residuals are compared with the problem's own noise model: see `pixel_scale` and `motion_scale`.
+    Residuals are compared with the problem's own noise model. The two criteria on `batch` need a batch solution.
     """
     if reference.status is Status.FAILED:
         return Trust(Verdict.UNTRUSTED, (f"it failed: {reference.reason}",))
@@ -132,43 +138,48 @@ def trust(
     weak = float(np.mean(per_frame < limit.weak_below))
     lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
     given_up = len(lost) / problem.n_frames
-    robust = "" if problem.kernel is None else ", robust"
     inflated = inflation_remark(problem)
     expected = (
-        f"expected 1{robust}"
-        if not inflated
-        else f"{inflated}; {1.0 / problem.pixel_inflation:.2g} if independent from frame to frame"
+        f"{1.0 / problem.pixel_inflation:.2g} is expected for white track errors, because {inflated}"
+        if inflated
+        else "1 is expected"
     )
+    recorded = "recorded ones" if (problem.excluded != Excluded.FEATURE_NOT_CHOSEN).all() else "chosen tracks'"
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
-    intervals = problem.n_frames - 1
+    intervals = max(1, problem.n_frames - 1)
+    motion_data = "velocities" if problem.imu is None else "inertial samples"
     judged = [
         (
             _criterion(limit, "pixel_scale", pixel, inflated),
-            f"normalized pixel residual RMS {_figure(pixel)} ({expected})",
+            f"normalized pixel residual RMS {_figure(pixel)} (limit {limit.pixel_scale[0]:g}; {expected})",
         ),
         (
             _criterion(limit, "motion_scale", motion),
-            f"normalized motion residual RMS {_figure(motion)} (expected at most 1)",
+            f"normalized motion residual RMS {_figure(motion)} (limit {limit.motion_scale[0]:g}; up to 1 is expected)",
         ),
-        (_criterion(limit, "used_share", share), f"it used {percent(share)} of the observations, far points aside"),
+        (
+            _criterion(limit, "used_share", share),
+            f"it used {plural(n_used, 'observation')}: {per_cent(share)} of the {recorded} that are not too far, "
+            f"{per_cent(n_used / max(1, int(problem.mask.sum())))} of those that the mask leaves",
+        ),
         (
             _criterion(limit, "weak_frames", weak),
-            f"{percent(weak, 1)} of the frames have fewer than {limit.weak_below} observations",
+            f"{per_cent(weak)} of the frames have fewer than {limit.weak_below} used observations" if weak else "",
         ),
         (
             _criterion(limit, "given_up_frames", given_up),
-            f"the observations of {percent(given_up, 1)} of the frames were given up",
+            f"the observations of {per_cent(given_up)} of the frames were dropped" if given_up else "",
         ),
         (
             _criterion(limit, "impossible_share", impossible),
-            f"{percent(impossible)} of the observations have no positive disparity, which no point in view can have"
+            f"{per_cent(impossible)} of the observations have no positive disparity, though every point in view has one"
             if impossible > NOTABLE
             else "",
         ),
         (
-            _criterion(limit, "untied_intervals", untied / max(1, intervals)),
-            f"over {untied:,} of {intervals:,} intervals no landmark ties what lies on both sides: only the velocities "
-            "give the motion there, and a jump would not show"
+            _criterion(limit, "untied_intervals", untied / intervals),
+            f"{untied:,} of {plural(intervals, 'interval')} ({per_cent(untied / intervals)}) have no landmark observed "
+            f"on both sides; there only the {motion_data} constrain the motion, and a jump would go unnoticed"
             if untied
             else "",
         ),
@@ -187,7 +198,7 @@ def trust(
 
 
 def inflation_remark(problem: Problem) -> str:
-    """States the inflation of the pixel noise; empty where there is none to speak of."""
+    """Clause on the inflation of the pixel noise; empty below `NOTABLE_INFLATION`."""
     if problem.pixel_inflation < NOTABLE_INFLATION:
         return ""
     return f"the pixel sigma is inflated {problem.pixel_inflation:.2g} times for time-correlated track errors"
@@ -235,7 +246,7 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     if EventKind.ONE_START in kinds:
         return _BesideBatch(
             Verdict.DOUBTFUL,
-            "a batch solution was found from one start only: nothing says that it is the lowest",
+            "a batch solution was found from one start only: no second start confirms that it is the lowest minimum",
         )
     if batch is reference:
         return _BesideBatch(Verdict.TRUSTED, "it is the batch solution itself")
@@ -246,12 +257,12 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     baselines = rmse / problem.sequence.camera.unit_length
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
-    start = " started at isam2's answer" if EventKind.STARTED_AT_ISAM2 in kinds else ""
+    start = ", started at isam2's answer," if EventKind.STARTED_AT_ISAM2 in kinds else ""
     agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
     side = "above" if excess > 0.0 else "below"
-    cost_gap = f"{abs(excess):.2g} {side} it, relative" if abs(excess) >= RESOLUTION else "the same"
-    path_gap = f"{rmse:.2g} m (RMSE) away" if rmse >= RESOLUTION else "the same"
-    text = f"a batch solution{start} {agrees}: the cost is {cost_gap}, the path {path_gap}"
+    cost_gap = f"{per_cent(abs(excess))} {side} the batch's" if abs(excess) >= RESOLUTION else "the same"
+    path_gap = f"{distance(rmse)} (RMSE, {baselines:.2g} baselines) away" if rmse >= RESOLUTION else "the same"
+    text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the path {path_gap}"
     return _BesideBatch(verdict, text, criteria)
 
 

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 LINES = 5
-"""of a `repr`, its heading among them"""
+"""lines of a `repr`, its heading among them"""
 WIDTH = 120
 """characters of a line"""
 

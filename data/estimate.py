@@ -30,7 +30,7 @@ class Progress(Protocol):
 
 
 class Status(StrEnum):
-    """How an estimator ended."""
+    """Outcome of an estimator."""
 
     OK = "ok"
     RECOVERED = "recovered"
@@ -215,7 +215,7 @@ class Estimate(Displayed):
         return plot_path(self.world_T_imu[:, :3, 3], self.name, axes)
 
     def transformed(self, motion: FloatArray) -> "Estimate":
-        """The same answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
+        """Answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
         R, landmarks, P = motion[:3, :3], self.landmarks, self.state_covariance
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(

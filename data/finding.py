@@ -31,6 +31,17 @@ AS_GIVEN = "as given"
 """the certainty of a finding that the user states"""
 
 
+MEASURES = {
+    "rad/s": "median error of the angular velocity",
+    "m/s": "median error of the linear velocity",
+    "m/s^2": "acceleration",
+    "°": "misalignment",
+    "px": "disparity offset",
+    "s": "time offset",
+}
+"""quantity of a finding by its unit; other units name it themselves, such as `observations`"""
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """A fault of a recording."""
@@ -46,3 +57,8 @@ class Finding:
     unit: str
     certainty: str
     """a standard error, a log-likelihood ratio, or 'counted'"""
+
+    @property
+    def measure(self) -> str:
+        """Quantity of `before` and `after`."""
+        return MEASURES.get(self.unit, self.unit)

@@ -48,7 +48,7 @@ class ImuNoise:
 
 
 ASSUMED_NOISE = ImuNoise(1e-3, 1e-5, 2e-2, 1e-3)
-"""of a MEMS unit of medium grade, in vibration: stands in where a recording does not state its noise"""
+"""noise of a vibrating MEMS unit of medium grade, for recordings that do not state their noise"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

@@ -1,4 +1,12 @@
-"""Counts and shares in sentences: '1 frame', '1,009 frames', '98 %'."""
+"""Counts, shares, numbers and lengths in sentences: `1,009 frames`, `98.0 %`, `0.293 mm`."""
+
+from collections.abc import Iterable
+from math import isfinite, isinf
+
+DASH = "–"
+INFINITY = "∞"
+MINUS = "\N{MINUS SIGN}"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plural(n: int, one: str, many: str = "") -> str:
@@ -11,6 +19,50 @@ def noun(n: int, one: str, many: str = "") -> str:
     return one if n == 1 else many or f"{one}s"
 
 
-def percent(share: float, decimals: int = 0) -> str:
-    """A share of one in percent: '98 %'."""
-    return f"{100.0 * share:.{decimals}f} %"
+def listed(items: Iterable[str]) -> str:
+    """`a, b and c`."""
+    every = list(items)
+    return " and ".join([", ".join(every[:-1]), every[-1]] if len(every) > 1 else every)
+
+
+def vector(values: Iterable[float], digits: int) -> str:
+    """`(0.10, −0.20, 0.30)`."""
+    return f"({', '.join(f'{value:.{digits}f}' for value in values)})".replace("-", MINUS)
+
+
+def signed(value: float, digits: int) -> str:
+    """`+0.36` or `−0.90`."""
+    return f"{value:+.{digits}f}".replace("-", MINUS)
+
+
+def number(value: object) -> str:
+    """A number to three significant digits (whole from 1,000 on, counts in full), ∞, or a dash for None and NaN."""
+    if isinstance(value, float) and isinf(value):
+        return INFINITY if value > 0 else f"{MINUS}{INFINITY}"
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        return DASH
+    if isinstance(value, int):
+        return f"{value:,}".replace("-", MINUS)
+    size = abs(value)
+    if size == 0.0:
+        return "0"
+    if 1e-3 <= size < 999.5:
+        return f"{value:#.3g}".rstrip(".").replace("-", MINUS)
+    if 999.5 <= size < 1e6:
+        return number(round(value))
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", MINUS)
+
+
+def per_cent(share: float) -> str:
+    """A share of one in percent, `below 0.001 %` for a smaller one; a dash for NaN."""
+    if 0.0 < abs(share) < 1e-5:
+        return "below 0.001 %"
+    return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
+
+
+def distance(value: float) -> str:
+    """A length in meters with its unit, in mm below 1 cm; `below 0.01 mm` for one that only rounding makes."""
+    if abs(value) < 1e-5:
+        return "below 0.01 mm"
+    return f"{number(1e3 * value)} mm" if abs(value) < 0.01 else f"{number(value)} m"

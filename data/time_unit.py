@@ -56,7 +56,7 @@ SINGLE = 7
 SAMPLE_PERIODS = (5e-5, 0.2)
 """s between raw inertial samples"""
 COARSE = 0.02
-"""of the median interval: rounding from which on the intervals are noticeably wrong"""
+"""rounding, as a share of the median interval, from which on intervals are noticeably wrong"""
 
 
 def usual(interval: float) -> bool:

@@ -120,11 +120,11 @@ def check_trajectory(path: Trajectory) -> FloatArray:
     Raises InputError, naming pose and line, where a trajectory is not comparable.
     """
     t, poses = path.t, path.world_T_body
-    who = path.source or path.name
+    name = path.source or path.name
     if t.ndim != 1 or poses.shape != (len(t), 4, 4):
-        raise InputError(f"{who}: expected stamps (T,) and poses (T, 4, 4), got {t.shape} and {poses.shape}")
+        raise InputError(f"{name}: expected stamps (T,) and poses (T, 4, 4), got {t.shape} and {poses.shape}")
     if len(t) == 0:
-        raise InputError(f"{who}: a trajectory needs at least one pose, this one has none")
+        raise InputError(f"{name}: a trajectory needs at least one pose, this one has none")
     _require(np.isfinite(t), path, lambda i: f"its time stamp is {float(t[i])!r}; remove it or give it a time")
     rising = np.concatenate([[True], np.diff(t) > 0])
     _require(

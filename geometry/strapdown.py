@@ -35,7 +35,7 @@ BLOCKS = {
 SMALL = 1.0
 """rad, below which coefficients are taken from their series: the closed forms lose digits there"""
 _TERMS = 9
-"""of the series: enough for double precision"""
+"""terms of the series, enough for double precision"""
 _SERIES = np.array(
     [[1.0 / math.factorial(2 * k + m) for k in range(_TERMS)] for m in (1, 2, 3, 4)]
     + [[-2.0 * (k + 1) / math.factorial(2 * k + 2 + m) for k in range(_TERMS)] for m in (2, 3, 4)]

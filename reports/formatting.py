@@ -1,20 +1,17 @@
 """Numbers, counts and names as text: for sentences and tables, and made safe for LaTeX and Markdown."""
 
 import re
-from collections.abc import Iterable, Mapping
-from math import isfinite, isinf
+from collections.abc import Mapping
+from math import isfinite
 
-from fgbaseline.data.plural import plural
+from fgbaseline.data.plural import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
 
-DASH = "–"
-INFINITY = "∞"
-MINUS = "\N{MINUS SIGN}"
+__all__ = ["DASH", "INFINITY", "MINUS", "distance", "listed", "number", "per_cent"]
 NO_BREAK = "\N{NO-BREAK SPACE}"
 RESOLUTION = 1e-5
 """m and degrees, below which estimates of a run do not differ: `isam2` does not propagate smaller changes"""
 SMALLEST: Mapping[str, float] = {"m": RESOLUTION, "°": RESOLUTION, "%": 10.0 * RESOLUTION, "°/m": 0.1 * RESOLUTION}
 """by unit, what means something in a comparison of trajectories; rates are over 10 m of the path"""
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _TEX = {
     "\\": r"\textbackslash{}",
@@ -35,25 +32,6 @@ counted = plural
 """a count and its noun"""
 
 
-def number(value: object) -> str:
-    """A number to three significant digits (whole from 1,000 on, counts in full), ∞, or a dash for None and NaN."""
-    if isinstance(value, float) and isinf(value):
-        return INFINITY if value > 0 else f"{MINUS}{INFINITY}"
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        return DASH
-    if isinstance(value, int):
-        return f"{value:,}".replace("-", MINUS)
-    size = abs(value)
-    if size == 0.0:
-        return "0"
-    if 1e-3 <= size < 999.5:
-        return f"{value:#.3g}".rstrip(".").replace("-", MINUS)
-    if 999.5 <= size < 1e6:
-        return number(round(value))
-    mantissa, exponent = f"{value:.2e}".split("e")
-    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", MINUS)
-
-
 def interval(value: float, low: float, high: float) -> str:
     """`0.52 [0.41, 0.66]`, or the value alone where its interval is not finite."""
     return f"{number(value)} [{number(low)}, {number(high)}]" if isfinite(low) and isfinite(high) else number(value)
@@ -65,15 +43,11 @@ def resolution(of_files: Mapping[str, float], unit: str) -> float:
 
 
 def resolved(value: float, resolution: float) -> str:
-    """A number, or `0 ± 1 × 10⁻⁶` for one below the resolution of the files it comes from."""
-    return f"0 ± {number(resolution)}" if abs(value) < resolution else number(value)
-
-
-def per_cent(share: float) -> str:
-    """A share of one as per cent, `below 0.001 %` for a smaller one; a dash for NaN."""
-    if 0.0 < abs(share) < 1e-5:
-        return "below 0.001 %"
-    return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
+    """A number, or `< 1 × 10⁻⁵` for one below the resolution of what it comes from (`> −1 × 10⁻⁵` if negative)."""
+    if abs(value) >= resolution or value != value:
+        return number(value)
+    bound = number(resolution).replace(".00 ", " ")
+    return f"> {MINUS}{bound}" if value < 0.0 else f"< {bound}"
 
 
 def meters(value: float) -> str:
@@ -92,18 +66,12 @@ def pixels(value: float) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A finding's figure: a share as per cent, a physical unit beside the number, and none beside a count."""
+    """A finding's figure: a share in percent, a physical unit beside the number, and none beside a count."""
     if unit.startswith("share"):
         return per_cent(value)
     if unit in ("m/s", "rad/s", "°", "px", "s"):
         return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
     return number(int(value) if float(value).is_integer() else value)
-
-
-def listed(items: Iterable[str]) -> str:
-    """`a, b and c`."""
-    every = list(items)
-    return " and ".join([", ".join(every[:-1]), every[-1]] if len(every) > 1 else every)
 
 
 def tex(text: str) -> str:

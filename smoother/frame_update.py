@@ -1,12 +1,14 @@
 """Update of the factor graph by one frame, with recovery from an indeterminate system."""
 
-from collections.abc import Collection, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import gtsam
 
 from fgbaseline.data.estimate import Event, EventKind
+from fgbaseline.data.plural import plural
 from fgbaseline.geometry import FloatArray
 
 from .errors import IndeterminateSystemError, UnrecoverableError
@@ -14,6 +16,11 @@ from .initialization.landmark_initialization import NewLandmark
 
 MAX_ATTEMPTS = 20
 """Attempts to solve a frame with fewer landmarks before all its observations are dropped."""
+DROPPED: Mapping[str, tuple[str, str]] = {
+    EventKind.LANDMARK_DROPPED: ("landmark", "landmarks"),
+    EventKind.FRAME_WITHOUT_OBSERVATIONS: ("frame's observations", "frames' observations"),
+}
+"""what one event of a kind drops, and several"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,7 +31,7 @@ class FrameUpdate:
     initial_pose: FloatArray
     """(4, 4) world_T_imu, initial value"""
     initial_values: gtsam.Values
-    """of the frame's variables"""
+    """initial values of the frame's variables"""
     motion_factor: gtsam.NonlinearFactor
     """motion from the previous frame, or the prior of the first one"""
     new_landmarks: tuple[NewLandmark, ...]
@@ -82,9 +89,24 @@ def add_with_recovery(graph: IncrementalGraph, update: FrameUpdate) -> Recovery:
         text = f"the system stays indeterminate at frame {update.frame} even without its observations"
         raise UnrecoverableError(text) from error
     landmarks, events = _recovery(update.frame, dropped)
-    reason = "its observations left the system indeterminate and were given up"
+    reason = "its observations left the system indeterminate and were dropped"
     lost = Event(update.frame, EventKind.FRAME_WITHOUT_OBSERVATIONS, reason)
     return Recovery(landmarks | {entry.landmark for entry in update.new_landmarks}, (*events, lost))
+
+
+def recovery_reason(events: Iterable[Event]) -> str:
+    """Losses among the events of a run, as the reason of the status `recovered`; empty where there are none.
+
+    Landmarks that were never determined are no loss by themselves, and are counted only beside others.
+    """
+    count = Counter(event.kind for event in events)
+    never = count.pop(EventKind.LANDMARK_NEVER_DETERMINED, 0)
+    lost = [
+        f"{plural(n, *DROPPED[kind])} dropped" if kind in DROPPED else f"{kind} ({n:,})"
+        for kind, n in sorted(count.items())
+        if kind != EventKind.SOLVED_BY_QR
+    ]
+    return "; ".join([*lost, *([f"{never:,} more never determined"] if never else [])]) if lost else ""
 
 
 def _recovery(frame: int, dropped: Mapping[int, str]) -> Recovery:

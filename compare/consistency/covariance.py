@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray, se3
 HELD = 1e-11
 """m^2 or rad^2: a pose whose largest entry is not above it is held fixed and has no error"""
 ROUNDING = 1e-13
-"""of the smallest eigenvalue of a correlation matrix"""
+"""smallest eigenvalue of a correlation matrix that is not rounding"""
 SINCE_FIRST_SHARE = 0.5
 """share of the poses whose covariance has to grow from that of the first pose to be one of the motion since it"""
 

@@ -14,9 +14,9 @@ from .covariance import CovarianceState, covariance_state, is_positive_definite
 from .nees import body_error
 
 NEGLIGIBLE = 1e-6
-"""of the filter's own variance: below it the difference has no variance in a direction"""
+"""share of the filter's own variance, below which the difference has no variance in a direction"""
 SMALLER = 0.1
-"""of the filter's own variance: by so much the reference's must exceed it in a direction of an overconfident pose"""
+"""share of the filter's variance, by which the reference's must exceed it in a direction of an overconfident pose"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

@@ -14,15 +14,15 @@ from ..residuals.whitening import evaluated_rows
 from ..statistics.chi_square import p_value
 
 MIN_OBSERVATIONS = 4
-"""of a track: point and velocity have six degrees of freedom"""
+"""observations of a track: point and velocity have six degrees of freedom"""
 SIGNIFICANCE = 0.01
 """family-wise probability of a false positive over all tracks (Bonferroni)"""
 EXPLAINED = 0.5
 """share of the squared residuals that the velocity must explain"""
 ITERATIONS = 8
-"""of Gauss-Newton; a step that increases a track's cost is rejected and shortened"""
+"""iterations of Gauss-Newton; a step that increases a track's cost is rejected and shortened"""
 CONVERGED, CONVERGED_STATIC = 1e-16, 1e-6
-"""of a track's cost: predicted decrease at convergence; the latter for tracks that a static point already explains"""
+"""predicted decrease of a track's cost at convergence, as a share; the latter for tracks of a static point"""
 UNOBSERVABLE = 1e-9
 """share of the largest eigenvalue of a track's scaled normal equations, below which a direction is unobservable"""
 SYMMETRIC, PULL = [0, 1, 2, 4, 5, 7], [3, 6, 8]

@@ -21,6 +21,8 @@ class RmseDifference:
     high: float
     block: int
     """block length, in moments"""
+    blocks: float
+    """number of blocks that fit into the series"""
     reliable: bool
     """whether at least `MIN_BLOCKS` blocks fit and the correlation of the difference ends within the series"""
 
@@ -52,19 +54,19 @@ def rmse_difference(
     squares = squares[~np.isnan(squares).any(axis=1)]
     n = len(squares)
     if n == 0:
-        return RmseDifference(np.nan, np.nan, np.nan, 1, False)
+        return RmseDifference(np.nan, np.nan, np.nan, 1, 0.0, False)
     infinite = np.isinf(squares)
     if infinite.any():
         first, second = np.sqrt(squares.mean(axis=0))
         value = float("nan") if infinite.any(axis=0).all() else float(first - second)
-        return RmseDifference(value, np.nan, np.nan, 1, False)
+        return RmseDifference(value, np.nan, np.nan, 1, float(n), False)
     found = block_length(squares[:, 0] - squares[:, 1])
     block = max(found.length, -(-n // MAX_BLOCKS))
     drawn = np.sqrt(draw_blocks(n, block, repetitions, seed).sums(squares) / n)
     low, high = percentile_interval(drawn[:, :1] - drawn[:, 1:], confidence)[:, 0]
     first, second = np.sqrt(squares.mean(axis=0))
     reliable = n / block >= MIN_BLOCKS and found.correlation_ends
-    return RmseDifference(float(first - second), float(low), float(high), block, reliable)
+    return RmseDifference(float(first - second), float(low), float(high), block, n / block, reliable)
 
 
 @dataclass(frozen=True, slots=True)

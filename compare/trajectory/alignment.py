@@ -140,8 +140,8 @@ def _fitted(
     n: int,
 ) -> Alignment:
     there, here = np.ascontiguousarray(there), np.ascontiguousarray(here)
-    centre, goal = there.mean(axis=0), here.mean(axis=0)
-    x, y = there - centre, here - goal
+    center, goal = there.mean(axis=0), here.mean(axis=0)
+    x, y = there - center, here - goal
     M = y.T @ x
     # Rounding of a square that should be zero: positions far from the origin keep fewer digits.
     rounding = 8 * np.finfo(np.float64).eps * (np.abs(there).max() + np.abs(here).max()) * len(x)
@@ -158,7 +158,7 @@ def _fitted(
         scale = along / spread
     elif kind is Align.SIM3:
         free = (*free, SCALE)
-    return Alignment(kind, R, goal - scale * R @ centre, scale, len(x), n, free)
+    return Alignment(kind, R, goal - scale * R @ center, scale, len(x), n, free)
 
 
 def _free_rotation(axis: FloatArray | None) -> tuple[str, ...]:

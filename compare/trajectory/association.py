@@ -214,8 +214,8 @@ def interpolated(path: Trajectory, t: FloatArray) -> Trajectory:
 
 
 RANKABLE_SHARE = 0.1
-"""of the longest estimate's stamps: an estimate with fewer is not ranked, since it would reduce the common stamps of
-the others to its own"""
+"""share of the longest estimate's stamps: an estimate with fewer is not ranked, since it would reduce the common
+stamps of the others to its own"""
 
 
 def rankable(counts: Mapping[str, int]) -> list[str]:

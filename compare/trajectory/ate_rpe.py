@@ -115,7 +115,7 @@ MOTION_COLUMNS = (
 
 
 class Pairing(TypedDict, total=False):
-    """How pairs of poses are chosen: see `matched_pairs`."""
+    """Choice of pairs of poses: see `matched_pairs`."""
 
     all_pairs: bool
     """False by default: consecutive pairs, end to end"""
@@ -137,13 +137,13 @@ def relative_error_columns(
 ) -> Columns:
     """RPE: one row per pair of poses that are `delta` apart (see `matched_pairs`), with the columns
 
-    `start`, `end` (indices of the matched poses), `t` (s, of the start), `seconds` and `metres` (of the reference's
+    `start`, `end` (indices of the matched poses), `t` (s, of the start), `seconds` and `meters` (of the reference's
     path) between them, and `PoseRelation` of the motion from start to end: `translation` (m, in the frame
     of the starting body), `rotation_deg`, `rotation_chord`, `pose`, `distance` (m) and `distance_percent`.
     """
     reference, estimate = matched.reference, matched.estimate
     pairs = matched_pairs(matched, delta, unit, **pairing)
-    travelled = distance_traveled(reference.position)
+    traveled = distance_traveled(reference.position)
     start, end = pairs[:, 0], pairs[:, 1]
     columns = {
         what.value: relative_pose_error(estimate.world_T_body, reference.world_T_body, pairs, what)
@@ -154,7 +154,7 @@ def relative_error_columns(
         "end": end,
         "t": reference.t[start],
         "seconds": reference.t[end] - reference.t[start],
-        "metres": travelled[end] - travelled[start],
+        "meters": traveled[end] - traveled[start],
         **columns,
     }
 

@@ -10,9 +10,9 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .path import distance_traveled
 
 ROUNDING = 1e-9
-"""of a delta: slack for steps that add up to it exactly but for rounding"""
+"""share of a delta: slack for steps that add up to it exactly but for rounding"""
 TOLERANCE = 0.1
-"""of a delta: largest deviation for all pairs"""
+"""largest deviation from a delta for all pairs, as a share"""
 AT_ONCE = 4_000_000
 """pairs per batch, to bound the memory"""
 
@@ -22,7 +22,7 @@ class Unit(StrEnum):
 
     FRAMES = "frames"
     SECONDS = "s"
-    METRES = "m"
+    METERS = "m"
     DEGREES = "deg"
 
 
@@ -107,7 +107,7 @@ def _coordinate(poses: FloatArray, t: FloatArray, unit: Unit) -> FloatArray:
         return np.arange(len(poses), dtype=np.float64)
     if unit is Unit.SECONDS:
         return np.asarray(t - t[0])
-    if unit is Unit.METRES:
+    if unit is Unit.METERS:
         return distance_traveled(poses[:, :3, 3])
     turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
     return np.asarray(np.rad2deg(np.concatenate([[0.0], np.cumsum(so3.rotation_angle(turns))])))

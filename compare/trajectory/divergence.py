@@ -63,7 +63,7 @@ def pose_error_columns(poses: FloatArray, reference: FloatArray, up: ArrayLike) 
 
     `position` |p - p_ref|, m; its components `along` track, `across` track (left positive) and `up`, m, of the
     reference's horizontal direction of travel; `rotation_deg` the angle of R_ref^T R and `heading_deg` its part about
-    `up` (left positive); `travelled` the length of the reference's path so far, m. NaN where either pose is.
+    `up` (left positive); `traveled` the length of the reference's path so far, m. NaN where either pose is.
     """
     if poses.shape != reference.shape:
         raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
@@ -81,7 +81,7 @@ def pose_error_columns(poses: FloatArray, reference: FloatArray, up: ArrayLike) 
         "up": difference @ upward,
         "rotation_deg": angle,
         "heading_deg": heading,
-        "travelled": distance_traveled(reference[:, :3, 3]),
+        "traveled": distance_traveled(reference[:, :3, 3]),
     }
 
 
@@ -110,27 +110,27 @@ def departure_columns(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1
     for growth from a common start use `none` or `first-pose`.
     """
     columns = pose_error_columns(matched.estimate.world_T_body, matched.reference.world_T_body, up)
-    moved = np.where(columns["travelled"] > 0, columns["travelled"], np.nan)
+    moved = np.where(columns["traveled"] > 0, columns["traveled"], np.nan)
     return {**columns, "t": matched.reference.t, "percent_of_path": 100.0 * columns["position"] / moved}
 
 
 def divergence_growth(table: "pd.DataFrame", parts: int = PARTS) -> "pd.DataFrame":
     """Growth of the error over `parts` pieces of the path of equal length, from a `divergence_along_path` table.
 
-    One row per piece: `from_m`, `to_m`, `frames`, `rmse` of the position error (m), its growth `per_metre` (m/m) and
+    One row per piece: `from_m`, `to_m`, `frames`, `rmse` of the position error (m), its growth `per_meter` (m/m) and
     `per_frame` (m) from the piece's first pose to the next one's, `heading_deg` at its end. NaN for a piece without
     a pose. Raises InputError where the reference does not move.
     """
-    travelled = table["travelled"].to_numpy()
-    if parts < 1 or not travelled[-1] > 0:
+    traveled = table["traveled"].to_numpy()
+    if parts < 1 or not traveled[-1] > 0:
         raise InputError("growth: a path that stands still cannot be split by length, nor one into fewer than 1 part")
-    edges = np.linspace(0.0, travelled[-1], parts + 1)
-    first = np.searchsorted(travelled, edges[:-1], side="left")
-    last = np.append(first[1:], len(travelled) - 1)
+    edges = np.linspace(0.0, traveled[-1], parts + 1)
+    first = np.searchsorted(traveled, edges[:-1], side="left")
+    last = np.append(first[1:], len(traveled) - 1)
     position = table["position"].to_numpy()
     frames = last - first
     frames[-1] += 1
-    end = np.append(first[1:], len(travelled))
+    end = np.append(first[1:], len(traveled))
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = position[last] - position[first]
         return to_frame(
@@ -139,7 +139,7 @@ def divergence_growth(table: "pd.DataFrame", parts: int = PARTS) -> "pd.DataFram
                 "to_m": edges[1:],
                 "frames": frames,
                 "rmse": np.array([summarized(position[a:b])["rmse"] for a, b in zip(first, end, strict=True)]),
-                "per_metre": grown / (travelled[last] - travelled[first]),
+                "per_meter": grown / (traveled[last] - traveled[first]),
                 "per_frame": grown / (last - first),
                 "heading_deg": table["heading_deg"].to_numpy()[last],
             },
@@ -154,16 +154,16 @@ class Exceedance:
     frame: int
     t: float
     """s"""
-    travelled: float
+    traveled: float
     """m"""
     value: float
 
 
 def first_exceedance(table: "pd.DataFrame | Columns", bound: float, column: str = "position") -> Exceedance | None:
     """First row of a `divergence_along_path` table, or of its columns, where |column| is above a bound."""
-    values, t, travelled = (np.asarray(table[name]) for name in (column, "t", "travelled"))
+    values, t, traveled = (np.asarray(table[name]) for name in (column, "t", "traveled"))
     beyond = np.flatnonzero(np.abs(values) > bound)
     if len(beyond) == 0:
         return None
     k = int(beyond[0])
-    return Exceedance(k, float(t[k]), float(travelled[k]), float(values[k]))
+    return Exceedance(k, float(t[k]), float(traveled[k]), float(values[k]))

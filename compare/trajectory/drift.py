@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHARE = 0.1
-"""of the path and of its duration: the default interval of drift, or one step where that is longer"""
+"""share of the path and of its duration: the default interval of drift, or one step where that is longer"""
 TOLERANCE = 0.5
-"""of the requested interval: largest deviation of a stretch, since rates divide by the stretch's own length"""
+"""largest deviation of a stretch from the requested interval, as a share; rates divide by the stretch's own length"""
 
 
 class Rate(NamedTuple):
@@ -39,7 +39,7 @@ class Rate(NamedTuple):
 
 def drift(
     matched: MatchedTrajectories,
-    metres: float | None = None,
+    meters: float | None = None,
     seconds: float | None = None,
     *,
     confidence: float = CONFIDENCE,
@@ -49,39 +49,39 @@ def drift(
     """Table of `drift_rates`: one row per rate, indexed by `quantity`."""
     import pandas as pd
 
-    rates = drift_rates(matched, metres, seconds, confidence=confidence, repetitions=repetitions, seed=seed)
+    rates = drift_rates(matched, meters, seconds, confidence=confidence, repetitions=repetitions, seed=seed)
     return pd.DataFrame(list(rates.values()), index=pd.Index(rates, name="quantity"), columns=list(Rate._fields))
 
 
 def drift_rates(
     matched: MatchedTrajectories,
-    metres: float | None = None,
+    meters: float | None = None,
     seconds: float | None = None,
     *,
     confidence: float = CONFIDENCE,
     repetitions: int = REPETITIONS,
     seed: int = 0,
 ) -> Mapping[str, Rate]:
-    """Mean error of the motion over `metres` of the reference's path, per meter, and over `seconds`, per second.
+    """Mean error of the motion over `meters` of the reference's path, per meter, and over `seconds`, per second.
 
     By quantity: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over` and the number `n` of
     overlapping stretches, each from a pose to the later one nearest to that interval.
-    Quantities: translation and rotation per metre (%, deg/m) and per second (m/s, deg/s; left out without
+    Quantities: translation and rotation per meter (%, deg/m) and per second (m/s, deg/s; left out without
     stamps), each divided by the stretch's own length; `end translation` (%) and `end rotation` (deg/m): the
     error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
     does not move or no stretch has the requested length.
     """
     reference = matched.reference
-    travelled = distance_traveled(reference.position)
-    path = float(travelled[-1])
+    traveled = distance_traveled(reference.position)
+    path = float(traveled[-1])
     if len(reference) < 2 or path == 0.0:
-        raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per metre")
-    metres = _default(travelled) if metres is None else metres
-    pairs = _stretches(travelled, metres, "m")
-    over = travelled[pairs[:, 1]] - travelled[pairs[:, 0]]
+        raise InputError(f"{reference.source or reference.name}: it stands still, so it has no drift per meter")
+    meters = _default(traveled) if meters is None else meters
+    pairs = _stretches(traveled, meters, "m")
+    over = traveled[pairs[:, 1]] - traveled[pairs[:, 0]]
     rates = [
-        ("translation", "%", 100.0, PoseRelation.TRANSLATION, pairs, over, f"{metres:.4g} m"),
-        ("rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{metres:.4g} m"),
+        ("translation", "%", 100.0, PoseRelation.TRANSLATION, pairs, over, f"{meters:.4g} m"),
+        ("rotation", "deg/m", 1.0, PoseRelation.ROTATION_DEG, pairs, over, f"{meters:.4g} m"),
     ]
     if seconds is not None:
         require_stamps(matched)

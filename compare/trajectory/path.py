@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 STANDING = 0.1
-"""of the 90th percentile of step lengths: below it the direction of a step is noise, and the last direction is kept"""
+"""share of the 90th percentile of step lengths, below which the direction of a step is noise: the last one is kept"""
 
 
 def distance_traveled(positions: FloatArray) -> FloatArray:

@@ -101,18 +101,18 @@ def segment_errors(
     does not move.
     """
     reference, estimate = matched.reference, matched.estimate
-    travelled = distance_traveled(reference.position)
-    fits = travelled[-1] > OFFICIAL_LENGTHS[0]
+    traveled = distance_traveled(reference.position)
+    fits = traveled[-1] > OFFICIAL_LENGTHS[0]
     if lengths is None:
-        lengths = tuple(map(float, OFFICIAL_LENGTHS)) if fits else fitted_lengths(float(travelled[-1]))
+        lengths = tuple(map(float, OFFICIAL_LENGTHS)) if fits else fitted_lengths(float(traveled[-1]))
         step = step or (OFFICIAL_STEP if fits else 1)
     step = step or OFFICIAL_STEP
     official = step == OFFICIAL_STEP and tuple(lengths) == OFFICIAL_LENGTHS
-    pairs, length = _segments(travelled, np.asarray(lengths, dtype=np.float64), step)
+    pairs, length = _segments(traveled, np.asarray(lengths, dtype=np.float64), step)
     if len(pairs) == 0:
         raise InputError(
             f"{reference.source or reference.name}: no segment of {min(lengths):g} m or more fits into its path of "
-            f"{travelled[-1]:.3g} m; give shorter lengths"
+            f"{traveled[-1]:.3g} m; give shorter lengths"
         )
     poses, truth = estimate.world_T_body, reference.world_T_body
     seconds = reference.t[pairs[:, 1]] - reference.t[pairs[:, 0]]
@@ -137,10 +137,10 @@ def fitted_lengths(path: float) -> tuple[float, ...]:
     return tuple(unit * k for k in range(1, 9))
 
 
-def _segments(travelled: FloatArray, lengths: FloatArray, step: int) -> tuple[IntArray, FloatArray]:
+def _segments(traveled: FloatArray, lengths: FloatArray, step: int) -> tuple[IntArray, FloatArray]:
     """First and last pose (m, 2) of each segment, by start, then length, and its length (m,), m."""
-    start = np.repeat(np.arange(0, len(travelled), step), len(lengths))
+    start = np.repeat(np.arange(0, len(traveled), step), len(lengths))
     length = np.tile(lengths, len(start) // len(lengths))
-    end = np.searchsorted(travelled, travelled[start] + length, side="right")
-    whole = end < len(travelled)
+    end = np.searchsorted(traveled, traveled[start] + length, side="right")
+    whole = end < len(traveled)
     return np.stack([start[whole], end[whole]], axis=1), length[whole]

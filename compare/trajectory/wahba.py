@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, so3
 
 UNDETERMINED = 1e-12
-"""of the largest singular value: below it a direction is rounding"""
+"""share of the largest singular value, below which a direction is rounding"""
 
 
 def solve_wahba(M: FloatArray, tie: Callable[[], FloatArray], floor: float) -> tuple[FloatArray, FloatArray | None]:

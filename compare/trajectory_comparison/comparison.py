@@ -39,7 +39,7 @@ class Result(Displayed):
     absolute: Columns
     """see `compare.absolute_errors`"""
     departure: Columns
-    """see `compare.divergence_along_path`: along, across, up and heading over the distance travelled"""
+    """see `compare.divergence_along_path`: along, across, up and heading over the distance traveled"""
     relative: dict[str, Columns]
     """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
     segments: SegmentErrors | None
@@ -52,7 +52,7 @@ class Result(Displayed):
     passing: Exceedance | None
     """first pose whose position is farther off than `bound`"""
     statistics: dict[str, ErrorStatistics]
-    """of the absolute errors `translation`, `rotation_deg` and `pose`"""
+    """statistics of the absolute errors `translation`, `rotation_deg` and `pose`"""
     relative_statistics: dict[str, dict[str, ErrorStatistics]]
     """statistics by delta, then `translation` and `rotation_deg`"""
     reported_covariance: "ReportedCovariance | None"

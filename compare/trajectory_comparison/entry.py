@@ -26,7 +26,7 @@ class Entry(Displayed):
     remarks: tuple[str, ...] = ()
     """findings on its file: each completes a sentence that begins with its name"""
     trust: "Trust | None" = None
-    """of a run's reference; None for files"""
+    """trust in a run's reference; None for files"""
     by_product: bool = False
     """whether it is a by-product of the reference (isam2-online), near to it by construction"""
 

@@ -148,7 +148,7 @@ def _compared(
         absolute |= dict.fromkeys(("rotation_deg", "rotation_chord", "pose"), unknown)
         departure |= dict.fromkeys(("rotation_deg", "heading_deg"), unknown)
         notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
-    bound = min(FAR, FAR_SHARE * float(departure["travelled"][-1])) or FAR
+    bound = min(FAR, FAR_SHARE * float(departure["traveled"][-1])) or FAR
     relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
     positions = matched.reference.position, entry.trajectory.position

@@ -170,7 +170,7 @@ def _is_last_row(words: list[str]) -> bool:
 
 
 def _behind_an_index(columns: Columns) -> Columns:
-    """The same columns, one further to the right."""
+    """Columns one further to the right."""
 
     def moved(places: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(place + 1 for place in places)

@@ -36,7 +36,7 @@ CHUNK = 2**19
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """How the flat entries of a block lie: `frames_first` when neighbors are the same landmark in the next frame."""
+    """Order of the flat entries of a block: `frames_first` when neighbors are the same landmark in the next frame."""
 
     key: str
     n_frames: int

@@ -11,7 +11,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
-from ..plural import percent
+from ..plural import per_cent
 from ..sequence import Truth
 from ..time_unit import COARSE, lost_digits
 from .fields import finite_stamps
@@ -45,7 +45,7 @@ class FrameStamps(NamedTuple):
         return Observations(number[o.frame[chosen]], o.landmark[chosen], o.pixel[chosen])
 
     def truth(self, truth: Truth | None) -> Truth | None:
-        """That of the kept frames."""
+        """Stamps of the kept frames."""
         return truth if truth is None else truth.of_frames(self.kept)
 
 
@@ -111,7 +111,7 @@ def _repeats(key: str, frames: IntArray) -> list[Finding]:
 
 
 def _rounding(key: str, t: FloatArray) -> list[Finding]:
-    """Of stamps whose intervals scatter because the stamps were rounded or cut off."""
+    """Finding on stamps whose intervals scatter because the stamps were rounded or cut off."""
     dt = np.diff(t)
     usual = float(np.median(dt))
     beats = dt / dt.min()
@@ -121,8 +121,8 @@ def _rounding(key: str, t: FloatArray) -> list[Finding]:
     if step < COARSE * usual:
         return []
     text = (
-        f"{key}: the stamps are multiples of {step:g}, {percent(step / usual)} of the median interval ({usual:g}){why}:"
-        " every interval, and with it every motion, is wrong by up to as much."
+        f"{key}: the stamps are multiples of {step:g}, {per_cent(step / usual)} of the median interval ({usual:g}){why}"
+        ": every interval, and with it every motion, is wrong by up to as much."
     )
     return [Finding("stamps_rounded", text, step / usual, step / usual, "share of the interval", "counted")]
 

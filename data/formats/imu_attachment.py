@@ -8,7 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, Observations
-from ..plural import percent, plural
+from ..plural import per_cent, plural
 from ..sequence import Sequence
 from .imu_csv import read_imu_csv
 from .imu_samples import RawSamples
@@ -17,7 +17,7 @@ from .named_file import FilePath
 
 MIN_FRAMES = 2
 FACTORS = (1.0, 1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9)
-"""of the stamps of samples in another unit than those of the frames"""
+"""factors for stamps of samples in another unit than those of the frames"""
 LONGEST_PERIOD, USUAL_PERIOD = 1.5, 0.5
 """intervals between frames: samples in the unit of the frames, and in another unit, have at most this period"""
 COVERED = 0.5
@@ -50,7 +50,7 @@ def attach_imu(sequence: Sequence, raw: RawSamples, source: str, *, velocities: 
     remarks, findings = [*sequence.remarks, *raw.remarks], [*sequence.findings, *raw.findings]
     if factor != 1.0:
         text = f"The stamps of samples are in another unit than those of the frames: multiplied by {factor:g}."
-        certainty = f"so multiplied they cover {percent(inside.mean())} of the frames"
+        certainty = f"so multiplied they cover {per_cent(float(inside.mean()))} of the frames"
         findings.append(Finding("imu_time_unit", text, 1.0 / factor, 1.0, "recorded over true", certainty))
     if velocities:
         remarks.append(f"The velocities of the recording are ignored: the motion is from the samples of {source}.")
@@ -77,7 +77,7 @@ def _inside(t: FloatArray, samples: FloatArray) -> BoolArray:
 
 
 def _unit_factor(t: FloatArray, samples: FloatArray) -> float:
-    """What brings the stamps of samples (M,) to the unit of frames (T,): 1, unless only another unit fits them."""
+    """Factor from the stamps of samples (M,) to the unit of frames (T,): 1, unless only another unit fits them."""
     if len(t) < MIN_FRAMES:
         return 1.0
     period = float(np.median(np.diff(samples)) / np.median(np.diff(t)))

@@ -22,7 +22,7 @@ UNIT = re.compile(r"[\[(]([^\])]*)[\])]")
 EUROC = tuple(range(7))
 """places of stamp, angular velocity and specific force where no header names them"""
 FACTORS = dict.fromkeys(("deg", "degree", "degrees", "dps", "°"), np.pi / 180.0) | {"g": 9.80665, "mg": 9.80665e-3}
-"""of units that a header may name, by their first word"""
+"""factors of the units that a header may name, by their first word"""
 
 
 def read_imu_csv(path: FilePath, noise: ImuNoise, gravity: float) -> RawSamples:

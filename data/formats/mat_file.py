@@ -46,7 +46,7 @@ class _Slice:
 
 
 class _Inflated:
-    """What compressed bytes unpack to; its end is reached only if the checksum holds."""
+    """Unpacked bytes; their end is reached only if the checksum holds."""
 
     def __init__(self, packed: Readable) -> None:
         self._packed, self._zlib = packed, zlib.decompressobj()

@@ -26,7 +26,7 @@ GZIP = b"\x1f\x8b"
 AT_ONCE = 10_000
 """lines that are split at a time"""
 MOST_BYTES = 2**30
-"""of a file once unpacked"""
+"""limit on a file, unpacked"""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 WINDOWS_NAN = re.compile(r"nan\([a-z]*\)", re.IGNORECASE)
@@ -256,7 +256,7 @@ def _encoding(content: bytes) -> str:
 
 
 def _separator(text: str, number: int) -> str | None:
-    """What stands between the numbers of a line. Raises InputError for decimal commas."""
+    """Separator of the numbers of a line. Raises InputError for decimal commas."""
     if ";" in text:
         words, found = text.split(";"), ";"
     elif "\t" in text:

@@ -17,7 +17,7 @@ from .quaternion_order import xyzw
 from .stamps import Stamps, no_unit
 
 STRAIGHT = 1e-3
-"""of a path's extent: one that leaves a straight line by less does not bend"""
+"""share of a path's extent: one that leaves a straight line by less does not bend"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

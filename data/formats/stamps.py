@@ -18,7 +18,7 @@ CERTAIN_BELOW = 5.0
 EPOCH_INTERVAL = 1e3
 """s between two poses at most, where the size of stamps alone shows that they count from 1970"""
 REPEATED = 0.1
-"""of the stamps: with more repeats than that, between poses that differ, the stamps have lost digits"""
+"""share of repeated stamps between poses that differ, above which the stamps have lost digits"""
 SYMBOL = 56
 """bits of a GTSAM key below its letter"""
 
@@ -30,7 +30,7 @@ class Stamps:
     value: FloatArray
     """(n,)"""
     whole: tuple[int, ...] | None
-    """the same, exactly, where all of them are whole numbers"""
+    """exact values, where all of them are whole numbers"""
     unit: TimeUnit | None
     """where the header has it"""
     words: Sequence[str] = ()

@@ -14,7 +14,7 @@ from ..display import Displayed
 from ..finding import Finding
 from ..frames import plot_over_time
 from ..observations import BoolArray, IntArray, Observations
-from ..plural import percent, plural
+from ..plural import per_cent, plural
 from ..sequence import Sequence
 from .inertial import ImuIntervals, InertialStart
 
@@ -177,7 +177,7 @@ class Problem(Displayed):
         landmarks = plural(len(self.features), "landmark")
         return {
             "frames": f"{self.n_frames:,}",
-            "observations": f"{used:,} of {n:,} ({percent(used / max(n, 1))}), {landmarks}",
+            "observations": f"{used:,} of {n:,} ({per_cent(used / max(n, 1))}), {landmarks}",
             "noise": f"pixel sigma {self.pixel_variance**0.5:.3g} px{inflated}, {kernel}; {noise}",
             "repairs": "; ".join(text.rstrip(".") for text in self.repairs) or "none",
             **{f"remark {i}": text for i, text in enumerate(self.remarks, 1)},

@@ -14,7 +14,7 @@ from .imu_gaps import interval_densities
 LEAST_WALK = 1e-4
 """1/s, times the noise density: in place of a bias that does not walk, so that the covariance has an inverse"""
 HELD_VARIANCE = 1e-9
-"""of the largest variance in a block of the start's covariance: what is no more than this is rounding"""
+"""share of the largest variance in a block of the start's covariance, up to which a variance is rounding"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

@@ -49,7 +49,7 @@ def inertial_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
 
 
 def inertial_scalars(problem: Problem) -> dict[str, Any]:
-    """How the start was found, and what is small enough to stand in the JSON."""
+    """Method of the start, and values that are small enough for the JSON."""
     imu, start = problem.sequence.imu, problem.start
     if imu is None or start is None:
         return {}

@@ -8,7 +8,7 @@ ARRAYS = "problem.npz"
 SCALARS = "problem.json"
 FRAMES, INCREMENTS, OBSERVATIONS, LANDMARKS = "frames.csv", "increments.csv", "observations.csv", "landmarks.csv"
 SAMPLES = "imu.csv"
-"""of a problem with raw inertial data, which has no increments"""
+"""file of a problem with raw inertial data, which has no increments"""
 
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 FRAME_COLUMNS = ("frame", "t", *TWIST)

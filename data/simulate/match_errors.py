@@ -47,7 +47,7 @@ def wrong_matches(
 
 
 def displacements(n: int, rng: np.random.Generator) -> FloatArray:
-    """How wrong matches are off (n, 4), px: seven in ten in both images alike, by 8 to 100 px; the rest along the right
+    """Errors of wrong matches (n, 4), px: seven in ten in both images alike, by 8 to 100 px; the rest along the right
     image's row only, by 5 to 60 px, which spoils the depth."""
     size = rng.lognormal(np.log(28.0), 0.6, n).clip(8.0, 100.0)
     angle = rng.uniform(0.0, 2.0 * np.pi, n)

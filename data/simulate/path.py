@@ -11,7 +11,7 @@ from ..imu import STANDARD_GRAVITY
 from ..sequence import Sequence
 from .settings import MAX_TIME_OFFSET, Simulation, Velocities
 
-MAX_METRES = 1000.0
+MAX_METERS = 1000.0
 """m a frame, on average over a drive: no point that a camera sees in one frame would be near in the next"""
 
 
@@ -45,7 +45,7 @@ class Path:
         return se3.log(motion) / width
 
     def moved(self, pose: FloatArray) -> "Path":
-        """The same path in another world: `pose` (4, 4) takes the present world to it."""
+        """Path in another world, to which `pose` (4, 4) takes the present one."""
         return Path(self.t, pose @ self.poses, self.velocity)
 
     def of(self, mounted: FloatArray) -> "Path":
@@ -127,9 +127,9 @@ def followed(settings: Simulation) -> Velocities:
     with np.errstate(over="ignore"):
         speed, dt = np.linalg.norm(linear[kept], axis=1), np.diff(t[kept])
         path = float(speed[:-1] @ dt + (speed[0] + speed[-1]) * _reach(dt))
-    if not path <= MAX_METRES * n:
+    if not path <= MAX_METERS * n:
         raise InputError(
-            f"along: its velocities lead over {path:.3g} m in {n} frames, and at most {MAX_METRES:g} m a frame are "
+            f"along: its velocities lead over {path:.3g} m in {n} frames, and at most {MAX_METERS:g} m a frame are "
             "simulated; check that its stamps are in s and its velocities in m/s"
         )
     return Velocities(t[kept], linear[kept], angular[kept])

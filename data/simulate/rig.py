@@ -30,7 +30,7 @@ class Rig:
 
     camera: StereoCamera
     width: int
-    """of the images, px"""
+    """width of the images, px"""
     height: int
     imu_T_cam: FloatArray = field(repr=False)
     """(4, 4) extrinsic of the left camera"""

@@ -14,7 +14,7 @@ STEP = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Road:
-    """What a car is led along, at stations every `STEP` m."""
+    """Center line that a car follows, at stations every `STEP` m."""
 
     curvature: FloatArray
     """(n,) 1/m, positive to the left"""
@@ -116,7 +116,7 @@ def drive(road: Road, t: FloatArray, rng: np.random.Generator) -> Path:
 
 
 def _traveled(road: Road, t: FloatArray) -> FloatArray:
-    """Metres along the road (g,) at times (g,): within the limits, 1.5 m/s^2 up and 2 m/s^2 down, no sudden jerk."""
+    """Meters along the road (g,) at times (g,): within the limits, 1.5 m/s^2 up and 2 m/s^2 down, no sudden jerk."""
     station = np.arange(len(road.speed)) * STEP
     square = road.speed**2
     for where, _ in road.stops:

@@ -227,7 +227,7 @@ class Simulation:
 
 
 def default_drive() -> Simulation:
-    """What `fgbaseline run` runs on when it is given no recording: a minute of a car in a town."""
+    """Default recording of `fgbaseline run`: a minute of a car in a town."""
     return Simulation()
 
 

@@ -17,7 +17,7 @@ from .camera_view import CameraView
 SHORTEST = 3
 """frames; shorter tracks are not kept, as in the course's files"""
 _SPREAD = 0.95
-"""of the logarithm of a lifetime"""
+"""standard deviation of the logarithm of a lifetime"""
 _OFFERED = 8.0
 """candidates for each point that is wanted, where all are new"""
 _CHUNK = 20_000

@@ -13,9 +13,9 @@ from .rig import Image
 WIDEST = 480
 """px; wider images are downscaled to it"""
 QUALITY = 60
-"""of JPEG, up to 100"""
+"""quality of the JPEGs, up to 100"""
 MOST_BYTES = 12_000_000
-"""of all JPEGs, so that a page with them stays below 20 MB in base64"""
+"""limit on all JPEGs, so that a page with them stays below 20 MB in base64"""
 
 
 class Picture(NamedTuple):

@@ -1,7 +1,7 @@
 """Stereo tracker: Lucas-Kanade from frame to frame and from left to right, with checks that end a track.
 
-A track keeps its point or ends: what the forward-backward check, the gate on vL - vR, the disparity or the motion of
-the rig rejects is not tracked on, and a corner found there later is a new track.
+A track keeps its point or ends. It ends where the forward-backward check, the gate on vL - vR, the disparity or the
+motion of the rig rejects it; a corner found there later begins a new track.
 """
 
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class Tracks:
     """Points tracked into one frame."""
 
     number: IntArray
-    """(n,) of each track, unique in a recording"""
+    """(n,) number of each track, unique in a recording"""
     pixel: FloatArray
     """(n, 4) uL, vL, uR, vR, px, in the rectified pair; NaN in uR and vR with one camera"""
 
@@ -48,7 +48,7 @@ class Tracks:
 
 @dataclass(eq=False)
 class StereoTracker:
-    """Tracks of a recording, pair by pair; results depend on nothing but images, predictions and settings.
+    """Tracks of a recording, pair by pair; results depend only on images, predictions and settings.
 
     Corners are found in the images, and tracked and matched in images of equalized local contrast.
     """

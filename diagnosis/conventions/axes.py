@@ -18,7 +18,7 @@ ENOUGH = 25.0
 MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.3, 0.05
 """rad, baselines and share: largest errors of a valid calibration; what they explain is no evidence for another"""
 CHI_SQUARE_MEDIAN = 0.4549
-"""of one degree of freedom"""
+"""median of the chi-square distribution with one degree of freedom"""
 MAX_BIAS = 1.0
 """rad/s"""
 GAIN_RANGE, GAIN_DEVIATION = 0.35, 0.12

@@ -17,7 +17,7 @@ SHIFTS = (-2.0, -1.0, 0.0, 1.0)
 ENOUGH = 25.0
 """log-likelihood lead over all other shifts; high, since time-correlated pixel errors exaggerate it"""
 INFLATION = 3.0
-"""of the standard error, for the same reason"""
+"""factor on the standard error, for the same reason"""
 HELD = 0.5
 """share of the cost's fall that the parabola predicts, from which on it describes the cost"""
 ROUNDING = 1.0 / np.sqrt(12.0)

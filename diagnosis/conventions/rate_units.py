@@ -1,4 +1,4 @@
-"""Whether a measured factor of velocities is that of a unit, or of raw counts of a gyroscope.
+"""Decision whether a measured factor of velocities is that of a unit, or of raw counts of a gyroscope.
 
 mrad/s and the 16.4 counts per °/s of a usual range are only 6 % apart, so that the factor has to be known well.
 """

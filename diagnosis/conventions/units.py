@@ -32,9 +32,9 @@ from .scale_ratio import ScaleRatio, scale_ratio
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
 ANGULAR = (1.0, DEGREE, *THOUSANDS[1:])
 CENTI, KMH, FEET = 1e-2, 1.0 / 3.6, 0.3048
-"""of cm or cm/s, km/h and ft/s"""
+"""factors of cm or cm/s, km/h and ft/s"""
 TOLERANCE = 0.45
-"""of the decadic logarithm of a ratio, for factors of 1000 and degrees; other units have to fit within the noise"""
+"""tolerance of log10 of a ratio for factors of 1000 and degrees; other units must fit within the noise"""
 UNUSUAL = 1.5
 """number of wrong units equivalent to an implausible interval or baseline"""
 LEAD = 1.0
@@ -83,7 +83,7 @@ class Units:
     """m, of the translation of imu_T_cam"""
     doubt: str = ""
     scale_ratios: tuple[ScaleRatio, ScaleRatio] | None = None
-    """of angular and linear velocity"""
+    """ratios of angular and of linear velocity"""
     given: frozenset[str] = frozenset()
     """names of those that the user states"""
 

@@ -4,13 +4,13 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import percent, plural
+from fgbaseline.data.plural import per_cent, plural
 from fgbaseline.data.problem.velocity_gaps import GAP
 from fgbaseline.data.sequence import Sequence
 
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY
 from .phrases import spans
-from .track_statistics import BURST, MIN_USABLE, MOVING_LINKS, TrackStatistics
+from .track_statistics import MIN_USABLE, MOVING_LINKS, TrackStatistics
 
 MIN_WRONG = 0.10
 """share of wrong links that is reported: every tracker has some"""
@@ -43,9 +43,8 @@ def _copies(repeated: BoolArray, tracks: TrackStatistics) -> list[Finding]:
     if n == 0:
         return []
     text = (
-        f"In {n:,} of {len(repeated):,} intervals nearly all tracks are copies, to the last bit, of the frame before: "
-        f"{plural(tracks.copied, 'observation')} that nothing was tracked for, and whose tracks often go on as other "
-        "points."
+        f"In {n:,} of {plural(len(repeated), 'interval')} nearly all observations are bit-identical copies of the "
+        f"previous frame ({tracks.copied:,}); many of these tracks then continue on a different point."
     )
     return [_counted("copied_frames", text, tracks.copied, 0, "observations")]
 
@@ -55,8 +54,8 @@ def _wrong_matches(tracks: TrackStatistics) -> list[Finding]:
     if wrong <= MIN_WRONG * links or links == 0:
         return []
     text = (
-        f"{percent(wrong / links)} of the matches from a frame to the next contradict the motion that the others "
-        f"of their frame agree on ({wrong:,} of {links:,})."
+        f"{per_cent(wrong / links)} of the matches from a frame to the next contradict the motion of the others "
+        f"({wrong:,} of {links:,})."
     )
     return [_counted("wrong_matches", text, wrong / links, tracks.wrong_after, "share of the matches")]
 
@@ -67,11 +66,11 @@ def _bursts(tracks: TrackStatistics) -> list[Finding]:
         return []
     worst = int(frames[np.argmax(tracks.wrong_share[frames])])
     text = (
-        f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than {percent(BURST)} of the matches "
-        f"contradict the motion (from frames {spans(frames)}; worst from frame {worst}, "
-        f"{percent(tracks.wrong_share[worst])} of {tracks.links[worst]})."
+        f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than a third of the matches "
+        f"contradict the motion (after frames {spans(frames)}). The worst follows frame {worst}: "
+        f"{per_cent(tracks.wrong_share[worst])} of {plural(int(tracks.links[worst]), 'match', 'matches')}."
     )
-    return [_counted("bursts", text, float(tracks.wrong_share[worst]), tracks.wrong_after, "share of the matches")]
+    return [_counted("bursts", text, len(frames), tracks.bursts_after, "intervals")]
 
 
 def _moving(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
@@ -79,8 +78,8 @@ def _moving(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     if tracks.moving <= MIN_MOVING * n_tracks:
         return []
     text = (
-        f"{plural(tracks.moving, 'track')} of {n_tracks:,} contradict the motion over {MOVING_LINKS} frames and more "
-        "in succession: things that move, or tracks that slide."
+        f"{tracks.moving:,} of {plural(n_tracks, 'track')} contradict the motion in {MOVING_LINKS} or more consecutive "
+        "intervals: moving objects, or tracks that slide."
     )
     return [_counted("moving", text, tracks.moving, tracks.moving_after, "tracks")]
 
@@ -89,13 +88,13 @@ def _disparities(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     n, found = max(1, len(sequence.observations)), []
     if tracks.not_positive > MIN_DEPTHLESS * n:
         text = (
-            f"{plural(tracks.not_positive, 'observation')} ({percent(tracks.not_positive / n, 1)}) have a disparity of "
-            "zero or less: no point in front of the camera gives that."
+            f"{plural(tracks.not_positive, 'observation')} ({per_cent(tracks.not_positive / n)}) have a disparity of "
+            "zero or less, which no point in front of the camera has."
         )
         found.append(_counted("disparity_not_positive", text, tracks.not_positive, 0, "observations"))
     if tracks.tiny > MIN_TINY * n:
         text = (
-            f"{plural(tracks.tiny, 'observation')} ({percent(tracks.tiny / n, 1)}) have a disparity of at most "
+            f"{plural(tracks.tiny, 'observation')} ({per_cent(tracks.tiny / n)}) have a disparity of at most "
             f"{MIN_DISPARITY:g} px, too small to determine a depth."
         )
         found.append(_counted("disparity_tiny", text, tracks.tiny, 0, "observations"))
@@ -107,7 +106,7 @@ def _rows(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     if tracks.rows <= MIN_ROWS * n:
         return []
     text = (
-        f"In {plural(tracks.rows, 'observation')} ({percent(tracks.rows / n, 1)}) the rows of the left and right image "
+        f"In {plural(tracks.rows, 'observation')} ({per_cent(tracks.rows / n)}) the rows of the left and right image "
         f"differ by more than {MAX_ROW_MISMATCH:g} px: not matched, or not rectified."
     )
     return [_counted("row_mismatch", text, tracks.rows, 0, "observations")]
@@ -119,7 +118,7 @@ def _few_features(tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"{plural(len(frames), 'frame')} of {len(tracks.usable):,} have fewer than {MIN_USABLE} usable features "
-        f"({spans(frames)}): only the velocities give the motion there."
+        f"({spans(frames)}): there only the velocities determine the motion."
     )
     return [_counted("few_features", text, len(frames), len(frames), "frames")]
 
@@ -133,7 +132,7 @@ def _cuts(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
-        "tracker started anew, or the recording is cut there. Only the velocities give the motion."
+        "tracker started anew, or the recording is cut there. Only the velocities determine the motion."
     )
     return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
 

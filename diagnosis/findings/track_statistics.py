@@ -17,11 +17,11 @@ from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive
 BURST = 1.0 / 3.0
 """share of the links of an interval that contradict its motion, from which on it is a burst"""
 BURST_LINKS = 5
-"""that must contradict it, so that few features are not taken for many errors"""
+"""links of a burst that contradict it at least, so that an interval with few features is none"""
 WRONG_PIXEL = 0.5
 """px: usual noise of the rows; segments within four sigmas of it are not wrong"""
 MOVING_LINKS = 5
-"""of a track in succession that contradict the motion: a wrong match contradicts it once or twice"""
+"""consecutive links of a track that contradict the motion: a wrong match contradicts it once or twice"""
 MIN_USABLE = 6
 """features of a frame, below which odometry has no motion"""
 GAP = 2.5
@@ -48,10 +48,12 @@ class TrackStatistics:
     """(T-1,) those that contradict this motion"""
     wrong_after: float
     """share of the links that contradict it, of those that the repaired and masked recording has left"""
+    bursts_after: int
+    """intervals with a `burst` among these"""
     moving: int
     """tracks that contradict the motion over `MOVING_LINKS` intervals in succession"""
     moving_after: int
-    """the same among the links that the repaired and masked recording has left"""
+    """tracks that still do among the links that repair and mask have left"""
     gaps: IntArray
     """intervals longer than `GAP` times the median"""
 
@@ -63,7 +65,7 @@ class TrackStatistics:
     @property
     def burst(self) -> BoolArray:
         """(T-1,) intervals in which a third or more of the links contradict the motion."""
-        return np.asarray((self.wrong >= BURST_LINKS) & (self.wrong > BURST * self.links), dtype=np.bool_)
+        return _burst(self.wrong, self.links)
 
     @property
     def few(self) -> BoolArray:
@@ -76,7 +78,8 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
     sequence = diagnosis.sequence
     o, n = sequence.observations, sequence.n_frames - 1
     apart = disparity(o.pixel)
-    links, wrong, moving, moving_after, after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0, 0.0
+    links, wrong, moving, moving_after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0
+    after, bursts_after = 0.0, 0
     odometry = diagnosis.odometry
     if odometry is not None:
         known = odometry.known[odometry.links.frame]
@@ -88,6 +91,8 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
         repaired = repaired or repair(diagnosis, MaskSettings())
         left = known & _left(sequence, repaired, odometry.links.before, odometry.links.after)
         after = float(outlier[left].mean()) if left.any() else 0.0
+        by_interval = [np.bincount(odometry.links.frame[which], minlength=n) for which in (outlier & left, left)]
+        bursts_after = int(_burst(*by_interval).sum())
         moving_after = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier & left)
     return TrackStatistics(
         not_positive=int(np.sum(apart <= 0)),
@@ -98,10 +103,15 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
         links=links,
         wrong=wrong,
         wrong_after=after,
+        bursts_after=bursts_after,
         moving=moving,
         moving_after=moving_after,
         gaps=np.flatnonzero(sequence.dt > GAP * np.median(sequence.dt)),
     )
+
+
+def _burst(wrong: IntArray, links: IntArray) -> BoolArray:
+    return np.asarray((wrong >= BURST_LINKS) & (wrong > BURST * links), dtype=np.bool_)
 
 
 def _copied(sequence: Sequence, repeated: BoolArray) -> int:
@@ -114,7 +124,7 @@ def _copied(sequence: Sequence, repeated: BoolArray) -> int:
 
 
 def _moving(landmark: IntArray, frame: IntArray, outlier: BoolArray) -> int:
-    """How many landmarks have so many outlier links in succession."""
+    """Number of landmarks with `MOVING_LINKS` outlier links in succession."""
     order = np.lexsort((frame, landmark))
     landmark, frame, outlier = landmark[order], frame[order], outlier[order]
     same = (landmark[1:] == landmark[:-1]) & (frame[1:] == frame[:-1] + 1) & (outlier[1:] == outlier[:-1])

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift, zero_order_hold
-from fgbaseline.data.plural import noun, percent, plural
+from fgbaseline.data.plural import listed, noun, number, per_cent, plural, signed, vector
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
@@ -16,7 +16,7 @@ from ..estimation.result import Diagnosis
 from ..noise.calibration_fit import SIGNIFICANT
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
 from ..tracks.image_size import intrinsics_findings
-from .phrases import listed, spans, vector
+from .phrases import spans
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
 
@@ -100,9 +100,9 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
         sentences.append("A delay between velocities and images: that needs turns that both show.")
     deviation = diagnosis.gyro_bias_deviation
     if (deviation > KNOWN_BIAS).any():
-        sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (one standard error).")
+        sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (standard errors).")
     if diagnosis.velocity_scale[1] > KNOWN_SCALE:
-        sentences.append(f"The scale of the velocities better than to {percent(diagnosis.velocity_scale[1], 1)}.")
+        sentences.append(f"The scale of the velocities better than to {per_cent(diagnosis.velocity_scale[1])}.")
     angle = diagnosis.misalignment[1]
     loose = ["xyz"[i] for i in range(3) if angle[i] > KNOWN_ANGLE]
     if loose:
@@ -148,7 +148,7 @@ def _axes(which: str, axes: Axes, unit: str) -> Finding:
         axes.before,
         axes.after,
         unit,
-        f"leads the conventions that differ by {axes.margin:.0f} in log-likelihood",
+        f"log-likelihood {number(round(axes.margin))} above the next convention",
     )
 
 
@@ -159,7 +159,7 @@ def _gyro_bias(diagnosis: Diagnosis) -> Finding | None:
     name, shift, none = diagnosis.angular.name, diagnosis.shift, np.zeros(3)
     return Finding(
         "gyro_bias",
-        f"The gyroscope reads {vector(bias, 4)} rad/s at rest, in the axes it was recorded in.",
+        f"Gyroscope bias {vector(bias, 4)} rad/s, in the recorded axes.",
         rate_error(diagnosis, shift, none, name),
         rate_error(diagnosis, shift, bias, name),
         "rad/s",
@@ -173,9 +173,12 @@ def _time_offset(diagnosis: Diagnosis) -> Finding | None:
     if not timing.identifiable or diagnosis.shift in USUAL:
         return None
     when = f"{abs(timing.shift):.3f} s {'before' if timing.shift < 0 else 'after'} their stamps"
-    text = f"Velocities describe the interval that begins {when} ({shift:+.2f} intervals)"
+    text = f"Velocities describe the interval that begins {when} ({signed(shift, 2)} intervals)"
     if diagnosis.shift == Shift.BEFORE:
-        text = f"Velocities belong to the interval before their stamp ({shift:+.2f} intervals), not to the one after it"
+        text = (
+            "Velocities describe the interval before their stamp, not the one after it: their estimated shift is "
+            f"{signed(shift, 2)} intervals"
+        )
     bias = significant_bias(diagnosis)
     return Finding(
         "time_offset",
@@ -216,12 +219,12 @@ def _velocity_scale(diagnosis: Diagnosis) -> Finding | None:
     more = "larger" if scale > 1.0 else "smaller"
     return Finding(
         "velocity_scale",
-        f"Recorded speeds are {percent(abs(scale - 1.0), 1)} {more} than the stereo speeds; the recording does not "
+        f"Recorded speeds are {per_cent(abs(scale - 1.0))} {more} than the stereo speeds; the recording does not "
         "show which of the two is wrong, so neither is changed without a user-specified repair.",
         scale,
         scale,
         "recorded over seen",
-        f"standard error {percent(deviation, 1)}",
+        f"standard error {per_cent(deviation)}",
     )
 
 
@@ -244,11 +247,11 @@ def _disparity_offset(diagnosis: Diagnosis) -> Finding | None:
     offset, deviation = significant_offset(diagnosis), diagnosis.disparity_offset[1]
     if not offset:
         return None
-    small = "small" if offset > 0 else "large"
+    small, changed = ("small", "reduced") if offset > 0 else ("large", "increased")
     return Finding(
         "disparity_offset",
-        f"Disparities are {abs(offset):.2f} px too {small}: with uR moved by {-offset:+.2f} px, near and far points "
-        "agree on one motion, as they do not as recorded.",
+        f"Disparities are {abs(offset):.2f} px too {small}: only with uR {changed} by {abs(offset):.2f} px do near and "
+        "far points give the same motion.",
         abs(offset),
         0.0,
         "px",

@@ -56,7 +56,7 @@ def inertial_track_statistics(found: InertialDiagnosis, tracks: RepairedTracks |
 
 
 def inertial_repairs(found: InertialDiagnosis) -> tuple[str, ...]:
-    """What was done to the samples, one sentence each."""
+    """Repairs of the samples, one sentence each."""
     named = (("angular velocities", found.units.rate), ("specific forces", found.units.force))
     done = [f"{name} of the inertial samples multiplied by {factor:.6g}" for name, factor in named if factor != 1.0]
     lengths = (("baseline", found.baseline.factor), ("translation of imu_T_cam", found.baseline.extrinsic))

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.data.finding import Finding
+from fgbaseline.data.plural import vector
 
 from ..findings.json_report import header
-from ..findings.phrases import vector
 from .findings import inertial_findings
 from .result import InertialDiagnosis
 

@@ -106,7 +106,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
 
 
 def misfit_of_beginning(sequence: Sequence, seen: Odometry, path: InertialPath) -> float:
-    """How much larger the odometry's misfit is at the beginning than in the whole recording, at least 1.
+    """Ratio (at least 1) of the odometry's misfit at the beginning to that in the whole recording.
 
     Tracks that lag behind in the first seconds do so together, as where a tracker starts on a moving vehicle.
     """

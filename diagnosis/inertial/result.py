@@ -42,7 +42,7 @@ class InertialDiagnosis(Displayed):
     path: InertialPath | None = None
     fit: CalibrationFit | None = None
     sensors: SensorChecks | None = None
-    """of gyroscope and accelerometer against the cameras"""
+    """checks of gyroscope and accelerometer against the cameras"""
 
     @property
     def pixel(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY, axes_matrix
 from fgbaseline.data.finding import Finding
+from fgbaseline.data.plural import number
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
@@ -20,7 +21,7 @@ from .units import mean_rates
 
 MIN_INTERVALS = 20
 LEAD = 0.3
-"""of the best convention's correlation with the cameras beyond that of the axes as recorded"""
+"""by which the correlation of the best convention with the cameras must exceed that of the axes as recorded"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,9 +32,9 @@ class SensorAxes:
     accelerometer: str = IDENTITY
     """right-handed, after the sign"""
     sign: float = 1.0
-    """of the specific force: -1 where it reads -9.8 upward at rest"""
+    """sign of the specific force: -1 where it reads -9.8 upward at rest"""
     correlation: tuple[float, float] = (np.nan, np.nan)
-    """of the accelerometer with the cameras, as recorded and in this convention"""
+    """correlation of the accelerometer with the cameras, as recorded and in this convention"""
 
     @property
     def accelerometer_matrix(self) -> FloatArray:
@@ -88,7 +89,7 @@ def axes_findings(axes: SensorAxes) -> tuple[Finding, ...]:
     gyroscope = axes.gyroscope
     if gyroscope is not None and gyroscope.changed:
         text = f"The gyroscope is recorded in other axes: the axes of imu_T_cam are its ({gyroscope.name})."
-        said = f"leads the conventions that differ by {gyroscope.margin:.0f} in log-likelihood"
+        said = f"log-likelihood {number(round(gyroscope.margin))} above the next convention"
         found.append(Finding("angular_axes", text, gyroscope.before, gyroscope.after, "rad/s", said))
     if axes.force_changed:
         sign = "with the opposite sign" if axes.sign < 0.0 else ""

@@ -3,13 +3,13 @@
 import numpy as np
 
 from fgbaseline.data.finding import Finding
+from fgbaseline.data.plural import per_cent, vector
 
-from ..findings.phrases import vector
 from ..noise.calibration_fit import SIGNIFICANT
 from .sensors import SensorChecks
 
 MIN_BIAS, MIN_ANGLE, MIN_OFFSET, MIN_SCALE = 0.005, np.deg2rad(0.5), 0.003, 0.02
-"""rad/s, rad, s and share that are worth a word; estimators carry a bias in their state"""
+"""rad/s, rad, s and share that are reported; the biases are in the state of the estimators"""
 MIN_ACCELEROMETER_BIAS, MIN_GRAVITY = 0.3, 0.15
 """m/s^2"""
 NOISIER = 2.0
@@ -33,7 +33,7 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
     before, after = checks.rate_error
     bias, deviation = checks.gyroscope_bias
     if any(_significant(b, d, MIN_BIAS) for b, d in zip(bias, deviation, strict=True)):
-        text = f"The gyroscope reads {vector(bias, 4)} rad/s at rest: estimators have it in their state."
+        text = f"Gyroscope bias {vector(bias, 4)} rad/s: it is in the state of the estimators."
         said = f"standard errors {vector(deviation, 4)} rad/s"
         found.append(Finding("gyro_bias", text, before, after, "rad/s", said))
     angle, deviation = checks.misalignment
@@ -56,7 +56,9 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
     scale, error = checks.gyroscope_scale
     if _significant(scale - 1.0, error, MIN_SCALE):
         text = f"The gyroscope turns {scale:.3f} times as far as the cameras see."
-        found.append(Finding("gyro_scale", text, scale, scale, "recorded over seen", f"standard error {error:.1%}"))
+        found.append(
+            Finding("gyro_scale", text, scale, scale, "recorded over seen", f"standard error {per_cent(error)}")
+        )
     return found
 
 
@@ -65,7 +67,7 @@ def _accelerometer(checks: SensorChecks) -> list[Finding]:
     bias = checks.accelerometer_bias
     size = float(np.linalg.norm(bias))
     if size > MIN_ACCELEROMETER_BIAS:
-        text = f"The accelerometer has a bias of {vector(bias, 3)} m/s^2: estimators have it in their state."
+        text = f"Accelerometer bias {vector(bias, 3)} m/s^2: it is in the state of the estimators."
         found.append(Finding("accelerometer_bias", text, size, size, "m/s^2", "by the path of the whole recording"))
     gravity, given = checks.gravity
     if abs(gravity - given) > MIN_GRAVITY:

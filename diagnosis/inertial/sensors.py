@@ -28,7 +28,7 @@ SATURATED_TIMES = 2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SensorChecks:
-    """What the samples show against the motion that the cameras see; standard errors second."""
+    """Differences of the samples from the motion that the cameras see; standard errors second."""
 
     gyroscope_bias: tuple[FloatArray, FloatArray]
     """(3,) rad/s"""

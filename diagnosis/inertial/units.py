@@ -17,11 +17,11 @@ from ..tracks.image_size import doubt_of_intrinsics
 RATES = {DEGREE: "°/s", 1e-3: "mrad/s", 1e-3 * DEGREE: "m°/s"}
 FORCES = {9.80665: "g", 9.80665e-3: "mg", 1e-3: "mm/s^2"}
 RATE_TOLERANCE, FORCE_TOLERANCE = 0.45, 0.18
-"""of the decadic logarithm of a ratio: factors of 2.8 and 1.5"""
+"""tolerances of the decadic logarithm of a ratio: factors of 2.8 and 1.5"""
 LEAST_GRAVITY = 0.93
 """share of gravity: the median magnitude is no less, except by the error of an accelerometer"""
 COUNTS_PER_G = (16384, 8192, 4096, 2048)
-"""of the ranges of usual accelerometers"""
+"""counts per g of the ranges of usual accelerometers"""
 MIN_KNOWN = 20
 """intervals whose rotation the cameras show"""
 MAX_RATE = 60.0
@@ -35,7 +35,7 @@ class ImuUnits:
     rate: float = 1.0
     force: float = 1.0
     ratio: float = np.nan
-    """of the rotations that the cameras see to those of the samples, where both are correlated"""
+    """rotations that the cameras see over those of the samples, where both are correlated"""
     magnitude: float = np.nan
     """median specific force as recorded"""
 

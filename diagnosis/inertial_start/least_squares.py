@@ -27,7 +27,7 @@ ITERATIONS = 12
 CONVERGED = 1e-5
 """largest change of a state, in m, rad and their rates"""
 SMALLEST_SIGMA = 1e-9
-"""of a noise or walk that is zero: keeps its information finite"""
+"""sigma of a noise or walk that is zero: keeps its information finite"""
 FARTHEST_BIAS = np.repeat([5e-3, 0.1], 3)
 """rad/s and m/s^2, changes of a bias beyond which samples are integrated anew"""
 

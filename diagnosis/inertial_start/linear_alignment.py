@@ -15,7 +15,7 @@ from .least_squares import ACCELEROMETER_BIAS_SIGMA, GYROSCOPE_BIAS_SIGMA
 from .states import Motions, RelativePoses, States, motions_between
 
 ROUNDS = 4
-"""of gravity on the tangent plane of its sphere"""
+"""refinements of gravity on the tangent plane of its sphere"""
 BIAS_ROUNDS = 3
 FLOOR = 1e-3
 """m and m/s, smallest deviation of an inertial motion in these equations"""

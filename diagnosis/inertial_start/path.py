@@ -18,9 +18,9 @@ CHI_SQUARE_6_MEDIAN = 5.3481
 WINDOW = 1.0
 """s, over which errors of the odometry add up"""
 MIN_WINDOWS = 5
-"""of `WINDOW` s, from which on errors that last are judged"""
+"""windows of `WINDOW` s from which on time-correlated errors are estimated"""
 ROUNDS = 2
-"""of path and inflation"""
+"""alternations of path and inflation"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,7 +29,7 @@ class InertialPath:
 
     states: States
     inflation: float
-    """of the odometry's deviations against the inertial samples, from frame to frame or over `WINDOW` s: at least 1"""
+    """factor (at least 1) on the odometry's sigmas, by the inertial samples from frame to frame or over `WINDOW` s"""
     whitened: FloatArray
     """(m,) squared whitened residuals of the m known intervals of the odometry"""
 

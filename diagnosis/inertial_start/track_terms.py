@@ -14,7 +14,7 @@ from ..odometry.stereo_odometry import Odometry
 from ..tracks.track_segments import track_chains
 
 MIN_OBSERVATIONS = 2
-"""of a track among the keyframes"""
+"""observations of a track among the keyframes"""
 MIN_FRONT = 0.1
 """m, nearest depth of a point"""
 

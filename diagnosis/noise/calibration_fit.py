@@ -20,14 +20,13 @@ START = NoiseSettings(pixel=1.0, linear_velocity=0.4, angular_velocity=0.02)
 FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
 """px, baselines/s and rad/s: no noise is less"""
 CHI_SQUARE_MEDIAN = 0.4549
-"""of one degree of freedom"""
+"""median of the chi-square distribution with one degree of freedom"""
 EFFICIENCY = 0.37
-"""of a variance from a median, in degrees of freedom of one from all residuals"""
+"""efficiency of a variance from a median, relative to one from all residuals"""
 SIGNIFICANT = 4.0
 """standard errors, from which on an estimate is significant"""
 MIN_REDUNDANCY = 0.05
-"""of a velocity's residual: below it the fit follows the velocity, as over an interval that the cameras do not see, and
-its residual is no evidence of noise"""
+"""redundancy of a velocity's residual, below which the fit follows the velocity and its residual shows no noise"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

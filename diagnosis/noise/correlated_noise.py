@@ -20,7 +20,7 @@ from ..windows.residuals import SCALE, TURN, Window, WindowData
 LOOSE = 30.0
 """times the velocity noise, for fits that the cameras dominate"""
 MIN_LANDMARKS = 8
-"""of a fit that the cameras dominate"""
+"""landmarks of a fit that the cameras dominate"""
 MIN_WINDOWS = 3
 LASTING = 1.5
 """factor between halves of the tracks from which on pixel errors count as time-correlated"""
@@ -34,12 +34,12 @@ class Inflation:
     """Factors on white noise, at least 1."""
 
     halves: float = 1.0
-    """of the pixels, for errors independent between tracks: from the motions by two halves of the tracks"""
+    """inflation of the pixel noise for errors independent between tracks: from the motions by two halves"""
     pixel: float = 1.0
-    """of the pixels, in total; above `halves` where tracks share errors: the excess against velocities is attributed to
-    cameras whose errors are time-correlated"""
+    """total inflation of the pixel noise; above `halves` where tracks share errors: the excess against velocities is
+    attributed to cameras whose errors are time-correlated"""
     velocity: float = 1.0
-    """of the velocities, to which the excess is attributed otherwise"""
+    """inflation of the velocity noise, to which the excess is attributed otherwise"""
 
 
 def inflation_of(

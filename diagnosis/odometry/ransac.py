@@ -13,7 +13,7 @@ from ..tracks.track_segments import BLOCK, TrackSegments
 HYPOTHESES = 48
 """per pair of frames; with half of the segments wrong, one of them is right with probability 0.998"""
 TRUNCATION = 16.0
-"""of a squared whitened residual of three rows"""
+"""limit of a squared whitened residual of three rows"""
 SEED = 20260
 
 
@@ -64,10 +64,10 @@ def _three_of(rng: np.random.Generator, count: IntArray) -> IntArray:
 
 
 def _through_three(points: FloatArray, moved: FloatArray) -> FloatArray:
-    """(3, 4, p) the rigid motions that take three points (3, 3, p) each, coordinates first, to `moved` (3, 3, p) best,
-    nearer points counting more; NaN where three points are on a line.
+    """Least-squares rigid motions (3, 4, p) from three points (3, 3, p) each, coordinates first, to `moved` (3, 3, p).
 
-    Kabsch's rotation: it lays the plane of the points on that of the moved ones, and turns in it.
+    Near points have larger weights. NaN where three points are on a line. The rotation is Kabsch's: it maps the plane
+    of the points to that of the moved ones, and rotates in it.
     """
     weight = 1.0 / (np.sqrt((points**2).sum(axis=0)) + np.sqrt((moved**2).sum(axis=0))) ** 2
     weight /= weight.sum(axis=0)

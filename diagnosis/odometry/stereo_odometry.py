@@ -127,7 +127,7 @@ def _block(camera: StereoCamera, links: TrackSegments, chosen: slice) -> _Block:
 
 
 def _whitened(camera: StereoCamera, blocks: list[_Block], M: FloatArray) -> tuple[list[FloatArray], FloatArray]:
-    """Of each block the Jacobians by delta in M @ exp(delta), [v, w], and the residuals, whitened (3, 7, n); and the
+    """Jacobians by delta in M @ exp(delta), [v, w], of each block, and the residuals, whitened (3, 7, n); and the
     squared whitened residuals of all links.
 
     What whitens a link is the noise of its pixels and that of the point it is predicted from, for 1 px in each row.

@@ -134,7 +134,7 @@ class Repairs(_Overrides):
     time_offset_s: Annotated[float, PlainValidator(_between(-1e3, 1e3, 0.0))] | None = None
     """s: sample k describes the interval that begins this long after its stamp"""
     shift_intervals: Annotated[float, PlainValidator(_between(-1e4, 1e4, 0.0))] | None = None
-    """the same in intervals between frames"""
+    """shift in intervals between frames"""
     misalignment_deg: Annotated[Vector, PlainValidator(_vector(180.0, "degrees"))] | None = None
     """rotation vector by which imu_T_cam is turned against the velocities, in its own axes; undone"""
     extrinsic_inverted: bool | None = None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fgbaseline.data.axis_conventions import twist_in_imu_axes
 from fgbaseline.data.motion import dead_reckoned_path, zero_order_hold
 from fgbaseline.data.observations import Observations
+from fgbaseline.data.plural import signed, vector
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence, Truth
 from fgbaseline.geometry import FloatArray, so3
@@ -61,25 +62,25 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     velocity = sequence.linear_velocity @ linear.matrix.T / scale
     rate = (sequence.angular_velocity - bias) @ angular.matrix.T
     if angular.changed:
-        done.append(f"angular velocity turned from the axes it was recorded in ({angular.name}) to those of imu_T_cam")
+        done.append(f"angular velocity rotated from the recorded axes ({angular.name}) to those of imu_T_cam")
     if linear.changed:
-        done.append(f"linear velocity turned from the axes it was recorded in ({linear.name}) to those of imu_T_cam")
+        done.append(f"linear velocity rotated from the recorded axes ({linear.name}) to those of imu_T_cam")
     if bias.any():
-        done.append(f"gyroscope bias of ({', '.join(f'{b:.4f}' for b in bias)}) rad/s taken off")
+        done.append(f"gyroscope bias of {vector(bias, 4)} rad/s subtracted")
     if scale != 1.0:
         done.append(f"linear velocity divided by {scale:.4g}")
     imu_T_cam = sequence.imu_T_cam.copy()
     if angle.any():
         imu_T_cam[:3, :3] = so3.exp_so3(angle) @ imu_T_cam[:3, :3]
         done.append(
-            f"extrinsic imu_T_cam turned by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities"
+            f"extrinsic imu_T_cam rotated by {np.rad2deg(np.linalg.norm(angle)):.2f}° to agree with the velocities"
         )
     offset = significant_offset(diagnosis)
     if offset:
         sequence = _without_offset(sequence, offset)
-        done.append(f"{offset:+.2f} px taken off every uR, so that disparities agree with the motion")
+        done.append(f"uR {'reduced' if offset > 0 else 'increased'} by {abs(offset):.2f} px")
     if diagnosis.shift != 0.0:
-        done.append(f"velocities shifted by {diagnosis.shift:+.2f} intervals")
+        done.append(f"velocities shifted by {signed(diagnosis.shift, 2)} intervals{_estimated_shift(diagnosis)}")
     path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)
     sigma = GATE_RANGE[0] if diagnosis.sigmas is None else diagnosis.sigmas.pixel
     found = repaired_tracks(sequence, path, mask, tracks, sigma)
@@ -115,10 +116,22 @@ def repaired_tracks(
     split, gate = _split(sequence, path, mask, tracks)
     observations, excluded = _renumbered(sequence, split)
     pieces = split.n_landmarks - sequence.n_landmarks
-    done = (f"{pieces} tracks that jump to another point split off as landmarks of their own",) if pieces else ()
+    done: tuple[str, ...] = ()
+    if pieces:
+        n = len(np.unique(sequence.observations.landmark))
+        done = (f"tracks split where they jump to another point: {n + pieces:,} tracks from {n:,}",)
     tracked = replace(sequence, observations=observations, n_landmarks=split.n_landmarks, truth=None)
     excluded = exclude_landmarks(tracked, path, excluded, sigma)
     return RepairedTracks(observations, split.n_landmarks, excluded, gate, done)
+
+
+def _estimated_shift(diagnosis: Diagnosis) -> str:
+    """States the estimate where a usual convention near it is used instead."""
+    estimated = diagnosis.timing.shift / float(np.median(diagnosis.sequence.dt))
+    text = signed(estimated, 2)
+    if "shift_intervals" in diagnosis.overrides or not diagnosis.timing.identifiable:
+        return ""
+    return "" if text == signed(diagnosis.shift, 2) else f", the convention nearest to the estimated {text}"
 
 
 def _without_offset(sequence: Sequence, offset: float) -> Sequence:
@@ -170,7 +183,7 @@ def _renumbered(sequence: Sequence, split: SplitTracks) -> tuple[Observations, N
 
 
 def truth_of_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
-    """The truth, with landmarks of unknown position for the tracks that were split off."""
+    """The truth, with landmarks of unknown position for the new tracks of a split."""
     if truth is None or truth.landmarks is None:
         return truth
     missing = np.full((n_landmarks - len(truth.landmarks), 3), np.nan)

@@ -17,7 +17,7 @@ MAX_ROW_MISMATCH = 3.0
 BLOCK = 8000
 """segments, whose arrays fit into a processor's cache"""
 REPEATED_SHARE = 0.8
-"""of the segments of an interval, from which on its tracks count as copied"""
+"""share of the segments of an interval, from which on its tracks count as copied"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

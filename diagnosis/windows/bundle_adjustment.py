@@ -41,7 +41,7 @@ class WindowFit:
     pixel_squared: FloatArray
     """(n,) kernel-weighted squared residual of three whitened rows"""
     degrees_of_freedom: float
-    """of the pixel residuals"""
+    """degrees of freedom of the pixel residuals"""
     last_covariance: FloatArray
     """(6, 6) of the right perturbation of the last pose"""
 
@@ -135,7 +135,7 @@ def _fit(
     redundancy: FloatArray,
     squared: FloatArray,
 ) -> WindowFit:
-    """That of one of the windows, out of the arrays of all."""
+    """Solution of one of the windows, out of the arrays of all."""
     f, o, p, k = data.frames[window], data.observations[window], data.points[window], data.intervals(window)
     left = float(redundancy[k].sum())
     return WindowFit(

@@ -14,12 +14,8 @@ SHARED = 8
 """gyroscope bias (3, rad/s), velocity scale minus one, the rotation vector (3, rad) by which the axes of the recorded
 velocities are turned against those of imu_T_cam: recorded = [(1 + s) exp(phi) v, exp(phi) w + b]; and the disparity
 offset d (px) by which uR is recorded too far to the right, all disparities too small: recorded uR = uR + d"""
-SCALE = 3
-"""of the shared parameters"""
-TURN = slice(4, 7)
-"""of the shared parameters"""
-OFFSET = 7
-"""of the shared parameters"""
+SCALE, TURN, OFFSET = 3, slice(4, 7), 7
+"""places of velocity scale, rotation and disparity offset among the shared parameters"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,7 +59,7 @@ class Joined:
     interval: IntArray
     """(k,) the frame at which each interval begins"""
     observations: tuple[slice, ...]
-    """of each window"""
+    """slice of the observations of each window"""
     frames: tuple[slice, ...]
     points: tuple[slice, ...]
 

@@ -14,7 +14,7 @@ from ..tracks.track_segments import track_chains
 from .residuals import Window, WindowData
 
 FRAMES = 25
-"""of a window: longer than most tracks"""
+"""frames of a window: longer than most tracks"""
 MAX_WINDOWS = 48
 MAX_UNBROKEN = 24
 """windows without gaps, the longest ones"""

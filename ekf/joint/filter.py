@@ -125,7 +125,11 @@ class JointFilter:
         self.motion_noise = prediction.covariance(self.motion_noise)
 
     def _update(self, k: int, index: IntArray) -> bool:
-        """Update with observations `index` (n,) of active landmarks; False if the whole frame is rejected."""
+        """Update with observations `index` (n,) of active landmarks.
+
+        False if the whole frame disagrees or S is not positive definite: then nothing was updated. True otherwise, also
+        where every observation was rejected by itself.
+        """
         if len(index) == 0:
             return True
         seen = self._reject_behind_camera(k, self._linearize(index))

@@ -34,7 +34,7 @@ class JointSettings:
     """Settings of the joint filter. Raises FgbaselineError, naming setting and value, for an invalid one."""
 
     coordinates: LandmarkRepresentation = LandmarkRepresentation.INVERSE_DEPTH
-    """of landmarks without a prior; those with a prior use world coordinates, in which it is Gaussian"""
+    """representation of landmarks without a prior; those with a prior use world coordinates, in which it is Gaussian"""
     linearization: Linearization = Linearization.INVARIANT
     gate: float | None = 0.9999
     """chi-square probability of the gate, which rejects one inlier in ten thousand; None: no gate"""

@@ -191,7 +191,7 @@ def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray)
 def subtract_symmetric(P: FloatArray, block: Callable[[slice, slice], FloatArray]) -> None:
     """Subtract a symmetric matrix from a symmetric one (n, n), in place; `block` gives its rows and columns.
 
-    It is made in panels, from the diagonal down, and mirrored above: each product is formed once and read in the cache.
+    The work goes by panels from the diagonal down, mirrored above: each product is formed once and read from the cache.
     """
     for first in range(0, len(P), PANEL):
         own, below = slice(first, first + PANEL), slice(first + PANEL, len(P))

@@ -42,7 +42,7 @@ class Simulated:
     """A simulated drive."""
 
     settings: Mapping[str, Any]
-    """of `Simulation`, without the seed"""
+    """settings of `Simulation`, without the seed"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ class ProgressEvent:
 
     worker: str
     key: str
-    """of its job; empty without a job"""
+    """key of its job; empty without a job"""
     doing: str
     """an estimator's name, or `reading` and `writing`"""
     done: int

@@ -60,7 +60,7 @@ Vector: TypeAlias = tuple[Finite, Finite, Finite]
 
 
 class Drives(_Part):
-    """What `fgbaseline simulate` takes; None for its defaults."""
+    """Options of `fgbaseline simulate`; None for its defaults."""
 
     path: Shape | tuple[Shape, ...] | None = None
     world: World | tuple[World, ...] | None = None
@@ -108,7 +108,7 @@ class Entry(_Part):
     """One or more recordings, or simulated drives."""
 
     name: Name | None = None
-    """of drives, or of a single recording; other recordings have the names of their files"""
+    """name of drives, or of a single recording; other recordings have the names of their files"""
     files: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """paths or globs; relative ones from the suite's folder, or from --data"""
     leave_out: str | tuple[str, ...] = ()
@@ -119,7 +119,7 @@ class Entry(_Part):
     """TOML file of user-specified repairs"""
     simulate: Drives | None = None
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] | Seeds | None = None
-    """of the drives; None for the single seed 0"""
+    """seeds of the drives; None for the single seed 0"""
 
     @model_validator(mode="after")
     def _is_something(self) -> "Entry":
@@ -157,11 +157,11 @@ class Sweep(_Part):
     features: Features | Annotated[tuple[Features, ...], Field(min_length=1)] | None = None
     """None for the preset's default"""
     noise: Noise | Annotated[tuple[Noise, ...], Field(min_length=1)] | None = None
-    """of the calibrated preset: estimated from the recording (the default), assumed, or given standard deviations"""
+    """noise of the calibrated preset: estimated from the recording (default), assumed, or given standard deviations"""
     landmarks: (
         Literal["in-turn", "held"] | Annotated[tuple[Literal["in-turn", "held"], ...], Field(min_length=1)] | None
     ) = None
-    """of the documented preset"""
+    """landmark mode of the documented preset"""
     held_out: Share | Annotated[tuple[Share, ...], Field(min_length=1)] = 0.0
 
 

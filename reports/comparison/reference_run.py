@@ -25,7 +25,7 @@ class RunInMemory:
 
     @property
     def folder(self) -> str:
-        """What stands for it in messages."""
+        """Name of it in messages."""
         return self.run.problem.sequence.name
 
     def trajectory(self, name: str) -> Trajectory:

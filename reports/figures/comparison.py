@@ -132,7 +132,7 @@ def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
     handles: list[Any] = []
     for panel, column in zip(axes, ("position", "heading_deg"), strict=False):
         for name, table in data.series.items():
-            handles += panel.plot(table["travelled"], table[column], **line(name))
+            handles += panel.plot(table["traveled"], table[column], **line(name))
     axes[0].set_ylabel("distance, m")
     fit_log_or_linear(axes[0], columns(data.series, "position"))
     few_ticks(axes[0], style)

@@ -41,7 +41,7 @@ class ComparisonData:
     names: tuple[str, ...]
     """estimates, in the order of the input"""
     alignment: str
-    """of all estimates, in words"""
+    """alignment of all estimates, in words"""
     up: FloatArray
     """(3,) in the reference's world"""
     stamped: bool

@@ -14,7 +14,7 @@ from .style import in_style
 
 FORMS = ("png", "svg")
 SHARES = 256
-"""of the work, at most: as many as `background_map` takes"""
+"""largest number of shares of the work: as many as `background_map` takes"""
 DrawOne = Callable[[], Figure | None]
 """draws a figure, within `in_style()` and without layout; None where there is nothing to show"""
 

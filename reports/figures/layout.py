@@ -144,7 +144,7 @@ def _spans(length: float, before: FloatArray, after: FloatArray, ratios: ArrayLi
 
 
 class Numbers(LogFormatter):
-    """Which ticks are labeled is matplotlib's choice; how, needs none of its mathematics, slow to be set."""
+    """Labels of the ticks that matplotlib chooses, without its mathematical text, which is slow to lay out."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The label of the tick at x; empty where it has none."""

@@ -55,7 +55,7 @@ class Panel:
     height: float
     """inches"""
     decades: float | None = None
-    """of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
+    """decades of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
     expected: Expected | None = None
     title: str = ""
     smooth: bool = False
@@ -208,9 +208,9 @@ def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals:
     tables = {n: _with_prefix(run.series[n], f"{prefix}_") for n in names}
     t = dict.fromkeys(names, run.t)
     figure, axes, handles = component_panels(tables, t, run.line())
-    travelled = max((float(np.nanmax(v)) for v in columns(tables, "travelled").values()), default=0.0)
+    traveled = max((float(np.nanmax(v)) for v in columns(tables, "traveled").values()), default=0.0)
     signed = [np.concatenate([table[column] for column in SIGNED]) for table in tables.values()]
-    reach = signed_range(signed, 0.05 * travelled)
+    reach = signed_range(signed, 0.05 * traveled)
     for panel, column in zip(axes, COMPONENTS, strict=True):
         if column in SIGNED:
             fit_signed(panel, run.t, columns(tables, column), reach)

@@ -18,7 +18,7 @@ from .style import BAND, GREEN, Style, note, safe_text
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6
-"""of a pose"""
+"""degrees of freedom of a pose"""
 CONSISTENT = "95 % if consistent"
 MEDIANS = 100
 """windows of a running median that a line holds"""

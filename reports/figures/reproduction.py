@@ -35,7 +35,7 @@ ARROWS = 50
 SIDE, HEAD = 6.4, 1.35
 """inches: width of a figure of the report's kind, and height of everything around its picture"""
 AROUND = 0.25
-"""of the path's extent: landmarks farther off are counted and not shown"""
+"""share of the path's extent: landmarks farther off are counted and not shown"""
 SQUARE = (0.6, 1.0 / 0.6)
 """height over width of a picture of the report's kind, at least and at most"""
 COLUMNS = 2

@@ -22,15 +22,14 @@ from .style import GRAY, GREEN, SCREEN, Style, label, stacked_panels, swatch, ti
 
 SMALL_ERROR = 3.0
 """px, a column of the tables"""
-COARSE = (Excluded.DISPARITY, Excluded.SHORT)
-"""reasons of observations that determine little"""
-BANDS = {
-    "in the problem": "#b8c4d0",
-    "too far or track too short": "#e9e4cf",
-    "copied from the frame before": "#d9b3e0",
-    "wrong match, moved or undetermined": "#c0392b",
+BANDS: Mapping[str, tuple[str, tuple[Excluded, ...]]] = {
+    "in the problem": ("#b8c4d0", (Excluded.NO,)),
+    "feature not chosen": ("#eef1f4", (Excluded.FEATURE_NOT_CHOSEN,)),
+    "too far or track too short": ("#e9e4cf", (Excluded.DISPARITY, Excluded.SHORT)),
+    "copied from the frame before": ("#d9b3e0", (Excluded.COPIED,)),
+    "wrong match, moved or undetermined": ("#c0392b", WRONG_MATCH),
 }
-"""observations of a frame, as the mask has them"""
+"""colors of the observations of a frame, and the reasons for exclusion that each stands for; every reason has one"""
 GRID = np.geomspace(0.05, 2000.0, 300)
 """px, where the distribution is drawn"""
 RATIOS = np.geomspace(1e-3, 100.0, 200)
@@ -56,12 +55,12 @@ def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None
     upper.set_ylabel("median error, px")
     upper.set_title(smoothed(len(run.t)))
     counts = observations_by_frame(run.observed.problem)
-    colors = [BANDS[name] for name in counts]
+    colors = [BANDS[name][0] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
     lower.set_ylabel("observations per frame")
     lower.set_ylim(bottom=0)
     time_axis(run, [upper, lower])
-    bands = [swatch(BANDS[name], name) for name in counts if counts[name].any()]
+    bands = [swatch(BANDS[name][0], name) for name in counts if counts[name].any()]
     title_and_legend(figure, "Median reprojection error by frame, and the observations", [*handles, *bands])
     return figure
 
@@ -184,12 +183,11 @@ def medians_by_class(
 
 
 def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) observations per frame by the names of BANDS."""
+    """(T,) observations per frame, by the names of BANDS: their sum is that of all observations."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
-    reasons = [(Excluded.NO,), COARSE, (Excluded.COPIED,), WRONG_MATCH]
     return {
-        name: np.bincount(frame[np.isin(excluded, reason)], minlength=problem.n_frames).astype(np.float64)
-        for name, reason in zip(BANDS, reasons, strict=True)
+        name: np.bincount(frame[np.isin(excluded, reasons)], minlength=problem.n_frames).astype(np.float64)
+        for name, (_, reasons) in BANDS.items()
     }
 
 

@@ -23,7 +23,7 @@ CAPTIONS: Final = "captions.json"
 UNDATED: Mapping[str, Mapping[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """metadata without the time of writing"""
 COMPRESSION = 3
-"""of a PNG; zlib's default makes files 7 % smaller in 1.4 times the time"""
+"""compression level of a PNG; zlib's default makes files 7 % smaller in 1.4 times the time"""
 _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 

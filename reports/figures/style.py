@@ -53,7 +53,7 @@ DASHES: Mapping[str, tuple[float, ...]] = {
     "#AA4499": DASH_DOT,
     "#332288": DASH_DOT_DOT,
 }
-"""of the lines of a color, solid where it has none: two colors that color-blind readers may confuse differ in these"""
+"""dashes of the lines of a color, solid without: two colors that color-blind readers may confuse differ in these"""
 DARK_GROUND, DARK_INK, DARK_CHROMA = "#1d2126", "#edf0f2", 1.15
 """ground and black ink of a figure on a dark page, and by how much colors are stronger there"""
 
@@ -62,7 +62,7 @@ MAX_NAME = 48
 GREEN, BAND, GRAY = "#6b9a72", "#d7e8d9", "#555555"
 """expected values, the band around them, and marks of no estimator"""
 MARKERS = "os^Dv<P*X>"
-"""of lines on paper, distinguished without color"""
+"""markers of lines on paper, distinguished without color"""
 MARKS_PER_LINE = 8
 """marks of a line on paper"""
 REFERENCE_ORDER = 2.0
@@ -79,13 +79,13 @@ class Style:
     """matplotlib's rcParams"""
     width: float
     dpi: int
-    """of a PNG"""
+    """resolution of a PNG"""
     room: float
     """height of everything around the panels of a column"""
     letters: int
     """characters in a row of the legend"""
     spare: int
-    """of these, how many the mark of each entry takes"""
+    """letters that the mark of each entry takes"""
     truth: Mapping[str, Any]
     """line of the true path"""
     titled: bool

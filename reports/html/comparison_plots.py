@@ -15,7 +15,7 @@ from ..figures.panels import nees_bounds, nees_median
 from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
 
 MOMENTS = 4000
-"""of the slider, at most"""
+"""largest number of positions of the slider"""
 REFERENCE_MOMENTS = 1000
 """poses of the reference among them, at most, where no estimate has a pair"""
 GAP = 10.0

@@ -33,7 +33,7 @@ CAPTIONS: Mapping[str, str] = {
     "pose.",
     "height": "Along the up direction of the recording.",
     "reprojection_over_time": "Above, the median error over all observations of the landmarks that an estimator has. "
-    "Below, the observations of each frame; the mask excludes those that contradict their own track.",
+    "Below, all recorded observations of each frame, and which of them the mask excludes.",
     "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over "
     "those it used. Curves farther left are better.",
     "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "

@@ -95,7 +95,7 @@ class Page:
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """title -> settings, versions and the like, at the end"""
     colors: Mapping[str, str] = field(default_factory=dict)
-    """of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
+    """color of each name in tables and plots; in the order of `plots["estimators"]`, where there are plots"""
     plots: Mapping[str, Any] | None = None
     """see `plot_data.page_data`"""
     still_paths: Picture | None = None
@@ -143,7 +143,7 @@ def _tables(holders: "Iterable[Section | Folded]") -> Iterator[Table]:
 
 
 def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
-    """What the template needs of the plots besides their data."""
+    """Properties of the plots that the template needs besides their data."""
     numbered = list(enumerate(plots["charts"]))
     shown = [(str(i), one["name"]) for i, one in enumerate(plots["estimators"]) if one["answered"]]
     has = {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")}

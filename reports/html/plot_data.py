@@ -241,7 +241,7 @@ def _observations(run: Run) -> dict[str, Any] | None:
 
 
 def _bookmarks(run: Run) -> list[dict[str, Any]]:
-    """Frames worth a look: first divergences, and the second with the most wrong matches."""
+    """Frames worth a look: first divergences, and the second with the most suspected errors of tracks."""
     bookmarks: list[dict[str, Any]] = []
     for result in run.compared:
         left = divergence_onset(run, result)
@@ -250,7 +250,5 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
             bookmarks.append({"frame": left.frame, "text": text})
     worst = worst_second(run.problem)
     if worst is not None:
-        t = run.problem.sequence.t
-        middle = int(np.argmin(np.abs(t - t[0] - worst.second - 0.5)))
-        bookmarks.append({"frame": middle, "text": "most wrong matches"})
+        bookmarks.append({"frame": worst.frame, "text": "most wrong or moving points"})
     return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))

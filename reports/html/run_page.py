@@ -36,7 +36,7 @@ from .plot_encoding import embedded_json
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
 MARKUP_BYTES = 500_000
-"""of tables, style and script, generously"""
+"""upper bound on tables, style and script"""
 BAND_FIGURES = ("three_sigma_", "velocity_and_biases_")
 EVIDENCE_FIGURES = ("held_out", *BAND_FIGURES, "reprojection_classes", "image_regions", "map_difference")
 """beginnings of the names of the figures that stand beside the evidence"""
@@ -92,8 +92,9 @@ def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) ->
     spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m"])]
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
-        f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}. "
-        f"Problem: {problem['preset']}, {counted(problem['features'], 'feature')}."
+        f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}"
+        f"{' (after repair)' if problem['repairs'] else ''}. Problem: {problem['preset']}, "
+        f"{number(problem['features'])} of the tracks."
     )
 
 
@@ -133,7 +134,7 @@ def _sections(
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
             "evidence",
-            "Beyond the paths: held-out tracks, consistency, residuals, map",
+            f"Beyond the paths: {'' if run.held_out is None else 'held-out tracks, '}consistency, residuals, map",
             beyond if evidence.columns else [],
             "Beyond the paths",
         ),

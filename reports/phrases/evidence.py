@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
+from fgbaseline.data.plural import plural
 
 from ..formatting import listed, number, per_cent
 
@@ -15,15 +16,14 @@ if TYPE_CHECKING:
     from fgbaseline.compare import Trust
 
 DEGREES_OF_FREEDOM = 6
-"""of a pose"""
+"""degrees of freedom of a pose"""
 FIRST = 6
 """sentences of a verdict that stand above the table"""
 MEANING: Mapping[str, str] = {
     "doubtful": "a small divergence from it counts, a large one may be its own error",
     "untrusted": "divergence from it does not measure accuracy",
 }
-"""of a reference that is not trusted"""
-ROUGH = "The interval is rough: fewer than 10 independent blocks fit the path."
+"""consequence of a verdict other than `trusted`"""
 
 
 @cache
@@ -35,11 +35,21 @@ def overconfidence_bound() -> float:
 
 
 def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
-    """Trust in a reference, with its first three reasons and what it means for divergence from it."""
-    word, reasons = trust.verdict.name.lower(), "; ".join(trust.reasons[:3])
+    """Trust in a reference with its first reason where it is trusted, else with three and what follows from it."""
+    word = trust.verdict.name.lower()
+    if word == "trusted" and trust.criteria:
+        n = len(trust.criteria)
+        first = f"{trust.reasons[0][0].upper()}{trust.reasons[0][1:]}"
+        return f"The reference, {name}, is trusted ({n} of {plural(n, 'criterion', 'criteria')}). {first}."
+    reasons = "; ".join(trust.reasons[:3])
     if word == "trusted" or not is_compared:
         return f"The reference, {name}, is {word}: {reasons}."
     return f"The reference, {name}, is {word}: {reasons}; {MEANING[word]}."
+
+
+def causal_estimate(reference: str) -> str:
+    """Description of the by-product of a smoother."""
+    return f"the causal estimate of {reference} (pose k from frames 0 to k)"
 
 
 def sample_requirement() -> str:
@@ -48,28 +58,25 @@ def sample_requirement() -> str:
 
 
 def threshold(bound: float) -> str:
-    """Threshold on a distance: 1 % of the path or, where that is more, 5 m."""
-    return (
-        f"threshold {number(bound)} m"
-        if bound >= FAR
-        else f"threshold {per_cent(FAR_SHARE)} of the path, {number(bound)} m"
-    )
+    """Threshold on a distance: 5 m, or 1 % of the path where that is less."""
+    return f"{bound:g} m" if bound >= FAR else f"{per_cent(FAR_SHARE)} of the path, {number(bound)} m"
 
 
 def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:
-    """Largest `quantity` of all estimators and the exceedances, in a sentence for each threshold.
+    """Largest `quantity` of all estimators and the exceedances, two sentences for each threshold.
 
-    `most` has threshold and maximum by name, m; `onset` says when the threshold is first exceeded, where it is.
+    `most` has threshold (m) and maximum (with its unit) by name; `onset` has the times of exceedance, where there are
+    any.
     """
     names: dict[str, list[str]] = {}
     for name, (bound, _) in most.items():
         names.setdefault(threshold(bound), []).append(name)
     sentences = []
     for text, those in names.items():
-        each = listed(f"{name} {most[name][1]} m" for name in those)
-        beyond = "; ".join(f"by {name} {onset[name]}" for name in those if name in onset)
-        exceeded = f" The threshold is first exceeded {beyond}." if beyond else ""
-        sentences.append(f"Maximum {quantity}: {each}; {text}.{exceeded}")
+        each = listed(f"{name} {most[name][1]}" for name in those)
+        beyond = "; ".join(f"{name} {onset[name]}" for name in onset if name in those)
+        exceeded = f" Above the threshold: {beyond}." if beyond else ""
+        sentences.append(f"Maximum {quantity}: {each}; threshold {text}.{exceeded}")
     return sentences
 
 
@@ -79,8 +86,8 @@ def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> st
         number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
     )
     return (
-        f"1-sigma of {name} itself: {along} m (RMS along the path), {final} m at the end; rotation {turn}° and "
-        f"{final_turn}° (under the problem's noise model, first pose fixed, unaligned)."
+        f"1-sigma of {name} itself, with the first pose fixed: position {along} m RMS, {final} m at the end; "
+        f"rotation {turn}° RMS, {final_turn}° at the end."
     )
 
 

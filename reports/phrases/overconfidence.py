@@ -1,4 +1,4 @@
-"""Sentences on overconfident estimators: the sigma that they claim beside the error that they make."""
+"""Sentences on overconfident estimators: the 1-sigma that they claim beside their error."""
 
 import numpy as np
 
@@ -52,7 +52,10 @@ def _claim(run: Run, result: Result) -> str:
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
     measured = f" ({known})" if known else ""
     claimed = number(_claimed(result))
-    return f"{result.name} claims {claimed} m (1-sigma) and is {number(distance)} m from {other}{measured}"
+    return (
+        f"{result.name} claims a 1-sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m (RMSE)"
+        f"{measured}"
+    )
 
 
 def _actual(run: Run, result: Result) -> tuple[float, str]:

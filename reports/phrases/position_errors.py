@@ -9,7 +9,7 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Resu
 from fgbaseline.compare.trajectory_comparison.samples import coverage
 
 from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolution, resolved
-from .evidence import threshold_sentences
+from .evidence import causal_estimate, threshold_sentences
 
 NOTABLE_SHARE = 0.05
 """share of heading or scale in the squared position error from which on it is reported"""
@@ -20,14 +20,14 @@ def position_rmse(comparison: Comparison) -> list[str]:
     name = comparison.reference.name
     others = [result for result in comparison.ranked if not result.entry.by_product]
     by_products = [
-        f"{result.name}, a by-product of {name} with pose k from data up to frame k: {_rmse(result)}."
+        f"{result.name}, {causal_estimate(name)}: {_rmse(result)}."
         for result in comparison.ranked
         if result.entry.by_product
     ]
     if not others:
         return by_products
     if comparison.ranking.same:
-        path = float(others[0].departure["travelled"][-1])
+        path = float(others[0].departure["traveled"][-1])
         share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
@@ -76,7 +76,7 @@ def _signed(meters: float) -> str:
 
 
 def _rmse(result: Result) -> str:
-    """Position RMSE with its interval, `0.52 m [0.41, 0.66]`; 0 below the resolution of the files."""
+    """Position RMSE with its interval, `0.52 m [0.41, 0.66]`, or as below the resolution of the files."""
     if _is_unresolved(result):
         return f"{resolved(result.rmse, resolution(result.resolution, 'm'))} m"
     value, mark, bounds = interval(*result.statistics["translation"]["rmse"]).partition(" [")
@@ -89,10 +89,12 @@ def maximum_errors(comparison: Comparison) -> list[str]:
     for result in comparison.ranked:
         if result.passing is not None:
             t = result.passing.t - float(result.matched.reference.t[0])
-            when = f"after {number(t)} s" if result.matched.reference.stamped else f"at frame {result.passing.frame}"
-            onset[result.name] = f"{when}, {number(result.passing.travelled)} m along the path"
+            when = f"{number(t)} s" if result.matched.reference.stamped else f"frame {result.passing.frame}"
+            onset[result.name] = f"first at {when}, {number(result.passing.traveled)} m along the path"
     largest = {r.name: float(np.nanmax(r.departure["position"])) for r in comparison.ranked}
-    most = {r.name: (r.bound, resolved(largest[r.name], resolution(r.resolution, "m"))) for r in comparison.ranked}
+    most = {
+        r.name: (r.bound, f"{resolved(largest[r.name], resolution(r.resolution, 'm'))} m") for r in comparison.ranked
+    }
     return threshold_sentences("position error", most, onset)
 
 

@@ -17,6 +17,7 @@ from fgbaseline.compare.divergence_onset import (
     AROUND,
     divergence_onset,
     divergence_threshold,
+    mask_share,
     worst_second,
     wrong_share,
 )
@@ -24,7 +25,7 @@ from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
 
-from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
+from ..formatting import counted, distance, listed, number, per_cent
 from ..results.evidence import frame_ranges, summarize_sigma
 from .evidence import (
     DEGREES_OF_FREEDOM,
@@ -37,6 +38,8 @@ from .evidence import (
 from .overconfidence import overconfidence_sentences
 from .run_accuracy import ate_sentences, divergence_sentences
 
+SUSPECTED = "wrong matches, moving points or undetermined points"
+"""reasons of `WRONG_MATCH`"""
 LONGEST_LIST = 80
 """letters of a list of frames; of a longer one only the first and the last frame are named"""
 
@@ -52,7 +55,7 @@ def verdict(run: Run) -> list[str]:
         ate_sentences,
         divergence_sentences,
         _coverage,
-        partial(_with_status, Status.RECOVERED),  # the table marks them, and what they lost shows in the ranking
+        partial(_with_status, Status.RECOVERED),  # the table marks them, and their loss shows in the ranking
         _maximum_divergence,
         _missing_poses,
         _consistency,
@@ -84,7 +87,7 @@ def _reference(run: Run) -> list[str]:
 
 
 def _reference_sigma(run: Run) -> list[str]:
-    """Possible distance of the reference itself from the truth, by its own covariances."""
+    """Uncertainty of the reference itself, by its own covariances."""
     if run.reference is None:
         return []
     sigma = summarize_sigma(run.results[run.reference].evidence.sigma)
@@ -114,40 +117,39 @@ def _coverage(run: Run) -> list[str]:
 
 
 def _maximum_divergence(run: Run) -> list[str]:
-    """Largest divergence of each estimator, and when it first exceeds the threshold."""
+    """Largest divergence of each estimator, and from when on it exceeds the threshold, the first one first."""
+    not_compared = run.by_products | run.same_graph
     rivals = [
-        r
-        for r in run.compared
-        if r.divergence is not None and r.name not in run.by_products and known(r.divergence).any()
+        r for r in run.compared if r.divergence is not None and r.name not in not_compared and known(r.divergence).any()
     ]
-    found = {r.name: divergence_onset(run, r) for r in rivals}
+    onsets = {r.name: onset for r in rivals if (onset := divergence_onset(run, r)) is not None}
+    found = dict(sorted(onsets.items(), key=lambda item: item[1].frame))
     sentences = threshold_sentences(
         "divergence",
         {
-            r.name: (divergence_threshold(r), resolved(divergence_summary(r.divergence)["max"], RESOLUTION))
+            r.name: (divergence_threshold(r), distance(divergence_summary(r.divergence)["max"]))
             for r in rivals
             if r.divergence is not None
         },
         {
-            name: f"at {onset.seconds:.1f} s (frame {onset.frame}), and in "
-            f"{'all frames' if onset.beyond == 1.0 else f'{per_cent(onset.beyond)} of the frames'} from then on"
+            name: f"from {onset.seconds:.1f} s (frame {onset.frame}) on"
+            + ("" if onset.beyond == 1.0 else f", in {per_cent(onset.beyond)} of the frames")
             for name, onset in found.items()
-            if onset is not None
         },
     )
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
-    wrong = {n: onset.wrong for n, onset in found.items() if onset is not None and onset.wrong is not None}
+    wrong = {name: onset.wrong for name, onset in found.items() if onset.wrong is not None}
     if wrong and overall is not None:
-        each = listed(f"{per_cent(share)} for {name}" for name, share in wrong.items())
+        each = listed(f"{per_cent(share)} of the observations ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Share of the observations that the mask excluded as wrong matches within {AROUND:g} s of that: {each} "
-            f"({per_cent(overall)} in the whole recording)."
+            f"Within {AROUND:g} s of these onsets the mask excluded {each} as {SUSPECTED}; {per_cent(overall)} in the "
+            "whole recording."
         )
     return sentences
 
 
 def _with_status(status: Status, run: Run) -> list[str]:
-    """Estimators that ended so, by reason."""
+    """Estimators that ended with a status, by reason."""
     reasons: dict[str, list[str]] = {}
     for result in run.results.values():
         if result.estimate.status is status:
@@ -193,7 +195,7 @@ def _invalid_covariances(run: Run) -> list[str]:
 
 
 def _held_out(run: Run) -> list[str]:
-    """Held-out errors; without other minima of the reference's graph, which do not compete with it."""
+    """Held-out errors, without other solvers of the reference's graph, which do not compete with it."""
     if run.held_out is None:
         return []
     ranking, held, errors = run.held_out.ranking, run.held_out.held, run.held_out.errors
@@ -224,19 +226,26 @@ def _common_observations(run: Run) -> list[str]:
         return []
     each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
-        f"Median reprojection error over the {counted(len(common), 'observation')} that all estimators used: {each}."
+        f"Median reprojection error over the {counted(len(common), 'observation')} that all estimators with landmark "
+        f"updates used: {each}."
     ]
 
 
 def _mask(run: Run) -> list[str]:
-    """Share of the observations that the mask excluded as wrong matches, and the worst second."""
+    """Share of the observations that the mask excluded, and of the suspected errors among them the worst second."""
+    n, excluded = mask_share(run.problem)
+    if excluded == 0:
+        return []
+    total = f"The mask excluded {per_cent(excluded / n)} of the observations ({number(excluded)} of {number(n)})."
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     worst = worst_second(run.problem)
     if overall is None or worst is None:
-        return []
+        return [total]
+    second = f"{worst.second:.0f} s to {worst.second + 1.0:.0f} s"
     return [
-        f"The mask excluded {per_cent(overall)} of the observations as wrong matches, which contradict their tracks; "
-        f"at most {per_cent(worst.share)}, in the second from {worst.second:.0f} s on."
+        total,
+        f"As {SUSPECTED} it excluded {per_cent(overall)}; their largest share is {per_cent(worst.share)}, from "
+        f"{second}.",
     ]
 
 
@@ -246,7 +255,7 @@ def _assumed_noise(run: Run) -> list[str]:
         return []
     if problem.imu is not None:
         return [
-            f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px are assumed as noise (one sigma), not "
+            f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px are assumed as noise (1-sigma), not "
             "estimated from this recording; the noise of the inertial samples is as given."
         ]
     sigma = np.sqrt(np.median(np.diagonal(problem.increment_covariance, axis1=1, axis2=2), axis=0))

@@ -1,23 +1,37 @@
 """Sentences on ATE and divergence; a difference is claimed only where it is significant.
 
 It is significant where the 95 % interval of the paired block bootstrap excludes zero, over the frames in which all
-estimators have a pose, and where the printed figures differ. By-products of the reference and other minima of its graph
-do not compete with it: their divergence is reported, and they are not ranked.
+estimators have a pose, and where the printed figures differ. The causal estimate of the reference and other solvers of
+its graph do not compete with it: their divergence is reported, and they are not ranked.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import PurePath
 
 import numpy as np
 
-from fgbaseline.compare import PairedRanking, RmseDifference, divergence_summary, paired_ranking, rmse_difference
+from fgbaseline.compare import (
+    PairedRanking,
+    RmseDifference,
+    Verdict,
+    divergence_summary,
+    paired_ranking,
+    rmse_difference,
+)
 from fgbaseline.compare.divergence_onset import path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.reference_trust import BATCH_CRITERIA
 from fgbaseline.compare.sample_sizes import insufficient_truth
+from fgbaseline.compare.statistics.block_bootstrap import MIN_BLOCKS
+from fgbaseline.data import EventKind
+from fgbaseline.data.plural import plural
 
-from ..formatting import RESOLUTION, counted, listed, number, per_cent, resolved
+from ..formatting import counted, distance, interval, listed, number, per_cent, resolved
 from ..results.metrics import ate_resolution
-from .evidence import ROUGH, no_difference
+from .evidence import causal_estimate, no_difference
+
+WITHIN_SIGMAS = 3.0
+"""1-sigmas of the reference up to which an order by divergence says nothing on accuracy"""
 
 
 def is_claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
@@ -62,7 +76,7 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
         than = listed(f"{name} ({text[name]} m)" for name in better)
         sentences.append(
             f"The reference {reference} has a larger ATE ({text[reference]} m) than {than}, by paired bootstrap{over}; "
-            f"divergence from it does not measure accuracy on this recording.{_rough(pairs[name] for name in better)}"
+            f"divergence from it does not measure accuracy on this recording.{_rough({n: pairs[n] for n in better})}"
         )
     sentences += no_difference(reference, [name for name in smaller if name not in (*better, *equal)], "ATE", over)
     if equal:
@@ -86,27 +100,32 @@ def divergence_sentences(run: Run) -> list[str]:
     if found.rmse:
         sentences += _ranked(run, rivals, found)
     elif rivals:
-        each = listed(f"{name} {resolved(r.divergence_rmse, RESOLUTION)} m" for name, r in rivals.items())
+        each = listed(f"{name} {distance(r.divergence_rmse)}" for name, r in rivals.items())
         sentences.append(f"Divergence from {run.reference} (RMSE, no frames in common, not ranked): {each}.")
     for result in known:
-        divergence = f"divergence {resolved(result.divergence_rmse, RESOLUTION)} m (RMSE)"
         if result.name in run.by_products:
-            sentences.append(
-                f"{result.name}, a by-product of {run.reference} with pose k from data up to frame k: {divergence}."
-            )
+            divergence = f"divergence {distance(result.divergence_rmse)} (RMSE)"
+            sentences.append(f"{result.name}, {causal_estimate(str(run.reference))}: {divergence}.")
         elif result.name in run.same_graph:
-            sentences.append(f"{result.name}, another minimum of the graph of {run.reference}: {divergence}.")
+            sentences.append(_same_graph(run, result))
     return sentences
+
+
+def _same_graph(run: Run, result: Result) -> str:
+    """Distance of another solver of the reference's graph, which may have started at the reference's answer."""
+    away = distance(result.divergence_rmse)
+    if EventKind.STARTED_AT_ISAM2 not in {event.kind for event in result.estimate.events}:
+        return f"{result.name}, which minimizes the same cost as {run.reference}: divergence {away} (RMSE)."
+    agrees = all(c.verdict is Verdict.TRUSTED for c in run.trust.criteria if c.code in BATCH_CRITERIA)
+    ends = "stays at the same minimum" if agrees else "leaves it"
+    return f"{result.name}, started at the answer of {run.reference}, {ends}: {away} (RMSE) from {run.reference}."
 
 
 def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[str]:
     first, *others = found.rmse
 
     def each(names: Iterable[str]) -> str:
-        return listed(
-            f"{name} {resolved(found.rmse[name], RESOLUTION)} m{_share(found.rmse[name], rivals[name])}"
-            for name in names
-        )
+        return listed(f"{name} {distance(found.rmse[name])}{_share(found.rmse[name], rivals[name])}" for name in names)
 
     over = f"RMSE over a path of {number(path_length(rivals[first]))} m{_over(run, found)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
@@ -119,9 +138,21 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     if equal:
         sentences.append(f"The divergence of {listed([first, *equal])} is the same to the printed digits.")
     if larger:
-        rough = _rough(found.behind[name] for name in larger)
+        rough = _rough({name: found.behind[name] for name in larger})
         sentences.append(f"Larger divergence than {first}, by paired bootstrap: {each(larger)}.{rough}")
+        sentences += _closeness(run, found)
     return sentences
+
+
+def _closeness(run: Run, found: PairedRanking) -> list[str]:
+    """States that an order within few sigmas of the reference is not one by accuracy."""
+    sigma = run.results[str(run.reference)].evidence.sigma.position_rmse
+    if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
+        return []
+    return [
+        f"All of them are within {WITHIN_SIGMAS:g} of {run.reference}'s own 1-sigma ({number(sigma)} m RMS): this "
+        "order shows closeness to it, not accuracy."
+    ]
 
 
 def _share(rmse: float, result: Result) -> str:
@@ -129,8 +160,16 @@ def _share(rmse: float, result: Result) -> str:
     return f" ({per_cent(rmse / length)} of the path)" if length > 0 else ""
 
 
-def _rough(differences: Iterable[RmseDifference]) -> str:
-    return "" if all(difference.reliable for difference in differences) else f" {ROUGH}"
+def _rough(differences: Mapping[str, RmseDifference]) -> str:
+    """Intervals of differences that are not reliable, and the number of independent blocks that they rest on."""
+    each = [
+        f"{name} {interval(d.value, d.low, d.high)} m ({plural(int(d.blocks), 'block')})"
+        for name, d in differences.items()
+        if not d.reliable
+    ]
+    if not each:
+        return ""
+    return f" Interval of the difference, rough with fewer than {MIN_BLOCKS} independent blocks: {listed(each)}."
 
 
 def _over(run: Run, found: PairedRanking) -> str:

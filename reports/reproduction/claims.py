@@ -47,7 +47,7 @@ class Claim:
     cause: str
     """cause of the measured value, by the diagnosis"""
     repaired: str
-    """the same filter on the repaired recording; empty where it does not apply"""
+    """result of the filter on the repaired recording; empty where it does not apply"""
     simulated: bool
     """whether the filter used simulated features"""
 

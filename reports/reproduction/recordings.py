@@ -20,7 +20,7 @@ MAPPED = (700, 1000)
 TRACKS_PER_FRAME = 13_289 / 3_026
 """new tracks per frame of 10.npz, and of its stand-in"""
 ANGULAR_AXES = "x,-y,-z"
-"""of the recorded rates: as diagnosed in 03.npz, of the same car and course"""
+"""axes of the recorded rates, as diagnosed in 03.npz, which has the same car and course"""
 STANDSTILL = 0.2
 """m/s, below which the gyroscope measures its bias"""
 LEAST_STANDSTILL = 20

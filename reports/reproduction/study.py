@@ -116,7 +116,7 @@ class Study:
     mapped: dict[int, Mapped]
     """by number of features"""
     slam: Estimate
-    """of figure 9"""
+    """SLAM of figure 9"""
     staged: list[Staged]
     low: dict[str, Outcome]
     """with low noise: `pixels`, `motion`, and `none` for zero motion noise"""

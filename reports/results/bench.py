@@ -35,13 +35,13 @@ class Results:
     costs: pd.DataFrame
     """`COSTS`, one row per run and estimator"""
     summaries: Mapping[str, Mapping[str, Any]]
-    """of the runs that did not fail, by name, without timings"""
+    """summaries of the runs that did not fail, by name, without timings"""
     failures: Mapping[str, str]
-    """of whole runs, by name"""
+    """reasons of failed runs, by name"""
     nees: Mapping[tuple[str, str], list[FloatArray]]
     """(T,) of each run that has any, by case and estimator"""
     seconds: float
-    """of all runs together"""
+    """computation time of all runs, s"""
 
     @property
     def cases(self) -> list[str]:

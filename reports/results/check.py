@@ -25,7 +25,7 @@ class Shortage:
 
     @property
     def reason(self) -> str:
-        """What there is, and what is asked for."""
+        """Size of the sample, and the required one."""
         there, asked = f"{self.n}", f"{self.smallest}"
         if self.coverage is not None:
             there += f" over {100.0 * self.coverage:.3g} % of the time"
@@ -60,7 +60,7 @@ class Line:
 
     @property
     def margin(self) -> float | None:
-        """How far inside its bounds the value is; negative outside."""
+        """Margin of the value inside its bounds; negative outside."""
         return None if self.value is None or self.bounds is None else self.bounds.margin(self.value)
 
     @property

@@ -113,6 +113,7 @@ class Behind(Statistic):
     """RMSE of the positions above that of the nearest estimate, with a paired block bootstrap."""
 
     block: int
+    blocks: Annotated[Number, Field(description="number of blocks that fit into the series")]
     reliable: bool
 
 
@@ -162,7 +163,7 @@ class Passing(Part):
 
     bound_m: float
     t: Number
-    travelled_m: Number
+    traveled_m: Number
 
 
 class EstimateSummary(Part):

@@ -117,7 +117,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         "passing": {
             "bound_m": result.bound,
             "t": None if result.passing is None else result.passing.t,
-            "travelled_m": None if result.passing is None else result.passing.travelled,
+            "traveled_m": None if result.passing is None else result.passing.traveled,
         },
         **_pixels(result.pixels),
         "map": None if result.map is None else _map(result.map),

@@ -11,9 +11,9 @@ from fgbaseline.data.formats.named_file import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
 SUMMARY = "summary.json"
-"""of `run` and `bench`, and the file by which a run's folder is known"""
+"""results of `run` and `bench`, and the file that identifies a run's folder"""
 COMPARISON = "comparison.json"
-"""of `compare`, and the file by which a comparison's folder is known"""
+"""results of `compare`, and the file that identifies a comparison's folder"""
 
 
 def read_document(path: Path) -> dict[str, Any]:

@@ -115,6 +115,7 @@ class HeldOutError(Part):
 
 
 REFERENCE = "it is the reference"
+SAME_GRAPH = "same graph as the reference's: P - P_ref is zero up to rounding"
 
 
 def summarize_evidence(run: Run, result: Result) -> dict[str, Any]:
@@ -146,12 +147,19 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
     no_truth = "" if result.evidence.nees is not None else "the recording has no ground truth"
     no_tracks = "none of its landmarks has enough observations"
     is_alone = result.evidence.difference is None
+    comparable = result.evidence.difference is not None and result.evidence.difference.comparable.any()
+    same_graph = SAME_GRAPH if result.name in run.same_graph else ""
     return {
         "nees": no_truth or no_covariance or "no frame has both ground truth and a positive definite covariance",
         "covariance": "it gives no covariance",
         "nees_reference": alone
         if is_alone
-        else no_covariance or "P - P_ref is positive definite in no frame, or one of the two has no covariance",
+        else no_covariance
+        or (
+            same_graph or "P - P_ref is positive definite in no frame"
+            if comparable
+            else "no frame has two positive definite covariances"
+        ),
         "sigma": no_covariance or "no pose has a positive definite covariance",
         "sigma_ratio": alone if is_alone else no_covariance or "no frame has two positive definite covariances",
         "nis": "it records no innovations",

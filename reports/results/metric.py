@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
 REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
-NEES, REFERENCE_NEES, RESIDUALS, COST = "NEES", "reference NEES", "residuals of tracks", "cost"
+NEES, REFERENCE_NEES, RESIDUALS, RUNTIME = "NEES", "reference NEES", "residuals of tracks", "runtime"
+OBSERVATIONS = "observations"
 SIGMA, CONSISTENCY = "1-sigma", "consistency"
 VELOCITY, GYROSCOPE_BIAS, ACCELEROMETER_BIAS = "velocity", "gyroscope bias", "accelerometer bias"
 STATE_NEES = "NEES of the state"
@@ -37,14 +38,17 @@ TERMS: Mapping[str, str] = {
     ATE: "Distance of the positions from ground truth, m. Aligned: after SE(3) alignment, with raw inertial data after "
     "alignment in yaw and position. Unaligned: both start at one pose, as in the charts over time. In a comparison: "
     "from the reference, after the alignment that was asked for.",
-    SIGMA: "Standard deviation of the positions by an estimator's own covariances, m, under the problem's noise model, "
-    "with the first pose fixed, unaligned. A consistent estimator's error is as large.",
+    SIGMA: "Square root of the trace of an estimator's own position covariance, m, under the problem's noise model, "
+    "with the first pose fixed, unaligned; RMS over the frames. The RMSE of a consistent estimator is as large. "
+    "An estimator is called overconfident where its 1-sigma is below its RMSE, and either its median NEES is above "
+    "14.4 (97.5 % quantile of one pose) or P is smaller than P_ref in most frames.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
     RPE: "Error of the motion between two poses a delta apart, m and °.",
     "drift": "Relative error per meter (or second) over a tenth of the path.",
     SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; shorter where the path is too short.",
     REPROJECTION: "Norm of the four pixel differences (uL, vL, uR, vR) of an observation, px. Common observations are "
-    "those that every estimator used.",
+    "those that every estimator with landmark updates used.",
+    OBSERVATIONS: "Used: share of the observations that the mask leaves.",
     HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
     "path, px. It judges motion over a second or two, not drift. A path is separated from the best where "
     "'above the best by at least' is positive.",
@@ -53,10 +57,12 @@ TERMS: Mapping[str, str] = {
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "
     "in the median. Frames where P − P_ref is not positive definite are left out. An estimator is overconfident where "
     "its P is smaller than P_ref in a direction, in most frames.",
-    "NIS per degree of freedom": "Squared innovations of a filter over their covariance: 1 is expected.",
+    "NIS per degree of freedom": "Squared innovations of a filter over their covariance: 1 is expected, less where the "
+    "pixel noise is inflated for time-correlated errors. It judges one step against this noise, so that a filter with "
+    "a small NIS can still be overconfident in its poses.",
     "sigma ratio": "Sigma of an estimator over that of the reference, median of the frames: a filter's is above 1.",
-    RESIDUALS: "Squared residuals of a track over the noise assumed, per degree of freedom: 1 is expected. A point is "
-    "dynamic where a constant velocity explains its residuals: it moved, or its track slid.",
+    RESIDUALS: "Chi-square of a track's residuals under the assumed noise, per degree of freedom: 1 is expected. A "
+    "point is dynamic where a constant velocity explains its residuals: it moved, or its track slid.",
     MAP: "Distance of landmarks from the reference's of the same number, m; in the frame of each one's own camera it "
     "is without drift. 1.54 sigmas of P − P_ref are expected.",
     **INERTIAL_TERMS,
@@ -85,11 +91,11 @@ class Tables(Flag):
     """Tables that a metric is a column of."""
 
     MAIN = auto()
-    """of a run, on its page"""
+    """main table of a run's page"""
     EVIDENCE = auto()
-    """of a run, below the charts of its page"""
+    """table below the charts of a run's page"""
     TERMINAL = auto()
-    """of a run"""
+    """table of a run on the terminal"""
     BENCH = auto()
     COMPARISON = auto()
 
@@ -112,9 +118,9 @@ class Metric:
     better: Better = Better.NEITHER
     tables: Tables = NONE
     scale: float = 1.0
-    """of the figure in a table over that in the results"""
+    """figure in a table over that in the results"""
     term: str = ""
-    """of the glossary, where it is not the group"""
+    """term of the glossary, where it is not the group"""
     brief: str = ""
     """heading on the terminal and in a bench, where it is not the group"""
     name: str = ""

@@ -1,4 +1,4 @@
-"""How results were made: versions, machine, date and command line."""
+"""Provenance of results: versions, machine, date and command line."""
 
 import os
 import platform

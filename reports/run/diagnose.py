@@ -105,7 +105,12 @@ def _print_findings(findings: tuple[Finding, ...]) -> None:
     def row(finding: Finding) -> Row:
         certainty = "" if finding.certainty == "counted" else f" ({finding.certainty})"
         figures = (quantity(x, finding.unit).replace(NO_BREAK, " ") for x in (finding.before, finding.after))
-        return Row(finding.code, tuple(map(Cell, (f"{finding.sentence}{certainty}", *figures))))
+        return Row(finding.code, tuple(map(Cell, (f"{finding.sentence}{certainty}", finding.measure, *figures))))
 
-    columns = (Column("description", words=True), Column("before"), Column("after"))
+    columns = (
+        Column("description", words=True),
+        Column("measure", words=True),
+        Column("before repair"),
+        Column("after"),
+    )
     print_table(Table(columns, tuple(map(row, findings)), name="finding"), width=UNWRAPPED, spaced=True)

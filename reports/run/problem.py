@@ -37,7 +37,7 @@ BESIDE = ("velocities", "extrinsic")
 IMAGES = ("cameras", "right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
 TRACKS = "tracks.npz"
-"""of a run on images, in its folder"""
+"""file of the tracks in the folder of a run on images"""
 MARK = "summary.json"
 """the file that marks a run's folder"""
 
@@ -61,7 +61,7 @@ class RunSettings:
     as_recorded: bool = False
     """no diagnosis, no repairs, assumed noise"""
     time_unit: TimeUnit | None = None
-    """of the recording's stamps; None to detect it"""
+    """unit of the recording's stamps; None to detect it"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
     imu: Path | None = None
@@ -81,7 +81,7 @@ class RunSettings:
     times: Path | None = None
     """stamps of the images of two folders"""
     topics: tuple[str, ...] = ()
-    """of a bag: left, right and, if any, the IMU"""
+    """topics of a bag: left, right and, if any, the IMU"""
     tracker: Path | None = None
     """TOML file of the settings of the tracker"""
     repairs: Path | None = None
@@ -93,7 +93,7 @@ class RunSettings:
     add_body: BodyFrame | None = None
     """body whose poses they have; None for the IMU"""
     add_time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """of ambiguous time stamps"""
+    """unit of ambiguous time stamps"""
     add_offset: float = 0.0
     """added to their stamps, s"""
 

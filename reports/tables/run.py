@@ -12,10 +12,11 @@ import pandas as pd
 
 from fgbaseline.compare import Criterion
 from fgbaseline.compare.estimate_comparison import Run, same_frames
+from fgbaseline.compare.reference_trust import SHARE
 from fgbaseline.data import Estimate, Event
 from fgbaseline.data.finding import Finding
 
-from ..formatting import DASH, INFINITY, RESOLUTION, counted, number, per_cent, quantity, resolved
+from ..formatting import DASH, INFINITY, RESOLUTION, counted, listed, number, per_cent, quantity, resolved
 from ..results.json_tree import INFINITE, at, leaves
 from ..results.metric import ATE, DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import ate_resolution, shown_in
@@ -29,6 +30,7 @@ OVERCONFIDENT = "overconfident"
 NOT_POSITIVE_DEFINITE = (
     "in most frames P - P_ref is not positive definite: the claimed covariance is below the reference's"
 )
+NOT_DEFINED = "P - P_ref is not positive definite in the others"
 MAX_DYNAMIC = 100
 MAX_EVENTS = 200
 """kinds of events of an estimator, with their causes, that are listed"""
@@ -49,18 +51,30 @@ Estimators = Mapping[str, Mapping[str, Any]]
 def main_table(run: Run, estimators: Estimators) -> Table:
     """Every estimator's main figures from `estimators` of `summary.json`; figures that no estimator has are left out.
 
-    What belongs to the reference's own run or graph is near to it by construction and is not called best.
+    Estimates from the reference's own run or graph are close to it by construction and are not called best.
     """
     table = _table(run, estimators, shown_in(MAIN))
     if not table.columns:
         return table
-    near = "; the reference, its by-products and other minima of its graph are not ranked by divergence"
     caption = (
-        f"Best of a column in bold{near if run.reference is not None else ''}; equal printed values are all "
-        "bold. Reprojection errors are over all observations of the landmarks that an estimator has; common "
-        "observations are those that every estimator used."
+        f"Best of a column in bold; equal printed values are all bold.{_unranked(run)} Reprojection errors "
+        "are over all observations of the landmarks that an estimator has; common observations are those that every "
+        "estimator with landmark updates used."
     )
     return replace(table, caption=caption)
+
+
+def _unranked(run: Run) -> str:
+    """Sentence on the estimators that are not ranked by divergence; empty without a reference."""
+    if run.reference is None:
+        return ""
+    reasons = {
+        **dict.fromkeys(sorted(run.added), "aligned"),
+        **dict.fromkeys(sorted(run.same_graph), "same graph"),
+        **dict.fromkeys(sorted(run.by_products), "its causal estimate"),
+    }
+    each = [f"{name} ({why})" for name, why in reasons.items() if name in run.results]
+    return f" Not ranked by divergence: {listed([f'{run.reference} (the reference)', *each])}."
 
 
 def main_values(estimators: Estimators) -> pd.DataFrame:
@@ -178,14 +192,15 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
 
 def _criterion(c: Criterion) -> Row:
     sign = "≥" if c.at_least else "≤"
-    texts = (f"{sign} {number(c.doubtful)}", f"{sign} {number(c.untrusted)}", c.verdict.name.lower(), c.remark)
-    cells = (*_numbers(c.value), *map(Cell, texts))
-    return Row(f"{c.name}, {c.unit}" if c.unit else c.name, cells)
+    text = per_cent if c.unit == SHARE else number
+    limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
+    texts = (text(c.value), *limits, c.verdict.name.lower(), c.remark)
+    return Row(f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name, tuple(map(Cell, texts)))
 
 
 def _stands_for(run: Run, name: str, metric: Metric) -> bool:
-    """Whether OVERCONFIDENT stands for the median reference NEES: P is smaller than P_ref in most frames of both."""
-    if metric.path != ("nees_reference", "median") or name in run.unranked:
+    """Whether OVERCONFIDENT stands for the reference NEES: P is smaller than P_ref in most frames of both."""
+    if metric.path not in (("nees_reference", "median"), ("nees_reference", "mean")) or name in run.unranked:
         return False
     difference = run.results[name].evidence.difference
     return difference is not None and difference.is_overconfident
@@ -197,13 +212,18 @@ def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
 
 
 def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:
-    """What the summary's notes say of a missing value, by its own key or that of what it belongs to."""
+    """Reason of a missing value in the summary's notes, by its own key or its parent's."""
     notes: Mapping[str, str] = estimator.get("notes") or {}
     return notes.get(metric.key) or notes.get(metric.path[0]) or metric.absent or "no such figure"
 
 
 def _left_out(estimator: Mapping[str, Any], metric: Metric) -> str:
-    """How many errors a figure leaves out since they are missing; empty where it leaves out none."""
+    """Errors or frames that a figure leaves out, and why; empty where it leaves out none."""
+    if metric.path[0] == "nees_reference":
+        frames, left_out = (int(at(estimator, "nees_reference", key) or 0) for key in ("frames", "left_out"))
+        if not left_out or metric.path[1] == "left_out":
+            return ""
+        return f"over {number(frames)} of {counted(frames + left_out, 'frame')}: {NOT_DEFINED}"
     missing = at(estimator, metric.path[0], "missing") or 0
     return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
 
@@ -220,16 +240,17 @@ def metrics_table(summary: Summary) -> pd.DataFrame:
 
 
 def findings_table(findings: Iterable[Finding]) -> Table:
-    """Findings of the diagnosis before and after repair; the status is the certainty of what is not counted."""
+    """Findings of the diagnosis with a measure before and after repair; the status is the certainty, if not counted."""
     rows = tuple(
         Row(
             f.sentence,
-            (Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
+            (Cell(f.measure), Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
             status="ok" if f.certainty == "counted" else f.certainty,
         )
         for f in findings
     )
-    return Table((Column("before"), Column("after")), rows, name="finding")
+    columns = (Column("measure", words=True), Column("before repair"), Column("after"))
+    return Table(columns, rows, name="finding")
 
 
 def _residuals(run: Run) -> Table:
@@ -259,7 +280,7 @@ def _moved(run: Run) -> Table:
         Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
         for row in moved.head(MAX_DYNAMIC).to_dict("records")
     )
-    headings = ("observations", "speed, m/s", "squared residuals", "of these explained")
+    headings = ("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
     return Table(tuple(map(Column, headings)), rows, name="landmark", title=title)
 
 
@@ -280,7 +301,7 @@ def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
 
 
 def exclusions_table(summary: Mapping[str, Any]) -> Table:
-    """How many observations are excluded for each reason by `summary.json`, the most frequent first."""
+    """Numbers of observations excluded for each reason in `summary.json`, the most frequent first."""
     counts: Mapping[str, int] = at(summary, "problem", "excluded") or {}
     n = max(1, int(at(summary, "sequence", "observations") or 0))
     rows = tuple(

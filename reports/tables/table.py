@@ -26,7 +26,7 @@ class Column:
     words: bool = False
     """whether its cells are words, which are aligned to the left"""
     term: str = ""
-    """of the glossary"""
+    """term of the glossary"""
 
     @classmethod
     def of(cls, metric: Metric, group: str = "") -> Self:
@@ -54,7 +54,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What a row is about, and its cells; in place of cells the reason why there are none."""
+    """Name and cells of a row, or in place of cells the reason why there are none."""
 
     name: str
     cells: tuple[Cell, ...]
@@ -65,12 +65,12 @@ class Row:
     reference: bool = False
     link: str = ""
     term: str = ""
-    """of the glossary"""
+    """term of the glossary"""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What writers and the HTML macro lay out."""
+    """Table as the writers and the HTML macro lay it out."""
 
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]

@@ -1,7 +1,6 @@
 """Estimator `fixed-lag`: each pose from the data up to a few seconds after it, at a bounded cost per frame."""
 
 import time
-from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +11,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from ..errors import FAILURES, failure_reason
-from ..frame_update import add_with_recovery
+from ..frame_update import add_with_recovery, recovery_reason
 from ..graph.cheirality import CHEIRALITY_VIOLATION
 from ..graph.gtsam_conversions import in_solver_frame
 from ..graph_builder import GraphBuilder
@@ -52,14 +51,14 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
     except FAILURES as error:
         return Estimate.failed("fixed-lag", failure_reason(error), T, len(problem.excluded))
     events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in window.lost]
-    trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
+    reason = recovery_reason(events)
     estimate = Estimate(
         name="fixed-lag",
         world_T_imu=window.states.world_T_imu,
         landmarks=window.landmarks(),
         used=problem.scatter_mask(window.used),
-        status=Status.RECOVERED if trouble else Status.OK,
-        reason=f"finished with events: {', '.join(trouble)}" if trouble else "",
+        status=Status.RECOVERED if reason else Status.OK,
+        reason=reason,
         seconds=seconds,
         seconds_total=time.perf_counter() - start,
         events=tuple(events),

@@ -32,7 +32,7 @@ class FixedLagWindow:
         self._lag = CheckpointedFixedLag(lag, settings, self._unit_length)
         self._seconds = lag
         self._last_seen: dict[int, float] = {}
-        """of each landmark in the window"""
+        """time of the last observation of each landmark in the window"""
         self._observed: dict[int, list[int]] = {}
         self._times_initialized: Counter[int] = Counter()
         self.key: dict[int, int] = {}
@@ -42,7 +42,7 @@ class FixedLagWindow:
         self.newest = -1
         self.used = np.zeros(len(builder.observations), dtype=np.bool_)
         self.states = FrameStates.unknown(problem)
-        """of marginalized frames, from all data in the window then"""
+        """states of marginalized frames, from all data in the window at that time"""
         self.lost: list[int] = []
         """landmarks that violated cheirality when they were marginalized"""
         self._landmark: dict[int, tuple[FloatArray, FloatArray]] = {}

@@ -52,7 +52,7 @@ def state_keys(frame: int, inertial: bool) -> list[int]:
 
 
 def width(key: int) -> int:
-    """How many numbers the tangent of a variable has."""
+    """Dimension of the tangent space of a variable."""
     return 6 if key >> _LETTER_AT in (ord(POSE), ord(BIAS)) else 3
 
 

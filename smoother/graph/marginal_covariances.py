@@ -22,7 +22,7 @@ class _Joint(NamedTuple):
     """Some variables and their joint covariance."""
 
     columns: dict[int, range]
-    """of each variable, by its key"""
+    """columns of each variable, by its key"""
     covariance: FloatArray
 
     def of(self, keys: list[int]) -> list[int]:

@@ -21,7 +21,7 @@ class InitializationCriterion:
 
     min_observations: int = 3
     max_relative_deviation: float = 0.5
-    """of the worst-known direction, as a share of the distance to the camera"""
+    """largest standard deviation in any direction, as a share of the distance to the camera"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,7 +21,7 @@ class Prediction(NamedTuple):
     covariance: FloatArray
     """(6, 6) of its right perturbation [v, w], with the pose before held"""
     factor: gtsam.NonlinearFactor
-    """of the motion"""
+    """factor of the motion"""
 
 
 def predict_state(factors: FactorBuilder, states: FrameStates, k: int) -> Prediction:

@@ -1,7 +1,6 @@
 """Estimators `isam2` (the reference) and `isam2-online`, from one run of iSAM2."""
 
 import time
-from collections import Counter
 from dataclasses import replace
 
 import gtsam
@@ -13,6 +12,7 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 
 from ..errors import FAILURES, failure_reason
+from ..frame_update import recovery_reason
 from ..graph.frame_states import FrameStates
 from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
 from ..graph.gtsam_conversions import in_solver_frame, landmarks_from_values
@@ -57,14 +57,14 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         return Estimate.failed("isam2", failure_reason(error), T, len(problem.excluded))
     states, landmarks = _marginals(smoother, graph, values)
     events = (*smoother.events, *_never_determined(smoother))
-    status, reason = _status(events)
+    reason = recovery_reason(events)
     used = problem.scatter_mask(smoother.used())
     online = Estimate(
         name="isam2-online",
         world_T_imu=smoother.builder.online.world_T_imu,
         landmarks=smoother.online_landmarks(),
         used=used,
-        status=status,
+        status=Status.RECOVERED if reason else Status.OK,
         reason=reason,
         seconds=seconds,
         seconds_total=float(seconds.sum()),
@@ -132,12 +132,3 @@ def _marginals(
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
     kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never fixed its position well enough"
     return [Event(frame, kind, why, landmark) for landmark, frame in smoother.builder.uninitialized.last_seen()]
-
-
-def _status(events: tuple[Event, ...]) -> tuple[Status, str]:
-    harmless = (EventKind.LANDMARK_NEVER_DETERMINED, EventKind.SOLVED_BY_QR)
-    trouble = Counter(event.kind for event in events if event.kind not in harmless)
-    if not trouble:
-        return Status.OK, ""
-    counts = ", ".join(f"{kind} ({n})" for kind, n in sorted(trouble.items()))
-    return Status.RECOVERED, f"finished with events: {counts}"

@@ -36,7 +36,7 @@ class MarginalizedISAM2:
         self._isam = CheckpointedISAM2(params)
         self._graph = gtsam.NonlinearFactorGraph()
         self._marginalized = gtsam.Values()
-        """of the variables that are not in the tree any more"""
+        """values of the variables that are no longer in the tree"""
         self._tree_slot: list[int] = []
         """tree slot of the factor in each slot of the graph"""
         self._frame: list[int] = []
@@ -63,9 +63,9 @@ class MarginalizedISAM2:
     ) -> Listing[int]:
         """Update the tree, see `CheckpointedISAM2`; returns the slots of the new factors, in their order.
 
-        `frames` has for each of them the first frame whose pose it names, or NO_POSE; `newest` are the keys of the
-        state, among the new values, that the tail hangs on from now on; `removed` are slots. What is in the prior
-        already cannot be taken out of it. Raises IndeterminateSystemError.
+        `frames` has the first frame among the poses of each factor, or NO_POSE. `newest` are the keys of the newest
+        state, to which the auxiliary pose is tied from now on. `removed` are slots; factors that are already in the
+        prior stay in it. Raises IndeterminateSystemError.
         """
         places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
         tied = gtsam.NonlinearFactorGraph(factors)
@@ -202,7 +202,7 @@ class MarginalizedISAM2:
 
 
 def _auxiliary_factor(newest: Listing[int]) -> gtsam.NonlinearFactor:
-    """The tie of the auxiliary pose to the newest state; one to several variables says nothing of them."""
+    """Factor between the auxiliary pose and the variables of the newest state, which it does not constrain."""
     if len(newest) == 1:
         return gtsam.BetweenFactorPose3(newest[0], AUXILIARY_POSE, gtsam.Pose3(), AUXILIARY_NOISE)
     graph = gtsam.GaussianFactorGraph()

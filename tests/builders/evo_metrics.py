@@ -27,7 +27,7 @@ OF_MOTIONS = OF_POSES | {
     Relation.DISTANCE: PoseRelation.point_distance,
     Relation.DISTANCE_PERCENT: PoseRelation.point_distance_error_ratio,
 }
-UNITS = {Unit.FRAMES: EvoUnit.frames, Unit.METRES: EvoUnit.meters, Unit.DEGREES: EvoUnit.degrees}
+UNITS = {Unit.FRAMES: EvoUnit.frames, Unit.METERS: EvoUnit.meters, Unit.DEGREES: EvoUnit.degrees}
 ALIGNMENTS: dict[str, tuple[Align, int | None]] = {
     "none": (Align.NONE, None),
     "first pose": (Align.FIRST_POSE, None),

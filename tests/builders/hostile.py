@@ -121,7 +121,7 @@ def gap() -> Sequence:
 
 
 def cut() -> Sequence:
-    """Fifty metres of the drive are cut out, and the stamps do not show it."""
+    """Fifty meters of the drive are cut out, and the stamps do not show it."""
     sequence = drive("town", seconds=16.0, features_per_frame=15.0)
     assert sequence.truth is not None
     x = sequence.truth.world_T_imu[:, :3, 3]

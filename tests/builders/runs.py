@@ -17,7 +17,7 @@ FRAMES = 60
 
 
 def scene(frames: int = FRAMES, **changes: Any) -> Sequence:
-    """A curve of some tens of metres with its truth."""
+    """A curve of some tens of meters with its truth."""
     return replace(Scene(frames=frames).sequence(), **changes)
 
 

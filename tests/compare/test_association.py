@@ -56,7 +56,7 @@ def test_pairs_are_the_closest_first_without_crossing(a: list[float], b: list[fl
             assert abs(x - y) > tolerance or not between
 
 
-def test_a_shift_of_half_an_interval_pairs_neighbours() -> None:
+def test_a_shift_of_half_an_interval_pairs_neighbors() -> None:
     t = np.arange(50.0)
     i, j = nearest_pairs(t, t + 0.5, 0.5)
     np.testing.assert_array_equal(i, np.arange(50))
@@ -248,7 +248,7 @@ def test_a_gap_that_is_the_tolerance_is_within_it() -> None:
     assert compare.associate(path([1.0]), path([1.0]), tolerance=0.0).caption.startswith("1 pose paired (within 0 s;")
 
 
-def test_stamps_of_five_metres_of_driving_apart_are_not_paired_by_default() -> None:
+def test_stamps_of_five_meters_of_driving_apart_are_not_paired_by_default() -> None:
     assert compare.associate(path([0.0, 1.0]), path([0.0099, 1.0101])).estimate.t.tolist() == [0.0099]
 
 
@@ -288,7 +288,7 @@ def test_the_caption_states_how_poses_were_paired() -> None:
 
 
 @pytest.mark.parametrize("sparse", ["reference", "estimate"])
-def test_the_error_with_an_offset_is_in_metres_of_the_reference_also_where_the_scale_is_fitted(sparse: str) -> None:
+def test_the_error_with_an_offset_is_in_meters_of_the_reference_also_where_the_scale_is_fitted(sparse: str) -> None:
     dense, few = path(np.arange(0.0, 20.0, 0.05)), path(np.arange(0.0, 20.0, 0.25))
     reference, estimate = (few, dense) if sparse == "reference" else (dense, few)
     errors = 0.1 * np.random.default_rng(1).normal(size=estimate.position.shape)

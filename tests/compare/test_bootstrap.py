@@ -37,8 +37,8 @@ def test_the_values_are_those_of_evo_and_numpy(errors: list[float]) -> None:
 
 def test_autocovariance_is_its_definition() -> None:
     x = autoregressive(60, 0.5, 0) + 7.0
-    centred = x - x.mean()
-    expected = [np.sum(centred[lag:] * centred[: len(x) - lag]) / len(x) for lag in range(len(x))]
+    centered = x - x.mean()
+    expected = [np.sum(centered[lag:] * centered[: len(x) - lag]) / len(x) for lag in range(len(x))]
     np.testing.assert_allclose(autocovariance(x), expected, atol=1e-12)
 
 
@@ -265,7 +265,7 @@ def test_moments_that_one_of_the_two_lacks_are_left_out() -> None:
 )
 def test_an_interval_that_touches_zero_has_no_sign(low: float, high: float, settled: bool) -> None:
     value = 1.0 if low + high > 0.0 else -1.0
-    assert compare.RmseDifference(value, low, high, 1, True).settled == settled
+    assert compare.RmseDifference(value, low, high, 1, 100.0, True).settled == settled
 
 
 def test_looking_at_a_few_draws_at_a_time_changes_nothing() -> None:

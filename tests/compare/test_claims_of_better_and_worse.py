@@ -35,9 +35,9 @@ def run_with(truth: dict[str, FloatArray], divergence: dict[str, FloatArray]) ->
     run, results = plain_run(), {}
     for name, result in run.results.items():
         if name in truth:
-            travelled = np.linspace(0.0, 100.0, FRAMES)
+            traveled = np.linspace(0.0, 100.0, FRAMES)
             tables = [
-                pd.DataFrame({"position": e, "rotation_deg": 0.0, "travelled": travelled})
+                pd.DataFrame({"position": e, "rotation_deg": 0.0, "traveled": traveled})
                 for e in (truth[name], divergence[name])
             ]
             results[name] = replace(result, truth_aligned=tables[0], divergence=tables[1])
@@ -113,7 +113,7 @@ def test_the_minimum_of_the_same_graph_is_not_ranked_against_the_reference() -> 
     assert not [s for s in ate_sentences(run) if "larger ATE" in s or "significant" in s]
     sentences = divergence_sentences(run)
     assert ": ekf 3.00 m " in sentences[0]
-    assert "batch, another minimum of the graph of isam2: divergence 0.0100 m (RMSE)." in sentences
+    assert "batch, which minimizes the same cost as isam2: divergence 0.0100 m (RMSE)." in sentences
 
 
 def test_values_with_the_same_digits_are_best_together_and_the_same_graph_is_not_nearest() -> None:

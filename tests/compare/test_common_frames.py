@@ -74,9 +74,9 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
 
 
 def test_no_interval_decides_an_order_other_than_that_of_the_point_estimates() -> None:
-    assert not figures.RmseDifference(0.1, -0.3, -0.2, 5, True).settled
-    assert not figures.RmseDifference(-0.1, 0.2, 0.3, 5, True).settled
-    assert figures.RmseDifference(0.1, 0.05, 0.2, 5, True).settled
+    assert not figures.RmseDifference(0.1, -0.3, -0.2, 5, 20.0, True).settled
+    assert not figures.RmseDifference(-0.1, 0.2, 0.3, 5, 20.0, True).settled
+    assert figures.RmseDifference(0.1, 0.05, 0.2, 5, 20.0, True).settled
 
 
 def path() -> FloatArray:
@@ -84,9 +84,9 @@ def path() -> FloatArray:
     return se3.compose(se3.exp(np.tile([0.8, 0.0, 0.01, 0.002, 0.0, 0.012], (T - 1, 1))))
 
 
-def off(poses: FloatArray, metres: float, seed: int) -> FloatArray:
+def off(poses: FloatArray, meters: float, seed: int) -> FloatArray:
     moved = poses.copy()
-    moved[:, :3, 3] += metres * np.random.default_rng(seed).normal(size=(len(poses), 3))
+    moved[:, :3, 3] += meters * np.random.default_rng(seed).normal(size=(len(poses), 3))
     return moved
 
 

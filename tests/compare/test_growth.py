@@ -30,15 +30,15 @@ def matched(estimate: FloatArray, reference: FloatArray | None = None) -> compar
     return compare.associate(Trajectory(t, truth, "reference"), Trajectory(t, estimate, "estimate"))
 
 
-def test_a_wrong_scale_drifts_by_its_percentage_of_every_metre() -> None:
+def test_a_wrong_scale_drifts_by_its_percentage_of_every_meter() -> None:
     pair = matched(winding(scale=1.03))
-    rates = compare.drift(pair, metres=1.0, seconds=1.0)
+    rates = compare.drift(pair, meters=1.0, seconds=1.0)
     assert rates.loc["translation", "value"] == pytest.approx(3.0, rel=1e-3)
     assert rates.loc["translation per second", "value"] == pytest.approx(0.3, rel=1e-2)
     assert rates.loc["rotation", "value"] == pytest.approx(0.0, abs=1e-9)
     assert rates.loc["translation", "over"] == "1 m"
     end = np.linalg.norm(pair.estimate.position[-1] - pair.reference.position[-1])
-    length = compare.divergence_along_path(pair)["travelled"].iloc[-1]
+    length = compare.divergence_along_path(pair)["traveled"].iloc[-1]
     assert rates.loc["end translation", "value"] == pytest.approx(100.0 * end / length)
 
 
@@ -58,10 +58,10 @@ def test_without_stamps_there_are_no_metrics_per_second() -> None:
     with pytest.raises(InputError, match="it has no time stamps"):
         compare.relative_errors(frames, 1.0, "s")
     still = np.tile(np.eye(4), (N, 1, 1))
-    with pytest.raises(InputError, match="it stands still, so it has no drift per metre"):
+    with pytest.raises(InputError, match="it stands still, so it has no drift per meter"):
         compare.drift(matched(winding(), still))
     with pytest.raises(InputError, match="no two poses are 9000 m apart"):
-        compare.drift(pair, metres=9000.0)
+        compare.drift(pair, meters=9000.0)
 
 
 def test_heading_to_the_left_is_positive_and_grows_as_it_was_made_to() -> None:
@@ -82,10 +82,10 @@ def test_the_parts_of_the_path_add_up() -> None:
     assert squares == pytest.approx((table["position"] ** 2).sum())
     grown = (parts["per_frame"] * np.append(parts["frames"][:-1], parts["frames"].iloc[-1] - 1)).sum()
     assert grown == pytest.approx(table["position"].iloc[-1])
-    np.testing.assert_allclose(parts["per_metre"], parts["per_frame"], rtol=1e-3)  # steps of one metre
+    np.testing.assert_allclose(parts["per_meter"], parts["per_frame"], rtol=1e-3)  # steps of one meter
     assert np.isnan(table["percent_of_path"].iloc[0])
     assert parts["from_m"].iloc[0] == 0.0
-    assert parts["to_m"].iloc[-1] == table["travelled"].iloc[-1]
+    assert parts["to_m"].iloc[-1] == table["traveled"].iloc[-1]
     with pytest.raises(InputError, match="a path that stands still cannot be split"):
         compare.divergence_growth(compare.divergence_along_path(matched(winding(), np.tile(np.eye(4), (N, 1, 1)))))
 
@@ -97,7 +97,7 @@ def test_the_first_time_beyond_a_bound() -> None:
     assert (table["position"].iloc[: passed.frame] <= 1.0).all()
     assert passed.value == table["position"].iloc[passed.frame] > 1.0
     assert passed.t == pytest.approx(passed.frame * DT)
-    assert passed.travelled == table["travelled"].iloc[passed.frame]
+    assert passed.traveled == table["traveled"].iloc[passed.frame]
     assert compare.first_exceedance(table, 1e6) is None
     turned = compare.divergence_along_path(matched(winding(heading_rate=-0.01)))
     right = compare.first_exceedance(turned, 2.0, "heading_deg")
@@ -219,19 +219,19 @@ def test_drift_is_measured_over_a_tenth_of_the_path_or_its_longest_step() -> Non
         assert rates.loc["translation", "over"] == over
         assert rates.loc["translation per second", "over"] == f"{0.1 * DT * (len(x) - 1):.4g} s"
         assert rates.loc["end translation", "over"] == "50 m"
-    for metres in (0.0, -1.0):
-        with pytest.raises(InputError, match=f"no two poses are {metres:g} m apart, of 50 m in all"):
-            compare.drift(matched(ahead(x), ahead(x)), metres=metres)
+    for meters in (0.0, -1.0):
+        with pytest.raises(InputError, match=f"no two poses are {meters:g} m apart, of 50 m in all"):
+            compare.drift(matched(ahead(x), ahead(x)), meters=meters)
 
 
 def test_drift_is_measured_over_pairs_up_to_half_as_long_again() -> None:
     x = np.array([0.0, 3.0, 6.0])
-    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "n"] == 2
-    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), metres=2.0).loc["translation", "value"] == pytest.approx(
+    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), meters=2.0).loc["translation", "n"] == 2
+    assert compare.drift(matched(ahead(1.1 * x), ahead(x)), meters=2.0).loc["translation", "value"] == pytest.approx(
         10.0
     )
     with pytest.raises(InputError, match=r"no two poses are 1\.9 m apart"):
-        compare.drift(matched(ahead(x), ahead(x)), metres=1.9)
+        compare.drift(matched(ahead(x), ahead(x)), meters=1.9)
 
 
 def test_growth_of_a_known_case() -> None:
@@ -246,7 +246,7 @@ def test_growth_of_a_known_case() -> None:
         "to_m": [2.0, 4.0],
         "frames": [2, 3],
         "rmse": pytest.approx([0.005**0.5, (0.29 / 3) ** 0.5]),
-        "per_metre": pytest.approx([0.1, 0.1]),
+        "per_meter": pytest.approx([0.1, 0.1]),
         "per_frame": pytest.approx([0.1, 0.1]),
         "heading_deg": [0.0, 0.0],
     }

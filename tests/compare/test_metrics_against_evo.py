@@ -38,7 +38,7 @@ def matched(reference: FloatArray, estimate: FloatArray) -> compare.MatchedTraje
 
 
 def assert_same(ours: FloatArray, evos: FloatArray, size: float) -> None:
-    """To 1e-9, relative, or absolute near zero: of the size of the paths for what is in metres."""
+    """To 1e-9, relative, or absolute near zero: of the size of the paths for what is in meters."""
     assert len(ours) == len(evos)
     np.testing.assert_allclose(ours, evos, rtol=1e-9, atol=1e-9 * max(1.0, size))
 
@@ -87,7 +87,7 @@ def test_absolute_and_relative_errors_of_random_trajectories(alignment: str) -> 
         steps = np.linalg.norm(np.diff(reference[:, :3, 3], axis=0), axis=1)
         deltas = {
             Unit.FRAMES: int(random.integers(1, 6)),
-            Unit.METRES: float(random.uniform(0.5, 4.0) * np.median(steps)),
+            Unit.METERS: float(random.uniform(0.5, 4.0) * np.median(steps)),
             Unit.DEGREES: float(random.uniform(5.0, 120.0)),
         }
         for unit, delta in deltas.items():
@@ -130,19 +130,19 @@ def real_pair(request: pytest.FixtureRequest, recordings: Callable[[str], Path])
 @pytest.mark.parametrize("alignment", ALIGNMENTS)
 def test_absolute_errors_of_real_trajectories(real_pair: tuple[FloatArray, FloatArray], alignment: str) -> None:
     reference, estimate = (poses[:: -(-len(poses) // 200)] for poses in real_pair)
-    if "first" in alignment:  # a few metres of straight road leave evo no rotation; see the test of degenerate paths
+    if "first" in alignment:  # a few meters of straight road leave evo no rotation; see the test of degenerate paths
         reference, estimate = reference[::-1], estimate[::-1]
     assert_absolute_as_evo(reference, estimate, alignment)
 
 
-@pytest.mark.parametrize(("delta", "unit"), [(7, Unit.FRAMES), (0.1, Unit.METRES), (3.0, Unit.DEGREES)])
+@pytest.mark.parametrize(("delta", "unit"), [(7, Unit.FRAMES), (0.1, Unit.METERS), (3.0, Unit.DEGREES)])
 @pytest.mark.parametrize("all_pairs", [False, True], ids=["consecutive", "all pairs"])
 def test_relative_errors_of_real_trajectories(
     real_pair: tuple[FloatArray, FloatArray], delta: float, unit: Unit, all_pairs: bool
 ) -> None:
     stride = -(-len(real_pair[0]) // 100)
     reference, estimate = (poses[::stride] for poses in real_pair)
-    if unit is Unit.METRES:  # of a path of 30 m or of several kilometres
+    if unit is Unit.METERS:  # of a path of 30 m or of several kilometers
         delta *= float(np.linalg.norm(np.diff(reference[:, :3, 3], axis=0), axis=1).sum())
     for alignment in ("SE(3)", "Sim(3)"):
         assert assert_relative_as_evo(reference, estimate, alignment, delta, unit, all_pairs, True) > 0

@@ -44,9 +44,9 @@ def disturbed(poses: FloatArray, seed: int, position: float = 0.1) -> FloatArray
     """The poses with errors of 3 degrees, and of `position` (m) along the path's own directions only."""
     random = np.random.default_rng(seed)
     wrong = poses @ se3.exp(random.normal(size=(len(poses), 6)) * np.repeat([0.0, 0.05], 3))
-    centred = poses[:, :3, 3] - poses[:, :3, 3].mean(axis=0)
+    centered = poses[:, :3, 3] - poses[:, :3, 3].mean(axis=0)
     weights = random.normal(size=(len(poses), len(poses))) / len(poses)
-    wrong[:, :3, 3] += position * weights @ centred
+    wrong[:, :3, 3] += position * weights @ centered
     return wrong
 
 

@@ -65,7 +65,7 @@ def test_unlike_in_evo_rounding_does_not_decide_where_steps_sum_to_a_delta() -> 
     poses = straight(np.full(100, 0.1))
     evos = filter_pairs_by_path(list(poses), 1.0)
     assert [end - start for start, end in evos] != [10] * 10  # ten times 0.1 is a little less than 1
-    ours = compare.pose_pairs(poses, np.arange(101.0), 1.0, Unit.METRES)
+    ours = compare.pose_pairs(poses, np.arange(101.0), 1.0, Unit.METERS)
     assert (ours[:, 1] - ours[:, 0]).tolist() == [10] * 10
 
 
@@ -136,18 +136,18 @@ def test_a_table_of_motions_has_first_frame_and_span_of_each() -> None:
     assert table["end"].tolist() == [2, 4]
     assert table["t"].tolist() == [0.0, 1.5]
     assert table["seconds"].tolist() == [1.5, 2.5]
-    assert table["metres"].tolist() == [3.0, 5.0]
+    assert table["meters"].tolist() == [3.0, 5.0]
     assert table["translation"].tolist() == pytest.approx([0.5, 1.0])
     assert table["distance"].tolist() == pytest.approx([0.5, 1.0])
     assert table["distance_percent"].tolist() == pytest.approx([100.0 / 6.0, 20.0])
     assert table["rotation_deg"].tolist() == [0.0, 0.0]
     every = compare.relative_errors(matched, 2, Unit.FRAMES, all_pairs=True)
     assert every["start"].tolist() == [0, 1, 2, 3]
-    near = compare.relative_errors(matched, 3.0, Unit.METRES, all_pairs=True, tolerance=0.0)
-    wide = compare.relative_errors(matched, 3.0, Unit.METRES, all_pairs=True, tolerance=0.34)
+    near = compare.relative_errors(matched, 3.0, Unit.METERS, all_pairs=True, tolerance=0.0)
+    wide = compare.relative_errors(matched, 3.0, Unit.METERS, all_pairs=True, tolerance=0.34)
     assert near["start"].tolist() == [0, 1]
     assert wide["start"].tolist() == [0, 1, 3]
-    own = compare.relative_errors(matched, 3.5, Unit.METRES, all_pairs=True, from_reference=False, tolerance=0.01)
+    own = compare.relative_errors(matched, 3.5, Unit.METERS, all_pairs=True, from_reference=False, tolerance=0.01)
     assert list(zip(own["start"], own["end"], strict=True)) == [(0, 2)]
 
 
@@ -174,7 +174,7 @@ def test_the_table_of_motions_is_named() -> None:
     pair = compare.associate(Trajectory(np.arange(5.0), poses), Trajectory(np.arange(5.0), poses))
     table = compare.relative_errors(pair, 1, "frames")
     assert table.columns.tolist() == [
-        "start", "end", "t", "seconds", "metres",
+        "start", "end", "t", "seconds", "meters",
         "translation", "rotation_deg", "rotation_chord", "pose", "distance", "distance_percent",
     ]  # fmt: skip
 

@@ -84,7 +84,7 @@ def test_on_the_truth_of_other_drives(recordings: Callable[[str], Path], drive: 
     assert sequence.truth is not None
     pair = matched(sequence.t, sequence.truth.world_T_imu, dead_reckoned(sequence))
     found = compare.segment_errors(pair)
-    length = float(compare.divergence_along_path(pair)["travelled"].iloc[-1])
+    length = float(compare.divergence_along_path(pair)["traveled"].iloc[-1])
     assert found.official == (length > 100.0)
     assert_as_devkit(pair.reference.world_T_body, pair.estimate.world_T_body, found)
 
@@ -141,7 +141,7 @@ def test_lengths_that_do_not_fit_and_standing_still_are_errors() -> None:
 
 
 def test_a_segment_ends_with_the_first_pose_that_is_further_than_its_length() -> None:
-    """One metre a step, straight ahead and 10 % too far: worked out by hand."""
+    """One meter a step, straight ahead and 10 % too far: worked out by hand."""
     truth, result = (np.tile(np.eye(4), (10, 1, 1)) for _ in range(2))
     truth[:, 0, 3] = np.arange(10.0)
     result[:, 0, 3] = 1.1 * np.arange(10.0)

@@ -193,7 +193,7 @@ def test_a_car_turning_left_is_ahead_left_or_above(
         np.testing.assert_allclose(inner[name], expected, atol=1e-3 if name != "up" else 1e-12)
     np.testing.assert_allclose(table["position"], 0.7)
     np.testing.assert_allclose(table["rotation_deg"], 0.0, atol=1e-6)
-    np.testing.assert_allclose(table["travelled"], np.arange(40) * 2 * 50 * np.sin(0.01), rtol=1e-12)
+    np.testing.assert_allclose(table["traveled"], np.arange(40) * 2 * 50 * np.sin(0.01), rtol=1e-12)
     assert table.index.name == "frame"
 
 
@@ -215,7 +215,7 @@ def test_a_standing_start_has_the_direction_it_will_leave_in_and_a_stop_the_last
     table = compare.pose_errors(estimate, reference, Z_UP)
     np.testing.assert_allclose(table["across"], 0.5)
     np.testing.assert_allclose(table["along"], 0.0, atol=1e-12)
-    np.testing.assert_allclose(table["travelled"], x)
+    np.testing.assert_allclose(table["traveled"], x)
 
 
 def test_a_path_that_only_stands_still_has_finite_parts() -> None:
@@ -247,7 +247,7 @@ def test_frames_without_a_pose_are_nan_and_cost_nothing_else() -> None:
     parts = ["position", "along", "across", "up", "rotation_deg"]
     assert table.loc[12:, parts].isna().all(axis=None)
     np.testing.assert_array_equal(table.loc[:11], whole.loc[:11])
-    np.testing.assert_array_equal(table["travelled"], whole["travelled"])
+    np.testing.assert_array_equal(table["traveled"], whole["traveled"])
     summary = compare.divergence_summary(table)
     assert summary["rmse"] == pytest.approx(np.sqrt(np.mean(whole.loc[:11, "position"] ** 2)))
     assert np.isnan(summary["final"])

@@ -67,4 +67,4 @@ def test_the_text_of_a_kind_is_the_kind() -> None:
     problem, estimate = with_events(*([kind] * 20))
     _, by_text = with_events(*([str(kind)] * 20))
     assert compare.trust(problem, estimate) == compare.trust(problem, by_text)
-    assert any("of the frames were given up" in reason for reason in compare.trust(problem, estimate).reasons)
+    assert any("of the frames were dropped" in reason for reason in compare.trust(problem, estimate).reasons)

@@ -144,7 +144,7 @@ BAD = {
     "no rotation": (lambda v: v.update(C_c_v=np.ones((3, 3))), "C_c_v .* no rotation"),
     "position of other shape": (lambda v: v.update(rho_v_c_v=np.ones((1, 3))), r"rho_v_c_v: expected shape \(3, 1\)"),
     "no baseline": (lambda v: v.update(b=0.0), "b: expected a positive number, the baseline in meters, got 0.0"),
-    "NaN centre": (lambda v: v.update(cu=np.nan), "cu: expected one finite number"),
+    "NaN center": (lambda v: v.update(cu=np.nan), "cu: expected one finite number"),
     "text": (lambda v: v.update(fu="700"), "fu: it is no dense array of real numbers"),
     "complex": (lambda v: v.update(fv=1j), "fv: it is no dense array of real numbers"),
     "cells": (lambda v: v.update(t=np.array([1, "a"], dtype=object)), "t: it is no dense array of real numbers"),

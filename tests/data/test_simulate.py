@@ -363,11 +363,11 @@ def test_one_noise_leaves_the_others_as_they_were() -> None:
         assert np.array_equal(recorded(after), recorded(before)), name
         assert np.array_equal(after.observations.landmark, before.observations.landmark), name
         assert not np.array_equal(after.observations.pixel, before.observations.pixel), name
-    after, relabelled = simulate_with_labels(dataclasses.replace(base, moving_share=0.2))
-    standing = ~relabelled.moving
+    after, relabeled = simulate_with_labels(dataclasses.replace(base, moving_share=0.2))
+    standing = ~relabeled.moving
     assert np.array_equal(after.observations.landmark[standing], before.observations.landmark)
-    after, relabelled = simulate_with_labels(dataclasses.replace(base, sigma_pixel=0.2))
-    assert np.array_equal(labels.wrong, relabelled.wrong)
+    after, relabeled = simulate_with_labels(dataclasses.replace(base, sigma_pixel=0.2))
+    assert np.array_equal(labels.wrong, relabeled.wrong)
 
 
 # --- axes

@@ -117,7 +117,7 @@ def test_segments_between_jumps_that_are_too_short_are_masked() -> None:
 
 
 @given(st.integers(0, TRACKS - 1), st.integers(0, FRAMES - 1), st.floats(-30.0, 0.999))
-def test_a_small_disparity_is_masked_and_its_neighbours_are_not(track: int, frame: int, disparity: float) -> None:
+def test_a_small_disparity_is_masked_and_its_neighbors_are_not(track: int, frame: int, disparity: float) -> None:
     where = at(track, frame)
     pixel = SCENE.observations.pixel.copy()
     pixel[where, 2] = pixel[where, 0] - disparity

@@ -123,7 +123,7 @@ def test_a_world_moved_by_a_rigid_motion_moves_the_estimate_and_nothing_else(
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_a_thousand_kilometres_from_the_origin_cost_no_millimetre(name: str) -> None:
+def test_a_thousand_kilometers_from_the_origin_cost_no_millimeter(name: str) -> None:
     new_T_old = random_motion(7, 1e6)
     assert_is_moved(data.find_estimator(name)(moved(posed("drive"), new_T_old)), solved(name, "drive"), new_T_old, 1e-3)
 

@@ -39,7 +39,7 @@ def disagreeing(seed: int, kernel: HuberKernel | None = None) -> Problem:
 
 
 def disturbed(problem: Problem, seed: int) -> Estimate:
-    """The truth, moved by some millimetres and milliradians."""
+    """The truth, moved by some millimeters and milliradians."""
     truth, random = problem.sequence.truth, np.random.default_rng(seed)
     assert truth is not None
     assert truth.landmarks is not None

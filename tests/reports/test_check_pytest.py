@@ -29,10 +29,10 @@ def true_path() -> FloatArray:
     return dead_reckoned_path(0.1 * twist)
 
 
-def estimated(metres: float = 0.3, seed: int = 4) -> FloatArray:
-    """The path from another world, each pose off by about so many metres."""
+def estimated(meters: float = 0.3, seed: int = 4) -> FloatArray:
+    """The path from another world, each pose off by about so many meters."""
     random = np.random.default_rng(seed)
-    off = se3.exp(np.column_stack([metres / np.sqrt(3.0) * random.normal(size=(T, 3)), np.zeros((T, 3))]))
+    off = se3.exp(np.column_stack([meters / np.sqrt(3.0) * random.normal(size=(T, 3)), np.zeros((T, 3))]))
     return se3.exp([4.0, -2.0, 1.0, 0.3, 0.2, -0.6]) @ true_path() @ off
 
 

@@ -84,7 +84,7 @@ def test_the_smallest_sample_and_coverage_are_settable_for_the_file_and_for_a_li
     assert judged(document, tmp_path, limits) == 0
 
 
-def test_one_stretch_of_many_metres_is_too_little_of_a_path(tmp_path: Path) -> None:
+def test_one_stretch_of_many_meters_is_too_little_of_a_path(tmp_path: Path) -> None:
     t, poses = 0.1 * np.arange(200), path()
     result = compare(Trajectory(t, poses, "truth"), Trajectory(t, off(poses, 0.01, 1), "mine"), deltas=["90m", "50m"])
     document = result.summary.model_dump(mode="json", by_alias=True)

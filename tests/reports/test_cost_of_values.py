@@ -133,7 +133,7 @@ def followed(speed: float, interval: float) -> Velocities:
 
 
 @pytest.mark.parametrize(("speed", "interval"), [(1e9, 0.1), (8.0, 1e8)])
-def test_a_street_is_not_built_along_velocities_that_lead_over_millions_of_metres(
+def test_a_street_is_not_built_along_velocities_that_lead_over_millions_of_meters(
     speed: float, interval: float
 ) -> None:
     with pytest.raises(InputError, match=r"along: its velocities lead over .* stamps are in s"):

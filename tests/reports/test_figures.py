@@ -125,7 +125,7 @@ def test_the_distribution_ends_at_the_share_under_3_px_of_the_table() -> None:
         assert y[k] == pytest.approx(100.0 * np.mean(errors <= x[k]))
 
 
-def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black() -> None:
+def test_an_estimator_has_one_color_in_all_figures_and_the_reference_is_black() -> None:
     run = standard_run()
     colors = figures.colors(run.results, run.reference)
     assert colors == {
@@ -143,7 +143,7 @@ def test_an_estimator_has_one_colour_in_all_figures_and_the_reference_is_black()
         assert drawn <= {ESTIMATOR_COLORS["ekf"].lower()}, name
 
 
-def test_a_known_estimator_keeps_its_colour_in_every_run_and_others_take_the_remaining_ones() -> None:
+def test_a_known_estimator_keeps_its_color_in_every_run_and_others_take_the_remaining_ones() -> None:
     problem = plain_problem(scene())
     strangers = [answer(problem, f"mine-{i}") for i in range(9)]
     run = run_of(problem, *strangers, answer(problem, "ekf"), answer(problem, "isam2"))
@@ -264,7 +264,7 @@ def test_two_answers_of_one_run_share_a_line_of_time() -> None:
         ((2.9e5, 3.55e5), ["2.9×10⁵", "3×10⁵", "3.1×10⁵", "3.2×10⁵", "3.3×10⁵", "3.4×10⁵", "3.5×10⁵"]),
     ],
 )
-def test_a_logarithmic_axis_is_labelled_with_numbers_and_powers_where_these_would_be_long(
+def test_a_logarithmic_axis_is_labeled_with_numbers_and_powers_where_these_would_be_long(
     limits: tuple[float, float], expected: list[str]
 ) -> None:
     figure = Figure()
@@ -337,3 +337,15 @@ def test_nothing_moves_when_a_figure_is_written(tmp_path: Path) -> None:
         figures.save({"divergence": figure}, tmp_path, (form,))
         assert figure.get_layout_engine() is None
         assert places() == before
+
+
+def test_every_observation_is_in_one_band_of_its_frame_whatever_excludes_it() -> None:
+    problem = plain_problem(scene())
+    reasons = np.array(list(Excluded), dtype=np.uint8)
+    excluded = reasons[np.arange(len(problem.excluded)) % len(reasons)]
+    bands = observations_by_frame(replace(problem, excluded=excluded))
+    frame = problem.sequence.observations.frame
+    np.testing.assert_array_equal(sum(bands.values()), np.bincount(frame, minlength=problem.n_frames))
+    red = "wrong match, moved or undetermined"
+    assert bands[red].sum() == np.isin(excluded, BANDS[red][1]).sum()
+    assert Excluded.COPIED not in BANDS[red][1]

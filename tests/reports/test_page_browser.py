@@ -202,17 +202,17 @@ def test_nothing_runs_over_the_edge_of_a_phone(chromium: Any, address: str, widt
     opened.page.context.close()
 
 
-def test_dark_ground_changes_every_colour_that_it_would_swallow(chromium: Any, address: str) -> None:
+def test_dark_ground_changes_every_color_that_it_would_swallow(chromium: Any, address: str) -> None:
     stroke = "getComputedStyle(document.querySelector('#path-view .line.estimator-2')).stroke"
-    colours = {}
+    colors = {}
     for scheme in ("light", "dark"):
         opened = Opened(chromium, address, scheme=scheme)
-        colours[scheme] = opened.page.evaluate(stroke)
+        colors[scheme] = opened.page.evaluate(stroke)
         if scheme == "dark":
             opened.page.emulate_media(media="print")
-            colours["print"] = opened.page.evaluate(stroke)
+            colors["print"] = opened.page.evaluate(stroke)
         opened.page.context.close()
-    assert colours == {"light": "rgb(0, 0, 0)", "dark": "rgb(237, 240, 242)", "print": "rgb(0, 0, 0)"}
+    assert colors == {"light": "rgb(0, 0, 0)", "dark": "rgb(237, 240, 242)", "print": "rgb(0, 0, 0)"}
 
 
 def test_on_paper_there_are_no_controls(opened: Opened, tmp_path: Path) -> None:

@@ -29,8 +29,9 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     html = rendered(replace(run, problem=problem))
     assert "The recording: 3 faults detected" in html
     assert "It &lt;drifts&gt;." in html
+    assert ">median error of the angular velocity</td>" in html
     assert "<td>0.0271\N{NO-BREAK SPACE}rad/s</td><td>0.0201\N{NO-BREAK SPACE}rad/s</td>" in html
-    assert "<td>6,562</td><td>0</td>" in html
+    assert ">observations</td><td>6,562</td><td>0</td>" in html
     assert "<td>41.2 %</td><td>0.2 %</td>" in html
     assert "standard error 0.001 rad/s" in html
     assert "counted" not in html

@@ -1,14 +1,16 @@
 """The verdict says what constructed runs are known to show."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare.divergence_onset import divergence_onset
+from fgbaseline.compare.divergence_onset import divergence_onset, mask_share, worst_second
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data import Excluded, Observations
+from fgbaseline.data import Event, EventKind, Excluded, Observations
 from fgbaseline.reports.formatting import number
+from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.phrases.run import verdict
 
 from ..builders.runs import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
@@ -30,14 +32,14 @@ def test_every_sentence_has_a_number_or_a_reason() -> None:
         assert any(c.isdigit() for c in sentence) or ":" in sentence, sentence
 
 
-def test_the_nearest_estimator_comes_first_with_metres_and_share_of_the_path() -> None:
+def test_the_nearest_estimator_comes_first_with_meters_and_share_of_the_path() -> None:
     run = standard_run()
     sentences = verdict(run)
     (sentence,) = (s for s in sentences if s.startswith("Smallest divergence from isam2 ("))
     larger = sentence_of(run, "Larger divergence than ekf")
     table = run.results["ekf"].divergence
     assert table is not None
-    rmse, length = float(np.sqrt(np.mean(table["position"] ** 2))), float(table["travelled"].max())
+    rmse, length = float(np.sqrt(np.mean(table["position"] ** 2))), float(table["traveled"].max())
     assert f"{rmse:.3g} m ({100 * rmse / length:.3g} % of the path)" in sentence
     assert ": ekf " in sentence
     assert "dead-reckoning" in larger
@@ -50,20 +52,21 @@ def test_the_divergence_onset_is_the_first_frame_beyond_the_threshold() -> None:
     table = run.results["ekf"].divergence
     assert left is not None
     assert table is not None
-    limit = 0.01 * float(table["travelled"].max())
+    limit = 0.01 * float(table["traveled"].max())
     assert limit < 5.0
     assert table["position"][left.frame] > limit
     assert (table["position"][: left.frame] <= limit).all()
     sentence = sentence_of(run, "Maximum divergence: ")
-    assert f"; threshold 1 % of the path, {limit:.3g} m. The threshold is first exceeded by ekf at " in sentence
-    assert f"by ekf at {left.seconds:.1f} s (frame {left.frame}), and in all frames from then on; by dead" in sentence
+    assert f"; threshold 1 % of the path, {limit:.3g} m. Above the threshold: " in sentence
+    assert f"ekf from {left.seconds:.1f} s (frame {left.frame}) on" in sentence
+    assert "% of the frames" not in sentence
 
 
 def test_a_path_below_the_threshold_is_reported_without_onset() -> None:
     problem = plain_problem(scene())
     run = run_of(problem, answer(problem, "ekf", (0.0, 0.1, 0.0)), answer(problem, "isam2"))
     sentence = sentence_of(run, "Maximum divergence: ekf 0.100 m; threshold 1 % of the path, ")
-    assert "exceeded" not in sentence
+    assert "Above the threshold" not in sentence
 
 
 def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> None:
@@ -77,9 +80,30 @@ def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> Non
     t = problem.sequence.t
     around = np.sum(np.abs(t - t[left.frame]) <= 1.0)
     masked = replace(run, problem=replace(problem, excluded=excluded))
-    sentence = sentence_of(masked, "Share of the observations that the mask excluded")
-    whole = f"({100 / 60:.3g} % in the whole recording)"
-    assert f"as wrong matches within 1 s of that: {100 / around:.3g} % for ekf {whole}" in sentence
+    sentence = sentence_of(masked, "Within 1 s of these onsets the mask excluded")
+    what = "as wrong matches, moving points or undetermined points"
+    assert f"{100 / around:.3g} % of the observations (ekf) {what}; {100 / 60:.3g} % in the whole" in sentence
+
+
+def test_the_mask_sentence_counts_every_reason_and_its_worst_second_is_that_of_the_bookmark() -> None:
+    problem = plain_problem(scene())
+    frame, t = problem.sequence.observations.frame, problem.sequence.t
+    excluded = np.full(len(frame), Excluded.NO, dtype=np.uint8)
+    excluded[frame == 5] = Excluded.COPIED
+    excluded[frame == 41] = Excluded.PREDICTION
+    excluded[frame == 42] = Excluded.MOVING
+    run = run_of(replace(problem, excluded=excluded), answer(problem, "ekf"), answer(problem, "isam2"))
+    n, k = len(frame), int((excluded != Excluded.NO).sum())
+    assert f"The mask excluded {100 * k / n:.3g} % of the observations ({k:,} of {n:,})." in verdict(run)
+    worst = worst_second(run.problem)
+    assert worst is not None
+    assert worst.frame in (41, 42)
+    assert worst.second <= t[worst.frame] - t[0] < worst.second + 1.0
+    assert f"from {worst.second:.0f} s to {worst.second + 1.0:.0f} s" in sentence_of(run, "As wrong matches, moving")
+    marked = [b["frame"] for b in page_data(run)["bookmarks"] if "moving" in b["text"]]
+    assert marked == [worst.frame]
+    unchosen = np.where(frame > 30, excluded, Excluded.FEATURE_NOT_CHOSEN).astype(np.uint8)
+    assert mask_share(replace(problem, excluded=unchosen)).observations == int((frame > 30).sum())
 
 
 def test_a_reference_with_a_larger_error_than_the_filter_is_reported() -> None:
@@ -102,7 +126,9 @@ def test_the_online_estimate_of_the_reference_is_not_ranked_against_it() -> None
     reference = answer(problem, "isam2", (0.0, 0.0, 1.0), by_products={"isam2-online": online})
     run = run_of(problem, reference, online, answer(problem, "ekf", (0.0, 5.0, 0.0)))
     assert "isam2-online" not in sentence_of(run, "Divergence from isam2 (RMSE over")
-    assert "a by-product of isam2" in sentence_of(run, "isam2-online")
+    assert sentence_of(run, "isam2-online").startswith(
+        "isam2-online, the causal estimate of isam2 (pose k from frames 0 to k): divergence "
+    )
     assert not [s for s in verdict(run) if "larger ATE" in s]
 
 
@@ -123,6 +149,40 @@ def test_trust_comes_first_with_its_reasons() -> None:
     assert first.startswith("The reference, isam2, is untrusted: it used 12% of the observations")
     trusted = with_trust(run, compare.Verdict.TRUSTED, "it used 98% of the observations")
     assert verdict(trusted)[0].startswith("The reference, isam2, is trusted")
+    judged = replace(run, trust=replace(run.trust, verdict=compare.Verdict.TRUSTED, reasons=("residual 0.9", "motion")))
+    n = len(run.trust.criteria)
+    assert n >= 7
+    assert verdict(judged)[0] == f"The reference, isam2, is trusted ({n} of {n} criteria). Residual 0.9."
+
+
+def test_an_order_within_the_sigma_of_the_reference_is_not_one_by_accuracy() -> None:
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    filters = [answer(problem, "dead-reckoning", (0.1, 0.0, 0.0)), answer(problem, "ekf", (0.0, 3.0, 0.0))]
+
+    def said(sigma: float) -> list[str]:
+        covariance = np.tile(sigma**2 * np.eye(6), (T, 1, 1))
+        run = run_of(problem, *filters, answer(problem, "isam2", covariance=covariance))
+        return [s for s in verdict(run) if "closeness to it, not accuracy" in s]
+
+    assert said(5.0) == [
+        "All of them are within 3 of isam2's own 1-sigma (8.66 m RMS): this order shows closeness to it, not accuracy."
+    ]
+    assert not said(0.1)
+
+
+def test_a_batch_solution_from_the_answer_of_isam2_is_another_minimum_only_where_it_moved() -> None:
+    problem = plain_problem(scene())
+    start = Event(0, EventKind.STARTED_AT_ISAM2, "")
+
+    def said(offset: float) -> str:
+        batch = answer(problem, "batch", (0.0, offset, 0.0), events=(start,))
+        return sentence_of(run_of(problem, answer(problem, "isam2"), batch), "batch")
+
+    assert re.fullmatch(
+        r"batch, started at the answer of isam2, stays at the same minimum: 1\.\d+ mm \(RMSE\) from isam2\.", said(2e-3)
+    )
+    assert said(30.0).startswith("batch, started at the answer of isam2, leaves it: 17")
 
 
 def test_failures_and_recoveries_are_reported_with_their_reason() -> None:

@@ -28,7 +28,7 @@ def test_the_length_of_a_path_that_bends_is_its_length(recordings: Recordings) -
     assert not any("too short" in sentence for sentence in result.verdict)
 
 
-def test_a_standing_rig_ranks_no_estimator_by_a_hundredth_of_a_millimetre(recordings: Recordings) -> None:
+def test_a_standing_rig_ranks_no_estimator_by_a_hundredth_of_a_millimeter(recordings: Recordings) -> None:
     problem = diagnosis.calibrated(data.read(recordings("cases/40-stationary/v08_stationary.npz")))
     isam2 = smoother.isam2(problem)
     answers = {"isam2": isam2, "fixed-lag": smoother.fixed_lag(problem)}

@@ -49,7 +49,7 @@ def values_of(state: State, problem: Problem, factors: FactorBuilder) -> gtsam.V
 
 
 def near_truth(problem: Problem, random: np.random.Generator, size: float = 1.0) -> State:
-    """The true state, moved by some centimetres and milliradians."""
+    """The true state, moved by some centimeters and milliradians."""
     truth = problem.sequence.truth
     assert truth is not None
     assert truth.landmarks is not None

@@ -52,5 +52,5 @@ def test_a_frame_that_neither_solver_can_solve_is_dropped(monkeypatch: pytest.Mo
     failing(monkeypatch, 5, qr_too=True)
     estimate = smoother.isam2(PROBLEM)
     assert estimate.status is Status.RECOVERED
-    assert "frame without observations (1)" in estimate.reason
+    assert "1 frame's observations dropped" in estimate.reason
     assert not estimate.used[PROBLEM.sequence.observations.frame == 5].any()

@@ -40,7 +40,7 @@ class ImageOptions:
     times: Path | None = None
     """stamps of images whose names are none"""
     topics: tuple[str, ...] = ()
-    """of a bag: left, right (without it, one camera) and, if any, the IMU"""
+    """topics of a bag: left, right (without it, one camera) and, if any, the IMU"""
     imu: Path | None = None
     imu_calibration: Path | None = None
     velocities: Path | None = None

@@ -19,7 +19,7 @@ ENDS = {b"\x89PNG": b"IEND", b"\xff\xd8\xff": b"\xff\xd9"}
 """marks near the end of a complete file, by its first bytes: decoders fill in what is missing"""
 TAIL = 64
 BITS = (8, 10, 12, 14, 16)
-"""of cameras, in images of 16 bits"""
+"""bits of cameras whose images are stored with 16"""
 Raw = NDArray[Any]
 
 

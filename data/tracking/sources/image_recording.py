@@ -22,7 +22,7 @@ class ImagePair(NamedTuple):
     right: Image | None
     """None with one camera"""
     name: str
-    """of the pair in messages"""
+    """name of the pair in messages"""
 
 
 class TruthFile(NamedTuple):

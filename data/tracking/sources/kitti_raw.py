@@ -29,7 +29,7 @@ EARTH = 6378137.0
 """m, radius of the Mercator projection of KITTI's development kit"""
 ONE_UNIT = "The velocities and the true poses are both from the OXTS unit: the truth is not independent of the motion."
 NUMBERS = 30
-"""of a line of oxts, at least 25 of which are read"""
+"""numbers of a line of oxts, at least 25 of which are read"""
 VELOCITY, RATE = slice(6, 8), slice(17, 20)
 """north and east, m/s; angular rates about the body's axes, rad/s"""
 UPWARD = 10

@@ -13,7 +13,7 @@ from ...observations import IntArray
 from ...plural import plural
 
 APART = 0.1
-"""of the median interval between frames: the images of a pair are not farther apart"""
+"""largest interval between the images of a pair, as a share of the median interval between frames"""
 STAMP_DIGITS = {10: 10**9, 13: 10**6, 16: 10**3, 19: 1}
 """ns in the unit of whole stamps since 1970, by their number of digits"""
 

@@ -1,0 +1,60 @@
+"""Language of code and docs: American spelling, and docstrings that start with their subject."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare", "reports", "package", "benchmarks", "tests")
+BRITISH = re.compile(
+    r"travelled|metre(?!l)|colour|neighbour|behaviour|\bcentred?\b|relabelled|(?<!aria-)\blabelled\b|modelling|"
+    r"(?:initial|normal|linear|marginal|visual|general|real|summar|optim|minim|maxim|recogn)is(?:e|ed|es|ing|ation)\b",
+    re.IGNORECASE,
+)
+PERSONS = re.compile(r"\b(who|whoever|nobody|somebody|told|tells?)\b(?! cannot)", re.IGNORECASE)
+
+
+def sources() -> list[Path]:
+    return sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+
+
+def docs() -> list[Path]:
+    return [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def strings_that_document(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of docstrings of modules, classes, functions and attributes."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            yield node.lineno, node.value.value
+
+
+def test_there_is_one_spelling() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{i}: {word.group()}"
+        for path in (*sources(), *docs())
+        if path != Path(__file__)
+        for i, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        for word in BRITISH.finditer(re.sub("`.*?`", "", line) if path.name == "CHANGELOG.md" else line)  # former names
+    ]
+    assert not found
+
+
+@pytest.mark.parametrize("word", ["travelled", "per_metre", "normalised", "colours", "summarise", "initialised"])
+def test_british_words_are_recognized(word: str) -> None:
+    assert BRITISH.search(word)
+
+
+def test_docstrings_start_with_their_subject_and_name_no_persons() -> None:
+    begin = re.compile(r"(of|the same|and)\b", re.IGNORECASE)
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
+        for path in sources()
+        if "tests" not in path.parts
+        for line, text in strings_that_document(path)
+        if begin.match(text) or PERSONS.search(text)
+    ]
+    assert not found
