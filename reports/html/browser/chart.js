@@ -149,8 +149,8 @@ class TimeChart {
     });
     for (const value of this.log ? logTicks(low, high, 5) : ticks(low, high, 4)) {
       parts.push(across(value, value === 0 ? "axis" : "grid"));
-      const text = value !== 0 && Math.abs(Math.log10(Math.abs(value))) >= 4
-        ? value.toExponential(0).replace("e+", "e") : String(Number(value.toPrecision(6)));
+      const short = Number(value.toPrecision(6));
+      const text = value !== 0 && Math.abs(Math.log10(Math.abs(value))) >= 4 ? scientific(short) : String(short);
       parts.push(svg("text", { class: "tick", x: ROOM.left - 6, y: y(value) + 4, "text-anchor": "end" },
         text.replace("-", "−")));
     }
