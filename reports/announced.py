@@ -1,6 +1,5 @@
 """Sentences on the terminal, place of a page there, and the page in the browser."""
 
-import re
 import shutil
 import sys
 import textwrap
@@ -10,11 +9,8 @@ from pathlib import Path
 
 import click
 
-NO_BREAK = "\N{NO-BREAK SPACE}"
-TOGETHER = re.compile(
-    r"(?<=[\d⁰¹²³⁴-⁹]) (?=[%°]|(?:m|km|mm|px|s|ms|m/s|rad/s)\b)|(?<=\d) (?=× 10)|(?<=×) (?=10)|(?<=,) (?=[^\[\]]*\])"
-)
-"""spaces within a quantity and within an interval"""
+from .formatting import NO_BREAK, unbroken
+
 LONGEST_LINE = 100
 """columns of a line that is read with ease, on a wider terminal too"""
 
@@ -32,9 +28,8 @@ def print_sentences(sentences: Sequence[str], most: int | None = None, mark: str
 
 def _wrapped(text: str, mark: str) -> str:
     width = min(LONGEST_LINE, shutil.get_terminal_size().columns)
-    bound = TOGETHER.sub(NO_BREAK, text)
     lines = textwrap.fill(
-        bound,
+        unbroken(text),
         width,
         initial_indent=mark,
         subsequent_indent=" " * len(mark),

@@ -12,6 +12,10 @@ RESOLUTION = 1e-5
 """m and degrees, below which estimates of a run do not differ: `isam2` does not propagate smaller changes"""
 SMALLEST: Mapping[str, float] = {"m": RESOLUTION, "°": RESOLUTION, "%": 10.0 * RESOLUTION, "°/m": 0.1 * RESOLUTION}
 """by unit, what means something in a comparison of trajectories; rates are over 10 m of the path"""
+_TOGETHER = re.compile(
+    r"(?<=[\d⁰¹²³⁴-⁹]) (?=[%°]|(?:m|km|mm|px|s|ms|m/s|rad/s)\b)|(?<=\d) (?=× 10)|(?<=×) (?=10)|(?<=,) (?=[^\[\]]*\])"
+)
+"""spaces within a quantity and within an interval"""
 _DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _TEX = {
     "\\": r"\textbackslash{}",
@@ -72,6 +76,11 @@ def quantity(value: float, unit: str) -> str:
     if unit in ("m/s", "rad/s", "°", "px", "s"):
         return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
     return number(int(value) if float(value).is_integer() else value)
+
+
+def unbroken(text: str) -> str:
+    """A sentence whose quantities and intervals stay on one line."""
+    return _TOGETHER.sub(NO_BREAK, text)
 
 
 def tex(text: str) -> str:

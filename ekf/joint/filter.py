@@ -144,7 +144,7 @@ class JointFilter:
         factor = self._record_nis(k, innovation, variance[order])
         if verdict.rejection is not EventKind.FRAME_DISAGREES:
             self._trust_motion()
-        elif self.n_rejected > 0 and (doubted := self._doubt_motion(k, seen.H, residual, variance)) is not None:
+        elif self.n_rejected > 0 and (doubted := self._doubt_motion(k, seen, variance)) is not None:
             innovation, verdict = doubted
             order, factor = verdict.order, None
             innovation = innovation.in_order(order)
@@ -187,23 +187,23 @@ class JointFilter:
         self.motion_noise = np.zeros_like(self.motion_noise)
 
     def _doubt_motion(
-        self, k: int, H: StackedJacobian, residual: FloatArray, variance: FloatArray
+        self, k: int, seen: _LinearizedObservations, variance: FloatArray
     ) -> tuple[Innovation, GatedObservations] | None:
         """Innovation with more noise in the motion since the last accepted frame, which P then has; None if rejected.
 
         Two successive frames disagree with the prediction: where this frame's observations agree with each other, the
         motion between the frames is less certain than modeled.
         """
-        P, n, pose = self.state.P, self.state.n_body, H.pose_jacobian
-        innovation = Innovation.of(H, residual, P)
+        P, n, pose = self.state.P, self.state.n_body, seen.H.pose_jacobian
+        innovation = Innovation.of(seen.H, seen.residual, P)
         covariance = innovation.own_covariances(variance)
         of_motion = pose @ self.motion_noise[:POSE, :POSE] @ np.swapaxes(pose, 1, 2)
-        factor = motion_noise_factor(residual, covariance, of_motion)
+        factor = motion_noise_factor(seen.residual, covariance, of_motion)
         if factor is None:
             return None
         before = P[:n, :n].copy()
         P[:n, :n] += factor * self.motion_noise
-        innovation = Innovation.of(H, residual, P)
+        innovation = Innovation.of(seen.H, seen.residual, P)
         try:
             verdict = gate_observations(innovation.nis_given_others(variance), self.measurement, self.settings)
         except NotPositiveDefiniteError:

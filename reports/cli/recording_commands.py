@@ -149,10 +149,12 @@ def estimators() -> None:
     """
     from fgbaseline.data import estimator_summaries
 
+    from ..announced import print_sentences
+
     summaries = estimator_summaries()
     width = max(map(len, summaries))
     for name, summary in summaries.items():
-        click.echo(f"{name:{width}}  {summary}")
+        print_sentences([summary], mark=f"{name:{width}}  ")
 
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")

@@ -10,7 +10,7 @@ SAMPLES = 200
 """points of a line that are compared"""
 SAME = 1.5
 """px of a PNG: lines nearer than this everywhere coincide"""
-STRIPE = 1.8
+STRIPE = 1.4
 """points by which a line is wider than the one on it"""
 BELOW_REFERENCE = 1.9
 """zorder of what coincides with the reference"""

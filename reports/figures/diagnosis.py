@@ -156,7 +156,7 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
         panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color=OTHERS)
         handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="normal distribution")
         beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
-        panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {beyond:.1%} beyond 3 sigma")
+        panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {100.0 * beyond:.1f} % beyond 3 sigma")
     for panel in panels[3:]:
         panel.set_xlabel("residual, sigmas")
     for panel in panels[::3]:

@@ -41,7 +41,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
     pictures = {name: replace(picture(name, figure), caption=_caption(name)) for name, figure in figures.items()}
-    notes = {f"Missing figures of {name}": estimate.notes for name, estimate in estimates.items()}
+    notes = {name: estimate.notes for name, estimate in estimates.items() if estimate.notes}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
     bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
     beyond = [p for name, p in pictures.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
@@ -75,7 +75,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                 ),
                 Section("stills", "Still figures", [still_figures(stills)] if stills else []),
             ],
-            settings={**notes, "Files": sources, "Settings": summary.settings},
+            settings={"Missing figures": notes, "Files": sources, "Settings": summary.settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=pictures.get("paths"),

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fgbaseline.reports.figures.saving import EncodedFigure, encoded
 
 from ..figures.style import dark_matrix
-from ..formatting import counted, number
+from ..formatting import counted, number, unbroken
 from ..results.metric import INERTIAL_TERMS, TERMS
 from ..results.provenance import creation
 
@@ -89,7 +89,13 @@ def environment() -> Environment:
     jinja = Environment(
         loader=FunctionLoader(asset), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    jinja.filters |= {"number": number, "counted": counted, "flattened": flattened, "anchor": anchor}
+    jinja.filters |= {
+        "number": number,
+        "counted": counted,
+        "flattened": flattened,
+        "anchor": anchor,
+        "unbroken": unbroken,
+    }
     jinja.globals |= {"dark_matrix": " ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3]))}
     jinja.globals |= {"css": Markup(asset("report.css")), "policy": Markup(NO_SCRIPT), "glossary": TERMS}
     jinja.globals |= {"terms": {term: text for term, text in TERMS.items() if term not in INERTIAL_TERMS}}

@@ -23,6 +23,7 @@ from fgbaseline.reports.bench.run_cache import open_cache
 from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
+from fgbaseline.reports.formatting import unbroken
 from fgbaseline.reports.phrases.bench import sentences
 from fgbaseline.reports.results import bench as tables
 from fgbaseline.reports.results.bench import Results
@@ -191,7 +192,7 @@ def test_the_page_is_whole_escaped_and_leads_to_every_run(results: Results) -> N
     keys = {one.job.key for one in results.planned}
     assert {link for link in page.links if not link.startswith("#")} == {f"runs/{key}/report.html" for key in keys}
     for sentence in sentences(results):
-        assert sentence in page.text
+        assert unbroken(sentence) in page.text
 
 
 def test_every_job_is_a_progress_event_and_the_bars_move(results: Results, tmp_path: Path) -> None:

@@ -2,7 +2,8 @@
 const ROOM = { left: 50, right: 10, top: 8, bottom: 24 };
 const HEIGHT = 190;
 const SHORTEST_DRAG = 6;  // px; anything shorter is a click
-const MEDIANS = 100;  // windows of a running median that the span holds
+const MEDIANS = 100;  // windows of a running median that the span holds, at most
+const WINDOW = 8;  // px of a window, at least
 
 class TimeChart {
   constructor(place, chart) {
@@ -66,14 +67,14 @@ class TimeChart {
     return [...this.chart.lines].filter(([key]) => chosen.shown.has(key));
   }
 
-  // What is drawn of each line shown between two frames: { key, points }, points being [frame, value].
+  // What is drawn of each line shown between two frames in so many pixels: { key, points }, points being [frame, value].
   // Of a line that jumps from frame to frame that is a running median, until the charts are zoomed in.
   drawn(frames, pixels) {
-    const half = this.chart.smooth ? Math.floor((frames[1] - frames[0]) / MEDIANS / 2) : 0;
+    const half = this.chart.smooth ? Math.floor((frames[1] - frames[0]) / Math.min(MEDIANS, pixels / WINDOW) / 2) : 0;
     if (this.words) this.words.textContent = half ? `Running median over ${2 * half + 1} frames; zoomed in, each frame.` : "";
     return this.shown().map(([key, line]) => ({
       key,
-      points: half ? runningMedian(line, frames, half) : thinned(line, frames, pixels).map(k => [k, line[k]]),
+      points: half ? runningMedian(line, frames, half) : thinned(line, frames, 2 * pixels).map(k => [k, line[k]]),
     }));
   }
 
@@ -131,7 +132,7 @@ class TimeChart {
     if (this.width === 0) return;
     const [from, until] = span();
     const frames = [Math.max(0, frameAt(from) - 1), Math.min(run.frames - 1, frameAt(until) + 1)];
-    const lines = this.drawn(frames, 2 * (this.width - ROOM.left - ROOM.right));
+    const lines = this.drawn(frames, this.width - ROOM.left - ROOM.right);
     const [low, high] = this.range(lines, frames);
     const to = this.log ? Math.log : value => value;
     const scale = (HEIGHT - ROOM.top - ROOM.bottom) / (to(high) - to(low));
@@ -148,8 +149,8 @@ class TimeChart {
     });
     for (const value of this.log ? logTicks(low, high, 5) : ticks(low, high, 4)) {
       parts.push(across(value, value === 0 ? "axis" : "grid"));
-      const text = value !== 0 && Math.abs(Math.log10(Math.abs(value))) >= 4
-        ? value.toExponential(0).replace("e+", "e") : String(Number(value.toPrecision(6)));
+      const short = Number(value.toPrecision(6));
+      const text = value !== 0 && Math.abs(Math.log10(Math.abs(value))) >= 4 ? scientific(short) : String(short);
       parts.push(svg("text", { class: "tick", x: ROOM.left - 6, y: y(value) + 4, "text-anchor": "end" },
         text.replace("-", "−")));
     }

@@ -59,6 +59,7 @@ function runningMedian(line, [first, last], half) {
 
 const SAMPLES = 200;  // places of two lines that are compared
 const SAME = 1;  // px: lines nearer than this everywhere coincide
+const STRIPE = 2;  // px by which a line is wider than the one on it
 
 // Whether two lines coincide, by their places ([x, y] or null) in n frames.
 function coincide(a, b, n) {
@@ -82,7 +83,7 @@ function stacked(lines, n) {
   const order = lines.map(line => [level(line), line]).sort(([a], [b]) => a - b).map(([, line]) => line);
   for (let i = order.length - 1; i >= 0; i--) {
     const above = order.slice(i + 1).filter(line => coincide(order[i].place, line.place, n)).map(line => line.width);
-    order[i].width = Math.max(isReference(order[i].key) ? 3 : 1.6, 3 + Math.max(-Infinity, ...above));
+    order[i].width = Math.max(isReference(order[i].key) ? 3 : 1.6, STRIPE + Math.max(-Infinity, ...above));
   }
   return order;
 }
@@ -91,13 +92,20 @@ const lineOf = ({ key, width }, d) => svg("path", { class: "line estimator-" + k
 
 const RESOLUTIONS = { m: 1e-5, "°": 1e-5, px: 1e-4 };  // formatting.py; pixels are kept in 32 bits
 
+// A number with a power of ten, as tables have it; without `digits` as short as it is.
+function scientific(value, digits) {
+  const [mantissa, exponent] = value.toExponential(digits).split("e");
+  const power = "10" + [...String(Number(exponent))].map(letter => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(letter)]).join("");
+  return mantissa === "1" ? power : `${mantissa} × ${power}`;
+}
+
 // A figure without its unit; 0 for rounding.
 function figure(value, unit) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   let text;
   if (size === 0 || size < RESOLUTIONS[unit]) text = "0";
-  else if (size >= 1e6 || size < 1e-3) text = value.toExponential(1);
+  else if (size >= 1e6 || size < 1e-3) text = scientific(value, 2);
   else if (size >= 999.5) text = Math.round(value).toLocaleString("en");
   else text = value.toPrecision(3);
   return text.replace("-", "−");
