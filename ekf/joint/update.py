@@ -155,7 +155,7 @@ class Innovation:
         if failed:
             raise NotPositiveDefiniteError
         z = dtrsv(factor.L, factor.whitened, lower=1, trans=1).reshape(self.residual.shape)
-        n, r = z.shape
+        n, r = len(self), self.residual.shape[1]
         each = np.arange(n)
         lower = np.tril(inverse.reshape(n, r, n, r)[each, :, each, :])
         return squared_norm(z, lower + np.swapaxes(np.tril(lower, -1), 1, 2))
