@@ -6,7 +6,7 @@ from dataclasses import replace
 from matplotlib.figure import Figure
 
 from ..results.diagnosis import Found
-from ..tables.run import findings_table
+from ..tables.run_details import findings_table
 from .environment import picture
 from .page import Grid, Page, Section, Sentences, render_page
 

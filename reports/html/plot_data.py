@@ -15,7 +15,7 @@ from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import STATE
 from fgbaseline.reports.figures.panels import nees_bounds, nees_median
-from fgbaseline.reports.tables.run import REASONS
+from fgbaseline.reports.tables.run_details import REASONS
 
 from .plot_encoding import (
     TRUTH_LINE,

@@ -14,6 +14,7 @@ from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
 from ..tables import run as tables
+from ..tables import run_details as details
 from .environment import Picture, picture
 from .page import (
     Block,
@@ -111,8 +112,8 @@ def _sections(
 ) -> list[Section]:
     """The sections below table and paths; those without blocks are left out."""
     estimators = summary["estimators"]
-    evidence, components = tables.evidence_table(run, estimators), tables.components_table(estimators)
-    excluded, events = tables.exclusions_table(summary), tables.events_tables(run)
+    evidence, components = tables.evidence_table(run, estimators), details.components_table(estimators)
+    excluded, events = details.exclusions_table(summary), details.events_tables(run)
     bands = [p for name, p in pictures.items() if name.startswith(BAND_FIGURES)]
     stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
@@ -120,7 +121,7 @@ def _sections(
         *figure_blocks(pictures, ["held_out"]),
         *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
         *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
-        *(folded(table) for table in tables.long_tables(run)),
+        *(folded(table) for table in details.long_tables(run)),
     ]
     live = plots is not None
     seen = plots is not None and plots["observations"] is not None
@@ -148,13 +149,13 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     """Trust in the reference with its criteria, the tracks, and the diagnosis with its findings and repairs."""
     blocks: list[Block] = []
     if run.reference is not None:
-        criteria = tables.trust_table(run.trust.criteria)
+        criteria = details.trust_table(run.trust.criteria)
         blocks.append(trust(run.reference, run.trust.verdict.name.lower(), run.trust.reasons, criteria))
     problem = run.problem
     size = None if plots is None else (plots["camera"]["width"], plots["camera"]["height"])
     if size is not None and (tracks := track_sentences(problem.sequence, size)):
         blocks += [Note("The recording", is_heading=True), Sentences(tracks, "tracks")]
-    findings = tables.findings_table(problem.findings)
+    findings = details.findings_table(problem.findings)
     if not (problem.diagnosed or findings.rows or problem.repairs):
         return blocks
     found = counted(len(findings.rows), "fault") + " detected" if findings.rows else "no fault detected"

@@ -16,7 +16,8 @@ from fgbaseline.reports.phrases.run_accuracy import ate_sentences
 from fgbaseline.reports.results.reader import read_folder
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_numbers
-from fgbaseline.reports.tables.run import OVERCONFIDENT, main_table, terminal_table, trust_table
+from fgbaseline.reports.tables.run import OVERCONFIDENT, main_table, terminal_table
+from fgbaseline.reports.tables.run_details import trust_table
 
 from ..builders.runs import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem

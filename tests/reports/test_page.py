@@ -25,7 +25,8 @@ from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.metric import MAIN
 from fgbaseline.reports.results.metrics import shown_in
 from fgbaseline.reports.run.folder import _write_tables
-from fgbaseline.reports.tables.run import MAX_EVENTS, events_tables, evidence_table, long_tables, main_table
+from fgbaseline.reports.tables.run import evidence_table, main_table
+from fgbaseline.reports.tables.run_details import MAX_EVENTS, events_tables, long_tables
 
 from ..builders.runs import answer, as_dict, failed, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

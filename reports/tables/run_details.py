@@ -1,0 +1,194 @@
+"""Details of a run in tables: trust, findings, residuals, maps, exclusions and events."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from itertools import islice
+from typing import Any
+
+import pandas as pd
+
+from fgbaseline.compare import Criterion
+from fgbaseline.compare.estimate_comparison import Run
+from fgbaseline.compare.reference_trust import SHARE
+from fgbaseline.data import Estimate, Event
+from fgbaseline.data.finding import Finding
+
+from ..formatting import RESOLUTION, counted, number, per_cent, quantity, resolved
+from ..results.json_tree import at
+from .table import Cell, Column, Row, Table
+
+PIXEL_ROWS = ("uL", "vL", "uR", "vR")
+MAX_DYNAMIC = 100
+MAX_EVENTS = 200
+"""kinds of events of an estimator, with their causes, that are listed"""
+REASONS: Mapping[str, str] = {
+    "feature not chosen": "not among the features asked for",
+    "disparity": "disparity too small to determine the depth",
+    "rows": "rows in the left and right image disagree",
+    "prediction": "contradicts its own track under the motion",
+    "short": "rest of the track too short for a check",
+    "geometry": "point not determined, or behind a camera",
+    "moving": "point moved",
+    "copied": "copied from the previous frame",
+}
+"""why the mask excludes an observation"""
+
+
+def trust_table(criteria: Iterable[Criterion]) -> Table:
+    """Criteria of the trust in the reference: measured value, limits and verdict."""
+    columns = (
+        Column("measured"),
+        Column("trusted"),
+        Column("doubtful"),
+        Column("verdict", words=True),
+        Column("remark", words=True),
+    )
+    return Table(columns, tuple(map(_criterion, criteria)), name="criterion")
+
+
+def _criterion(c: Criterion) -> Row:
+    sign = "≥" if c.at_least else "≤"
+    text = per_cent if c.unit == SHARE else number
+    limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
+    texts = (text(c.value), *limits, c.verdict.name.lower(), c.remark)
+    return Row(f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name, tuple(map(Cell, texts)))
+
+
+def findings_table(findings: Iterable[Finding]) -> Table:
+    """Findings of the diagnosis with a measure before and after repair; the status is the certainty, if not counted."""
+    rows = tuple(
+        Row(
+            f.sentence,
+            (Cell(f.measure), Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
+            status="ok" if f.certainty == "counted" else f.certainty,
+        )
+        for f in findings
+    )
+    columns = (Column("measure", words=True), Column("before repair"), Column("after"))
+    return Table(columns, rows, name="finding")
+
+
+def _residuals(run: Run) -> Table:
+    """Reprojection errors in classes."""
+    tables = {r.name: r.evidence.patterns for r in run.answered}
+    figures = {"n": "n", "median, px": "median", "mean, px": "mean", "95 %, px": "p95"}
+    title = "Reprojection errors by distance, track age, place in the image and camera"
+    return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"median u, px": "u", "median v, px": "v"})
+
+
+def _map(run: Run) -> Table:
+    """Distances of landmarks from the reference's, by depth."""
+    tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
+    figures = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
+    return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, figures)
+
+
+def _moved(run: Run) -> Table:
+    """Dynamic landmarks by the reference's residuals, the clearest first; empty without a reference."""
+    if run.reference is None:
+        return Table((), ())
+    table = run.results[run.reference].evidence.moved
+    moved = table[table["moved"]].sort_values("gain", ascending=False)
+    more = f", the clearest {MAX_DYNAMIC}" if len(moved) > MAX_DYNAMIC else ""
+    title = f"{counted(len(moved), 'track')} whose points moved or slid, as {run.reference} sees them{more}"
+    rows = tuple(
+        Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
+        for row in moved.head(MAX_DYNAMIC).to_dict("records")
+    )
+    headings = ("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
+    return Table(tuple(map(Column, headings)), rows, name="landmark", title=title)
+
+
+def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, robust, of each that has any."""
+    components = {name: e.get("components") or {} for name, e in estimators.items()}
+    rows = tuple(
+        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in PIXEL_ROWS for key in ("bias", "spread"))))
+        for name, of in components.items()
+        if any(row.get("bias") is not None for row in of.values())
+    )
+    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("median", "1.4826 MAD"))
+    caption = (
+        "Measured minus predicted, over all observations of the landmarks that an estimator has. 1.4826 times the "
+        "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
+    )
+    return Table(columns, rows, caption=caption)
+
+
+def exclusions_table(summary: Mapping[str, Any]) -> Table:
+    """Numbers of observations excluded for each reason in `summary.json`, the most frequent first."""
+    counts: Mapping[str, int] = at(summary, "problem", "excluded") or {}
+    n = max(1, int(at(summary, "sequence", "observations") or 0))
+    rows = tuple(
+        Row(REASONS.get(reason, reason), (Cell(number(count)), Cell(per_cent(count / n))))
+        for reason, count in sorted(counts.items(), key=lambda item: -item[1])
+        if count
+    )
+    columns = (Column("observations"), Column("of all"))
+    caption = "Decided once for all estimators, before any of them runs."
+    return Table(columns, rows, name="reason for exclusion", caption=caption)
+
+
+def events_tables(run: Run) -> list[Table]:
+    """Events of each estimator by kind and cause; estimators that one run answers for share a table."""
+    names: dict[int, list[str]] = {}
+    estimates: dict[int, Estimate] = {}
+    for name, result in run.results.items():
+        if result.estimate.events:
+            names.setdefault(id(result.estimate.events), []).append(name)
+            estimates.setdefault(id(result.estimate.events), result.estimate)
+    return [_events(names[key], estimate) for key, estimate in estimates.items()]
+
+
+def _events(names: list[str], estimate: Estimate) -> Table:
+    kinds = Counter(event.kind for event in estimate.events).most_common()
+    title = f"{', '.join(names)}: " + ", ".join(f"{number(count)} × {kind}" for kind, count in kinds)
+    alike: dict[tuple[str, str], list[Event]] = {}
+    for event in estimate.events:
+        alike.setdefault((event.kind, event.reason), []).append(event)
+    rows = tuple(Row(kind, (*_where(events), Cell(why))) for (kind, why), events in islice(alike.items(), MAX_EVENTS))
+    more = len(alike) - MAX_EVENTS
+    caption = f"{f'And {number(more)} more. ' if more > 0 else ''}tables/events.csv has every event."
+    columns = (Column("events"), Column("frames"), Column("landmarks"), Column("why", words=True))
+    return Table(columns, rows, name="event", title=title, caption=caption)
+
+
+def _where(events: list[Event]) -> tuple[Cell, ...]:
+    """Number of events of one kind and cause, first and last frame, and the landmark or how many there are."""
+    frames = sorted({event.frame for event in events})
+    landmarks = sorted({event.landmark for event in events if event.landmark is not None})
+    span = f"{frames[0]}" if len(frames) == 1 else f"{frames[0]}–{frames[-1]}"
+    few = ", ".join(map(str, landmarks)) if len(landmarks) <= 3 else f"{number(len(landmarks))} of them"
+    return Cell(number(len(events))), Cell(span), Cell(few)
+
+
+def _frames(
+    title: str, tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], figures: Mapping[str, str]
+) -> Table:
+    """A row for each row of each estimator's table; headings -> its columns of words and of figures."""
+    rows = tuple(
+        Row(
+            name,
+            (
+                *(Cell(str(row[key])) for key in words.values()),
+                *_numbers(*(int(row[key]) if key == "n" else row[key] for key in figures.values())),
+            ),
+        )
+        for name, table in tables.items()
+        for row in table.to_dict("records")
+    )
+    columns = (*(Column(heading, words=True) for heading in words), *map(Column, figures))
+    return Table(columns, rows, title=title)
+
+
+def _numbers(*values: object) -> tuple[Cell, ...]:
+    """Cells of figures; 0 with the resolution for rounding."""
+    return tuple(
+        Cell(resolved(v, RESOLUTION) if isinstance(v, float) and 0.0 < abs(v) < RESOLUTION else number(v))
+        for v in values
+    )
+
+
+def long_tables(run: Run) -> list[Table]:
+    """Reprojection in classes, the map by depth and the dynamic landmarks, where a run has them."""
+    return [table for table in (_residuals(run), _map(run), _moved(run)) if table.rows]
