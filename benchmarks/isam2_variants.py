@@ -24,7 +24,7 @@ from fgbaseline.smoother.isam2.settings import ISAM2Settings
 
 from .gtsam_time import INCREMENTAL, gtsam_timed
 
-EVERY = ISAM2Settings(relinearize_skip=1)
+EVERY = ISAM2Settings(relinearize_skip=1, relinearize_all_skip=1)
 
 
 class PartialCheck(ISAM2Settings):
@@ -46,6 +46,11 @@ class Variant:
 
 def isam2(settings: ISAM2Settings) -> Callable[[Problem], Estimate]:
     return lambda problem: smoother.isam2(problem, settings=settings)
+
+
+def at_every(frames: int) -> Callable[[Problem], Estimate]:
+    """All of the tree is relinearized, at each of so many frames."""
+    return isam2(ISAM2Settings(relinearize_skip=frames, relinearize_all_skip=frames))
 
 
 def landmarks_first(problem: Problem) -> Estimate:
@@ -83,10 +88,11 @@ def by_colamd(problem: Problem) -> Estimate:
 
 VARIANTS = (
     Variant("relinearized at every update", isam2(EVERY)),
-    Variant("at every second", isam2(replace(EVERY, relinearize_skip=2))),
+    Variant("at every second", at_every(2)),
     Variant("at every third (the default)", isam2(ISAM2Settings())),
+    Variant("the last 10 frames at every third, all at every fifteenth", isam2(ISAM2Settings(relinearize_all_skip=15))),
     Variant("the default, in the order of COLAMD", by_colamd),
-    Variant("at every fifth", isam2(replace(EVERY, relinearize_skip=5))),
+    Variant("at every fifth", at_every(5)),
     Variant(
         "at every one, thresholds 2.5 times as large",
         isam2(
@@ -99,7 +105,9 @@ VARIANTS = (
             )
         ),
     ),
-    Variant("at every one, checked from the root down", isam2(PartialCheck(relinearize_skip=1))),
+    Variant(
+        "at every one, checked from the root down", isam2(PartialCheck(relinearize_skip=1, relinearize_all_skip=1))
+    ),
     Variant("at every one, landmarks eliminated before the pose", landmarks_first),
     Variant("at every one, by QR", isam2(replace(EVERY, qr=True))),
     Variant("the default, every second frame without observations", keyframes),

@@ -80,6 +80,14 @@ class HuberKernel:
         k = self.threshold
         return np.where(squared > k**2, 2.0 * k * np.sqrt(squared) - k**2, squared)
 
+    def terms(self, squared: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`loss`, `weight` and `curvature_correction` of squared whitened norms (...), from one square root."""
+        k = self.threshold
+        norm = np.sqrt(squared)
+        beyond, weight = norm > k, k / np.maximum(norm, k)
+        loss = np.where(beyond, 2.0 * k * norm - k**2, squared)
+        return loss, weight, np.where(beyond, weight / k**2, 0.0)
+
     def curvature_correction(self, squared: FloatArray) -> FloatArray:
         """Second-order coefficient c of squared whitened norms (...): 1 / (k norm) beyond k, 0 up to it.
 
@@ -146,6 +154,12 @@ class StereoMeasurement:
     def curvature_correction(self, squared: FloatArray) -> FloatArray:
         """Second-order coefficient, see `HuberKernel.curvature_correction`; 0 without a kernel."""
         return np.zeros_like(squared) if self.kernel is None else self.kernel.curvature_correction(squared)
+
+    def robust_terms(self, squared: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`loss`, `weight` and `curvature_correction` of squared whitened norms (...)."""
+        if self.kernel is None:
+            return squared, np.ones_like(squared), np.zeros_like(squared)
+        return self.kernel.terms(squared)
 
     def documented_innovation(self, pixel: FloatArray, predicted: FloatArray) -> "DocumentedInnovation":
         """Innovation of the documented filter: pixels (n, 4) minus predicted rows (n, 3).

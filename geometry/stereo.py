@@ -67,7 +67,9 @@ class StereoCamera:
         Points behind the camera are projected by the same formula, as in the source paper. Divides by zero at z = 0.
         """
         near = 1.0 / q[2]
-        slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
+        slope = np.empty((3, *np.shape(near)))
+        np.multiply(q[:2], near, out=slope[:2])
+        slope[2] = near if len(q) == 3 else q[3] * near
         pixel = np.empty_like(slope)
         pixel[0] = self.fu * slope[0] + self.cu
         pixel[1] = pixel[0] - (self.fu * self.baseline) * slope[2]
@@ -81,10 +83,19 @@ class StereoCamera:
         points at a finite distance, where w is constant.
         """
         x, y, w = seen.normalized
-        left = (self.fu * seen.inverse_depth) * (along[0] - x * along[2])
-        farther = -w * along[2] if len(along) == 3 else along[3] - w * along[2]
-        right = left - (self.fu * self.baseline * seen.inverse_depth) * farther
-        return np.stack([left, right, (self.fv * seen.inverse_depth) * (along[1] - y * along[2])])
+        near = seen.inverse_depth
+        result = np.empty((3, *along.shape[1:]))  # filled in place: the arrays are short and calls are what costs
+        left, right, v = result
+        np.subtract(along[0], np.multiply(x, along[2], out=left), out=left)
+        left *= self.fu * near
+        np.multiply(w, along[2], out=right)
+        if len(along) == 4:
+            right -= along[3]
+        right *= self.fu * self.baseline * near
+        right += left
+        np.subtract(along[1], np.multiply(y, along[2], out=v), out=v)
+        v *= self.fv * near
+        return result
 
     def project(self, points: ArrayLike) -> FloatArray:
         """Pixels uL, vL, uR, vR (..., 4) of points (..., 3) in the left camera frame, m (equation 10).

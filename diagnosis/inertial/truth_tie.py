@@ -66,7 +66,7 @@ def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, 
     tilt = float(np.arctan2(np.linalg.norm(np.cross(measured, z)), measured[2]))
     if not body and tilt < UPRIGHT:
         return z, f"its z axis ({np.rad2deg(tilt):.2f}° from the measured up)"
-    return measured, "the up of the inertial samples over all frames"
+    return measured, f"the up of the inertial samples over all frames, {np.rad2deg(tilt):.1f}° from its z axis"
 
 
 def _yaw(path: FloatArray, truth: FloatArray) -> FloatArray:

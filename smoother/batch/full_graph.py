@@ -21,13 +21,13 @@ def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.Non
         states = FrameStates.unknown(problem)
         if problem.start is not None:
             states.bias[:] = problem.start.bias
-    graph.push_back(factors.start_prior())
+    graph.add(factors.start_prior())
     for k in range(problem.n_frames - 1):
-        graph.push_back(factors.motion(k, states))
+        graph.add(factors.motion(k, states))
     o = problem.observations()
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), problem.measurement.measured(o.pixel), strict=True):
-        graph.push_back(factors.observation(k, landmark_key(j), rows))
+        graph.add(factors.observation(k, landmark_key(j), rows))
     if problem.landmark_prior is not None:
         for j in np.unique(o.landmark).tolist():
-            graph.push_back(factors.landmark_prior(j, landmark_key(j)))
+            graph.add(factors.landmark_prior(j, landmark_key(j)))
     return graph

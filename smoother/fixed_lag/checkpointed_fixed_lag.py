@@ -118,6 +118,7 @@ class CheckpointedFixedLag:
     def _new(self, *, qr: bool) -> gtsam.IncrementalFixedLagSmoother:
         params = self._settings.params(self._baseline)
         params.findUnusedFactorSlots = True
+        params.enableRelinearization = True
         params.relinearizeSkip = 1  # what leaves the window has no later chance, and most of the time goes elsewhere
         if qr:
             params.setFactorization("QR")
@@ -131,7 +132,7 @@ class CheckpointedFixedLag:
                 # Nothing keeps the point fixed in the new one: the marginal must know it.
                 point = checkpoint.linearization_point
                 factor = gtsam.LinearContainerFactor(factor.linearize(point), point)
-            graph.push_back(factor)
+            graph.add(factor)
         smoother = self._new(qr=qr)
         if checkpoint.times:
             smoother.update(graph, checkpoint.linearization_point, _plain(checkpoint.times))
@@ -145,7 +146,7 @@ class CheckpointedFixedLag:
                 in_marginals |= {key for key in factor.keys() if key in forgotten}  # noqa: SIM118
             elif any(key in forgotten for key in factor.keys()):  # noqa: SIM118
                 continue
-            graph.push_back(factor)
+            graph.add(factor)
         times = {key: time for key, time in checkpoint.times.items() if key not in forgotten or key in in_marginals}
         values = gtsam.Values(checkpoint.linearization_point)
         for key in checkpoint.times.keys() - times.keys():
@@ -156,7 +157,7 @@ class CheckpointedFixedLag:
         graph, point = compact_graph(checkpoint.factors), checkpoint.linearization_point
         loose = gtsam.noiseModel.Isotropic.Sigma(3, LOOSE_SIGMA * self._baseline)
         for key in landmarks:
-            graph.push_back(gtsam.PriorFactorPoint3(key, point.atPoint3(key), loose))
+            graph.add(gtsam.PriorFactorPoint3(key, point.atPoint3(key), loose))
         return checkpoint._replace(factors=graph)
 
 

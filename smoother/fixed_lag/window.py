@@ -59,7 +59,7 @@ class FixedLagWindow:
         k, now = update.frame, float(self._problem.sequence.t[update.frame])
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         values.insert(update.initial_values)
-        graph.push_back(update.motion_factor)
+        graph.add(update.motion_factor)
         new: dict[int, int] = {}
         for entry in update.new_landmarks:
             j = entry.landmark
@@ -68,11 +68,11 @@ class FixedLagWindow:
             new[j] = distance_key(name, distance)
             values.insert(new[j], entry.position)
             if self._problem.landmark_prior is not None:
-                graph.push_back(self._builder.factors.landmark_prior(j, new[j]))
+                graph.add(self._builder.factors.landmark_prior(j, new[j]))
             for i in entry.observations:
-                graph.push_back(self._builder.observation(i, new[j]))
+                graph.add(self._builder.observation(i, new[j]))
         for j, i in update.tracked.items():
-            graph.push_back(self._builder.observation(i, self.key[j]))
+            graph.add(self._builder.observation(i, self.key[j]))
         seen = new | {j: self.key[j] for j in update.tracked}
         times = dict.fromkeys(state_keys(k, self.states.inertial), now) | dict.fromkeys(seen.values(), now)
         forgotten = {self.key[j] for j in dropped if j in self.key}

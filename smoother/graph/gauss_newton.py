@@ -20,7 +20,7 @@ def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGra
     for i in range(graph.size()):
         factor = graph.at(i)
         if factor is not None:
-            result.push_back(factor)
+            result.add(factor)
     return result
 
 

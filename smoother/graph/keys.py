@@ -41,11 +41,6 @@ def pose_key(frame: int) -> int:
     return _POSES | frame
 
 
-def frame_of(key: int) -> int:
-    """The frame of a variable of a frame."""
-    return key & ((1 << _LETTER_AT) - 1)
-
-
 def state_keys(frame: int, inertial: bool) -> list[int]:
     """The keys of a frame's variables: its pose, and with raw inertial data its velocity and its biases."""
     return [_POSES | frame, _VELOCITIES | frame, _BIASES | frame] if inertial else [_POSES | frame]

@@ -31,6 +31,8 @@ class _Joint(NamedTuple):
 
     def part(self, keys: list[int]) -> FloatArray:
         """The joint covariance of some of the variables, in the order of their keys."""
+        if keys == list(self.columns):
+            return self.covariance
         columns = np.array(self.of(keys), dtype=np.int64)
         return self.covariance.take(columns, axis=0).take(columns, axis=1)
 

@@ -47,14 +47,14 @@ def optimize_window(
     landmarks = triangulate_along(factors.problem, o.select(often[o.landmark]), states.world_T_imu)
     o = o.select(np.isin(o.landmark, landmarks.index))
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    graph.push_back(factors.held_state(first, states))
+    graph.add(factors.held_state(first, states))
     for k in range(first, last):
-        graph.push_back(factors.motion(k, states))
+        graph.add(factors.motion(k, states))
     for k in range(first, last + 1):
         states.insert(values, k)
     measured = factors.problem.measurement.measured(o.pixel)
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured, strict=True):
-        graph.push_back(factors.observation(k, landmark_key(j), rows))
+        graph.add(factors.observation(k, landmark_key(j), rows))
     for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):
         values.insert(landmark_key(j), position)
     params = gtsam.LevenbergMarquardtParams()

@@ -23,6 +23,8 @@ class Update(NamedTuple):
     """elimination group by key: larger groups are eliminated later; unlisted keys are in group 0"""
     relinearize: bool = False
     """force relinearization at this update"""
+    held: gtsam.KeyList | None = None
+    """variables that keep their linearization points at this update"""
 
 
 class CheckpointedISAM2:
@@ -53,12 +55,13 @@ class CheckpointedISAM2:
         removed: Listing[int] = (),
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
+        held: gtsam.KeyList | None = None,
     ) -> gtsam.ISAM2Result:
         """Update the tree; where GTSAM fails, restore it and raise IndeterminateSystemError.
 
         Without `groups` GTSAM eliminates all variables of the new factors last.
         """
-        step = Update(factors, values, tuple(removed), groups, relinearize)
+        step = Update(factors, values, tuple(removed), groups, relinearize, held)
         if len(self._since_checkpoint) >= max(self._interval, int(CHECKPOINT_SHARE * self._updates)):
             self._take_checkpoint()
         try:
@@ -80,6 +83,7 @@ class CheckpointedISAM2:
             step.values,
             list(step.removed),
             constrainedKeys=None if step.groups is None else self._groups.with_those_of(step.groups),
+            noRelinKeys=step.held,
             force_relinearize=step.relinearize,
         )
         self.tree.calculateEstimatePose3(self._first)

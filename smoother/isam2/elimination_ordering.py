@@ -5,9 +5,9 @@ every update visits them again: after 900 simulated frames, poses 30 s old were 
 Groups by age eliminate the oldest first; COLAMD orders within a group. The solution is unchanged.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
-from ..graph.keys import AUXILIARY_POSE, frame_of, landmark_of, pose_key, state_keys
+from ..graph.keys import AUXILIARY_POSE, state_keys
 
 GROUP_FRAMES, N_GROUPS = 20, 6
 """Frames of a group, and number of groups beside the last one; older variables are in the first group. Longer groups
@@ -49,38 +49,48 @@ class EliminationOrdering:
         # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
         most = len(landmarks) + (frame > 0)
         if len(landmarks) > MANY_LANDMARKS:
-            return self._with_states({pose_key(frame): 1, AUXILIARY_POSE: 2}, frame)
+            return self._with_states({}, [frame], [1])
         if all_new:
             last, first = min(1, most), max(first, frame - 1)
-            together = dict.fromkeys([*map(pose_key, range(first, frame + 1)), *landmarks], last)
-            return self._with_states(together | {AUXILIARY_POSE: last + 1}, frame)
+            frames = range(first, frame + 1)
+            return self._with_states(dict.fromkeys(landmarks, last), frames, [last] * len(frames))
         last, age = min(N_GROUPS, most), (frame - 1) // GROUP_FRAMES
         oldest = max(first, GROUP_FRAMES * (age - last + 2))
         of_frame = [last - 1 - age + k // GROUP_FRAMES for k in range(oldest, frame)]
-        groups = {pose_key(k): group for k, group in enumerate(of_frame, oldest)}
+        groups = dict[int, int]()
         for key in reversed(seen):
             if seen[key] < oldest:
                 break
             if seen[key] < frame:
                 groups[key] = of_frame[seen[key] - oldest]
-        newest = dict.fromkeys([pose_key(frame), *landmarks], last) | {AUXILIARY_POSE: last + 1}
-        return self._with_states(groups | newest, frame)
+        groups |= dict.fromkeys(landmarks, last)
+        return self._with_states(groups, [*range(oldest, frame), frame], [*of_frame, last])
 
-    def _with_states(self, groups: dict[int, int], newest: int) -> dict[int, int]:
-        """Groups with those of velocities and biases.
+    def _with_states(self, landmarks: dict[int, int], frames: Sequence[int], of_frame: Sequence[int]) -> dict[int, int]:
+        """Groups of landmarks with those of the states of frames in time, of which the newest is in the last group.
 
-        The newest state comes after all landmarks: else they were one clique with it, and its covariance far away.
+        With raw inertial data the newest state comes after all landmarks: else they were one clique with it, and its
+        covariance far away.
         """
-        if not self._inertial:
-            return groups
-        newest_pose, end = pose_key(newest), groups[AUXILIARY_POSE]
-        states = {
-            key: end if pose == newest_pose else group
-            for pose, group in groups.items()
-            if landmark_of(pose) is None and pose != AUXILIARY_POSE
-            for key in state_keys(frame_of(pose), True)
+        end = of_frame[-1] + 1
+        groups = landmarks | {
+            key: group for k, group in zip(frames, of_frame, strict=True) for key in state_keys(k, self._inertial)
         }
-        return groups | states | {AUXILIARY_POSE: end + 1}
+        if self._inertial:
+            groups |= dict.fromkeys(state_keys(frames[-1], True), end)
+            end += 1
+        groups[AUXILIARY_POSE] = end
+        return groups
+
+    def older(self, first: int, frame: int) -> list[int]:
+        """Variables of the frames from `first` to before `frame`, and landmarks observed last in these."""
+        keys = [key for k in range(first, frame) for key in state_keys(k, self._inertial)]
+        for key in reversed(self._seen):
+            if self._seen[key] < first:
+                break
+            if self._seen[key] < frame:
+                keys.append(key)
+        return keys
 
     def batch_groups(self, first: int, frame: int) -> dict[int, int]:
         """Elimination group by key, for a tree built at once over the frames `first` to `frame`, the latest frame of
@@ -89,9 +99,10 @@ class EliminationOrdering:
         Landmarks observed only before `first` are left out.
         """
         last = 1 + (frame - first) // GROUP_FRAMES
-        groups = {pose_key(k): (k - first) // GROUP_FRAMES for k in range(first, frame)} | {pose_key(frame): last}
+        groups = dict[int, int]()
         for key in reversed(self._seen):
             if self._seen[key] < first:
                 break
             groups[key] = last if self._seen[key] == frame else (self._seen[key] - first) // GROUP_FRAMES
-        return self._with_states(groups | {AUXILIARY_POSE: last + 1}, frame)
+        of_frame = [(k - first) // GROUP_FRAMES for k in range(first, frame)]
+        return self._with_states(groups, range(first, frame + 1), [*of_frame, last])

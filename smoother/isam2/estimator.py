@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray
 from ..errors import FAILURES, failure_reason
 from ..frame_update import recovery_reason
 from ..graph.frame_states import FrameStates
-from ..graph.gauss_newton import GaussNewtonResult, compact_graph, gauss_newton
+from ..graph.gauss_newton import GaussNewtonResult, gauss_newton
 from ..graph.gtsam_conversions import in_solver_frame, landmarks_from_values
 from .incremental_smoother import FrameLostError, IncrementalSmoother
 from .settings import ISAM2Settings
@@ -102,11 +102,10 @@ def _final_solution(
     smoother: IncrementalSmoother, relinearize: bool
 ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     """The whole graph and its solution, relinearized or not, without cheirality violations."""
-    slots, values = smoother.release()
+    graph, values = smoother.release()
     while True:
-        graph = compact_graph(slots)
         values, failure = gauss_newton(graph, values) if relinearize else GaussNewtonResult(values)
-        if not smoother.drop_cheirality_violations(slots, values):
+        if not smoother.drop_cheirality_violations(graph, values):
             break
     if failure:
         last = smoother.problem.n_frames - 1

@@ -60,8 +60,10 @@ class IncrementalSmoother:
         self._settling_frames = 0
         """frames for which every update relinearizes"""
         self._ordering = EliminationOrdering(self._inertial)
-        self._first = 0
-        """first frame in the tree"""
+        self._first = self._held_before = 0
+        """first frame in the tree, and the first one whose variables are not among the older ones"""
+        self._held = gtsam.KeyList()
+        """older variables of the tree: they are relinearized with the whole tree only"""
         self._marginalize_at = settings.tree_frames
         """next frame after which to marginalize"""
         self.events: list[Event] = []
@@ -113,8 +115,12 @@ class IncrementalSmoother:
         if first < self._first + kept:
             return
         if self.solver.marginalize_before(first, self._ordering.batch_groups(first, k)):
-            self._first = first
+            self._start_tree_at(first)
             self._marginalize_at = first + self._settings.tree_frames
+
+    def _start_tree_at(self, first: int) -> None:
+        self._first = self._held_before = first
+        self._held = gtsam.KeyList()
 
     def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
         """Update after restoring the whole tree, where it refers to marginalized variables.
@@ -127,7 +133,7 @@ class IncrementalSmoother:
             return update
         k, new = update.frame, back - self._dropped
         if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
-            self._first = 0
+            self._start_tree_at(0)
             # next after twice as many frames: all earlier restorations together cost no more than the last
             self._marginalize_at = max(self._marginalize_at, 2 * k)
             return update
@@ -155,23 +161,25 @@ class IncrementalSmoother:
         k, factors = update.frame, self.builder.factors
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         values.insert(update.initial_values)
-        graph.push_back(update.motion_factor)
+        graph.add(update.motion_factor)
         owner: list[tuple[int, int]] = []
+        points = np.array([e.position for e in update.new_landmarks]).reshape(-1, 3) - update.initial_pose[:3, 3]
+        distances = np.linalg.norm(points, axis=1) / self.problem.sequence.camera.unit_length
         new = {
-            e.landmark: distance_key(e.landmark, self._unit_lengths(e.position, update.initial_pose))
-            for e in update.new_landmarks
+            e.landmark: distance_key(e.landmark, distance)
+            for e, distance in zip(update.new_landmarks, distances.tolist(), strict=True)
         }
         for entry in update.new_landmarks:
             j, key = entry.landmark, new[entry.landmark]
             values.insert(key, entry.position)
             if self.problem.landmark_prior is not None:
-                graph.push_back(factors.landmark_prior(j, key))
+                graph.add(factors.landmark_prior(j, key))
                 owner.append((j, PRIOR))
             for i in entry.observations:
-                graph.push_back(self.builder.observation(i, key))
+                graph.add(self.builder.observation(i, key))
                 owner.append((j, i))
         for j, i in update.tracked.items():
-            graph.push_back(self.builder.observation(i, self.key[j]))
+            graph.add(self.builder.observation(i, self.key[j]))
             owner.append((j, i))
         if update.new_landmarks and not update.tracked:
             self._settling_frames = SETTLING_FRAMES
@@ -181,9 +189,10 @@ class IncrementalSmoother:
         self._ordering.remove([self.key[j] for j in there])
         groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._settling_frames > 0)
         frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
+        relinearize, held = self._relinearization(k)
         try:
             state = state_keys(k, self._inertial)
-            slots = self.solver.update(graph, frames, values, state, removed, groups, self._settling_frames > 0)
+            slots = self.solver.update(graph, frames, values, state, removed, groups, relinearize, held)
         except IndeterminateSystemError:
             self._ordering.remove(new.values())
             raise
@@ -193,6 +202,22 @@ class IncrementalSmoother:
         self.key |= new
         for (j, i), slot in zip(owner, slots[1:], strict=True):
             self._slots.setdefault(j, {})[i] = slot
+
+    def _relinearization(self, k: int) -> tuple[bool, gtsam.KeyList | None]:
+        """Whether frame k relinearizes, and the older variables, which keep their linearization points then.
+
+        A landmark that is observed again counts as older until the tree is exchanged.
+        """
+        settings = self._settings
+        if self._settling_frames > 0 or k % settings.relinearize_all_skip == 0:
+            return True, None
+        if k % settings.relinearize_skip:
+            return False, None
+        before = max(k - settings.recent_frames, self._held_before)
+        for key in self._ordering.older(self._held_before, before):
+            self._held.push_back(key)
+        self._held_before = before
+        return True, gtsam.KeyList(self._held)
 
     def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
         """See `IncrementalGraph.suspect_landmarks`.
@@ -250,6 +275,3 @@ class IncrementalSmoother:
         position = self.builder.landmark_position
         index = np.sort(np.fromiter(position, dtype=np.int64))
         return Landmarks(index, np.array([position[int(j)] for j in index]).reshape(-1, 3))
-
-    def _unit_lengths(self, point: FloatArray, world_T_imu: FloatArray) -> float:
-        return float(np.linalg.norm(point - world_T_imu[:3, 3])) / self.problem.sequence.camera.unit_length

@@ -6,13 +6,13 @@ solution is unchanged, but marginalized frames are not relinearized. The graph k
 Gauss-Newton steps, and to rebuild the whole tree when a marginalized landmark is observed again.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from collections.abc import Sequence as Listing
 
 import gtsam
 import numpy as np
 
-from fgbaseline.data.observations import Observations
+from fgbaseline.data.observations import IntArray, Observations
 
 from ..errors import IndeterminateSystemError
 from ..graph.keys import AUXILIARY_POSE, width
@@ -60,6 +60,7 @@ class MarginalizedISAM2:
         removed: Collection[int] = (),
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
+        held: gtsam.KeyList | None = None,
     ) -> Listing[int]:
         """Update the tree, see `CheckpointedISAM2`; returns the slots of the new factors, in their order.
 
@@ -69,12 +70,12 @@ class MarginalizedISAM2:
         """
         places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
         tied = gtsam.NonlinearFactorGraph(factors)
-        tied.push_back(_auxiliary_factor(newest))
+        tied.add(_auxiliary_factor(newest))
         if self._auxiliary_slot is None:
             values.insert(AUXILIARY_POSE, values.atPose3(newest[0]))
         else:
             places.append(self._auxiliary_slot)
-        result = self._isam.update(tied, values, places, groups, relinearize)
+        result = self._isam.update(tied, values, places, groups, relinearize, held)
         *new, self._auxiliary_slot = result.getNewFactorsIndices()
         for slot in removed:
             self._graph.remove(slot)
@@ -96,6 +97,7 @@ class MarginalizedISAM2:
         Later factors must not refer to the marginalized variables: poses before `first`, and landmarks without
         observations since. `groups` are elimination groups, as in `update`.
         """
+        assert self._auxiliary_slot is not None
         point, factors = self.tree.getLinearizationPoint(), self.tree.getFactorsUnsafe()
         behind, ahead, place = self._split(factors, first)
         staying = set(ahead.keyVector())
@@ -103,17 +105,18 @@ class MarginalizedISAM2:
             prior = behind.linearize(point).marginal([key for key in behind.keyVector() if key in staying])
             n = ahead.size()
             for i in range(prior.size()):
-                ahead.push_back(gtsam.LinearContainerFactor(prior.at(i), point))
+                ahead.add(gtsam.LinearContainerFactor(prior.at(i), point))
             isam = CheckpointedISAM2(self._params, first=first)
-            isam.update(ahead, _without(point, set(point.keys()) - staying), groups=groups)
+            isam.update(ahead, point.extract(list(staying)), groups=groups)
         except (RuntimeError, IndeterminateSystemError):
             return False
-        self._marginalized.insert(_without(self.tree.calculateEstimate(), staying))
+        estimate = self.tree.calculateEstimate()
+        leaving = [key for key in estimate.keys() if key not in staying]  # noqa: SIM118
+        self._marginalized.insert(estimate.extract(leaving))
         self._isam = isam
-        self._tree_slot = [place.get(there, IN_PRIOR) for there in self._tree_slot]
+        self._tree_slot = place[self._tree_slot].tolist()
         self._prior = list(range(n, ahead.size()))
-        assert self._auxiliary_slot is not None
-        self._auxiliary_slot = place[self._auxiliary_slot]
+        self._auxiliary_slot = int(place[self._auxiliary_slot])
         return True
 
     def is_marginalized(self, key: int) -> bool:
@@ -131,16 +134,14 @@ class MarginalizedISAM2:
             factor = self._graph.at(slot)
             place.append(IN_PRIOR if factor is None else factors.size())
             if factor is not None:
-                factors.push_back(factor)
+                factors.add(factor)
         tail = factors.size()
-        factors.push_back(self.tree.getFactorsUnsafe().at(self._auxiliary_slot))
+        factors.add(self.tree.getFactorsUnsafe().at(self._auxiliary_slot))
         point = gtsam.Values(self._marginalized)
         point.insert(self.tree.getLinearizationPoint())
-        named = set(factors.keyVector())
-        without = [key for key in point.keys() if key not in named]  # noqa: SIM118
         isam = CheckpointedISAM2(self._params)
         try:
-            isam.update(factors, _without(point, without), groups=groups, relinearize=True)
+            isam.update(factors, point.extract(list(set(factors.keyVector()))), groups=groups, relinearize=True)
         except IndeterminateSystemError:
             return False
         self._isam, self._marginalized, self._tree_slot, self._prior, self._auxiliary_slot = (
@@ -154,37 +155,28 @@ class MarginalizedISAM2:
 
     def _split(
         self, factors: gtsam.NonlinearFactorGraph, first: int
-    ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.NonlinearFactorGraph, dict[int, int]]:
-        """Factors to marginalize, the others, and the new slot of each of the others by its slot in the tree.
+    ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.NonlinearFactorGraph, IntArray]:
+        """Factors to marginalize, the others, and the new slot of each of the others by its slot in the tree, IN_PRIOR
+        for the rest (the last entry is that of IN_PRIOR itself).
 
         Marginalized are factors on poses before `first`, and those on landmarks observed only there.
         """
-        behind, ahead, place = gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph(), dict[int, int]()
-
-        def goes_ahead(there: int) -> None:
-            place[there] = ahead.size()
-            ahead.push_back(factors.at(there))
-
-        for there in self._prior:
-            behind.push_back(factors.at(there))
         assert self._auxiliary_slot is not None
-        goes_ahead(self._auxiliary_slot)
-        without_pose = []
-        for there, frame in zip(self._tree_slot, self._frame, strict=True):
-            if there == IN_PRIOR:
-                continue
-            if frame == NO_POSE:
-                without_pose.append(there)
-            elif frame < first:
-                behind.push_back(factors.at(there))
-            else:
-                goes_ahead(there)
+        slots, frames = np.array(self._tree_slot), np.array(self._frame)
+        slots, frames = slots[slots != IN_PRIOR], frames[slots != IN_PRIOR]
+        staying_slots = [self._auxiliary_slot, *slots[frames >= first].tolist()]
+        leaving_slots = [*self._prior, *slots[(frames < first) & (frames != NO_POSE)].tolist()]
+        behind, ahead = _some(factors, leaving_slots), _some(factors, staying_slots)
         staying = set(ahead.keyVector())
-        for there in without_pose:
-            if staying.issuperset(factors.at(there).keys()):
-                goes_ahead(there)
+        for there in slots[frames == NO_POSE].tolist():
+            factor = factors.at(there)
+            if staying.issuperset(factor.keys()):
+                staying_slots.append(there)
+                ahead.add(factor)
             else:
-                behind.push_back(factors.at(there))
+                behind.add(factor)
+        place = np.full(factors.size() + 1, IN_PRIOR)
+        place[staying_slots] = np.arange(len(staying_slots))
         return behind, ahead, place
 
     def estimate(self) -> gtsam.Values:
@@ -212,10 +204,11 @@ def _auxiliary_factor(newest: Listing[int]) -> gtsam.NonlinearFactor:
     return gtsam.LinearContainerFactor(gtsam.JacobianFactor(graph))
 
 
-def _without(values: gtsam.Values, keys: Collection[int]) -> gtsam.Values:
-    result = gtsam.Values(values)
-    for key in keys:
-        result.erase(key)
+def _some(factors: gtsam.NonlinearFactorGraph, slots: Iterable[int]) -> gtsam.NonlinearFactorGraph:
+    """Graph of the factors in some slots, in their order."""
+    result = gtsam.NonlinearFactorGraph()
+    for slot in slots:
+        result.add(factors.at(slot))
     return result
 
 

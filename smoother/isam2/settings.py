@@ -41,6 +41,10 @@ class ISAM2Settings:
     """as a share of its distance"""
     relinearize_skip: int = 3
     """updates from one relinearization to the next; the fixed-lag smoother relinearizes at each"""
+    relinearize_all_skip: int = 3
+    """updates from one relinearization of the whole tree to the next; between them only what was last observed in the
+    last `recent_frames` frames is relinearized"""
+    recent_frames: int = 10
     initialization: InitializationCriterion = field(default_factory=InitializationCriterion)
     relinearize_at_end: bool = True
     """Gauss-Newton over the whole graph after the last frame"""
@@ -63,7 +67,7 @@ class ISAM2Settings:
                 baseline,
             )
         )
-        params.relinearizeSkip = self.relinearize_skip
+        params.enableRelinearization = False  # but where an update asks for it
         params.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE_THRESHOLD * min(2.0 * baseline, 1.0)))
         params.setFactorization("QR" if self.qr else "CHOLESKY")
         return params
@@ -77,8 +81,9 @@ class ISAM2Settings:
         """
         if problem.imu is None:
             return cls()
-        inertial = cls(relinearize_skip=5, tree_frames=100, kept_frames=40)
+        inertial = cls(relinearize_skip=5, relinearize_all_skip=20, tree_frames=100, kept_frames=40)
         if not problem.sequence.monocular:
             return inertial
         parallax = InitializationCriterion(max_relative_deviation=PARALLAX_SUFFICES)
-        return replace(inertial, relinearize_skip=ONE_CAMERA_SKIP, initialization=parallax)
+        skip = ONE_CAMERA_SKIP
+        return replace(inertial, relinearize_skip=skip, relinearize_all_skip=skip, initialization=parallax)

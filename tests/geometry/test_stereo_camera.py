@@ -150,3 +150,21 @@ def test_a_point_without_a_positive_disparity_is_not_determined() -> None:
     assert np.isnan(found.position[[0, 2]]).all()
     np.testing.assert_allclose(found.position[1], several([track], None)[0][0], rtol=1e-9)
     np.testing.assert_array_equal(found.information[[0, 2]], 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_point_beyond_infinity_lies_far_along_its_ray_and_holds_no_other_up(seed: int) -> None:
+    """Disparities of a point at infinity that are negative in all frames but one."""
+    far, near = Track(seed), Track(seed + 10)
+    ray = far.point / np.linalg.norm(far.point)
+    center = far.world_T_cam[:, :3, 3]
+    pixel = CAMERA.project(se3.transform(se3.inverse(far.world_T_cam), center + 1e9 * ray))
+    pixel[:, 2] += 0.3 * np.array([-1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    far.pixel = pixel
+    (position, beside), (information, _) = several([far, near], 2.5)
+    away = position - center.mean(axis=0)
+    assert np.linalg.norm(away) > 1e5 * CAMERA.baseline
+    assert np.linalg.norm(away / np.linalg.norm(away) - ray) < 2e-3
+    assert far.cost(position, 2.5) < far.cost(center[0] + 1000.0 * ray, 2.5)
+    assert np.linalg.eigvalsh(information)[0] < 1e-12  # 1/m^2: nothing is known of its distance
+    np.testing.assert_array_equal(beside, several([near], 2.5)[0][0])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.graph.factors import FactorBuilder
@@ -80,6 +80,27 @@ def test_after_a_failed_update_the_estimate_is_restored(failure: object, interva
     np.testing.assert_array_equal(everything(isam), before)
     assert isam.tree.getFactorsUnsafe().size() == slots
     assert not isam.tree.valueExists(pose_key(8))
+
+
+def test_held_variables_keep_their_linearization_points() -> None:
+    assert TRUTH is not None
+    isam = CheckpointedISAM2(parameters())
+    isam.update(*frame(0))
+    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    for k in range(1, 4):
+        graph.push_back(frame(k)[0])
+        values.insert(pose_key(k), gtsam.Pose3(TRUTH.world_T_imu[k] @ se3.exp([0.5, 0.0, 0.0, 0.0, 0.0, 0.1])))
+    isam.update(graph, values)
+    held = gtsam.KeyList()
+    held.push_back(pose_key(2))
+    isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), relinearize=True, held=held)
+    point, estimate = isam.tree.getLinearizationPoint(), isam.tree.calculateEstimate()
+    stays, *moved = (point.atPose3(pose_key(k)).equals(values.atPose3(pose_key(k)), 1e-9) for k in (2, 1, 3))
+    assert stays
+    assert moved == [False, False]
+    assert estimate.atPose3(pose_key(2)).localCoordinates(gtsam.Pose3(TRUTH.world_T_imu[2])) == pytest.approx(
+        0, abs=0.1
+    )
 
 
 def test_the_failure_names_the_variable_where_gtsam_does() -> None:

@@ -46,6 +46,17 @@ def test_older_variables_are_eliminated_first() -> None:
     assert groups[AUXILIARY_POSE] == max(groups.values()) > groups[pose_key(frame)]
 
 
+@pytest.mark.parametrize("inertial", [False, True])
+def test_older_variables_are_those_of_frames_and_the_landmarks_last_seen_there(inertial: bool) -> None:
+    ordering, n, first, frame = EliminationOrdering(inertial), 12, 3, 8
+    for k in range(n):
+        ordering.groups(k, seen_at(k))
+    states = [key for k in range(first, frame) for key in state_keys(k, inertial)]
+    landmarks = [key(j) for j in range(n) if first <= j + LIFE - 1 < frame]
+    assert set(ordering.older(first, frame)) == {*states, *landmarks}
+    assert ordering.older(frame, frame) == []
+
+
 @given(st.lists(st.tuples(st.integers(0, 6), st.booleans()), min_size=1, max_size=60))
 def test_no_group_is_beyond_the_number_of_variables(frames: list[tuple[int, bool]]) -> None:
     ordering, fresh_landmark = EliminationOrdering(), 0

@@ -62,7 +62,7 @@ def assert_alike(a: Estimate, b: Estimate, online: float) -> None:
     """The same in the end; what was known online within `online` m."""
     assert a.status is b.status is Status.OK
     np.testing.assert_array_equal(a.used, b.used)
-    np.testing.assert_allclose(a.world_T_imu, b.world_T_imu, atol=1e-5)
+    np.testing.assert_allclose(a.world_T_imu, b.world_T_imu, atol=2e-5)  # where Gauss-Newton stops
     np.testing.assert_allclose(sigmas(a), sigmas(b), rtol=1e-4, atol=1e-12)
     np.testing.assert_array_equal(a.landmarks.index, b.landmarks.index)
     now, then = (e.by_products["isam2-online"] for e in (a, b))
