@@ -168,7 +168,7 @@ def _linearized(measurement: StereoMeasurement, observed: _Observed, p: FloatArr
     """
     camera, axes = measurement.camera, observed.axes
     q = (axes * (p[:, observed.row] - observed.center)[:, None]).sum(axis=0)
-    seen, white = camera.rows(q), measurement.white_scale[:, None]
+    seen, white = camera.rows(q), measurement.whitening_scale[:, None]
     A = np.empty((len(seen.pixel), 4, q.shape[1]))
     A[:, :3] = camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
     A[:, 3] = (observed.measured - seen.pixel) * white

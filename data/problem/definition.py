@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 
+from ..dataframes import plot_over_time
 from ..display import Displayed
 from ..finding import Finding
-from ..frames import plot_over_time
 from ..observations import BoolArray, IntArray, Observations
-from ..plural import per_cent, plural
 from ..sequence import Sequence
+from ..wording import per_cent, plural
 from .inertial import ImuIntervals, InertialStart
 
 if TYPE_CHECKING:

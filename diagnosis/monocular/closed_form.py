@@ -13,8 +13,8 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
-from ..inertial_start.least_squares import ACCELEROMETER_BIAS_SIGMA
-from ..inertial_start.states import Motions, States
+from ..inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
+from ..inertial_initialization.states import Motions, States
 from .window_tracks import Rays
 
 ROUNDS = 5

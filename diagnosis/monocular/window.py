@@ -13,10 +13,10 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, strapdown
 
-from ..inertial_start.least_squares import Solution, solved
-from ..inertial_start.start import NO_POSES, Start
-from ..inertial_start.states import RelativePoses, States, motions_between
-from ..inertial_start.track_terms import KeyframeTracks
+from ..inertial_initialization.least_squares import Solution, solved
+from ..inertial_initialization.start import NO_POSES, Start
+from ..inertial_initialization.states import RelativePoses, States, motions_between
+from ..inertial_initialization.track_terms import KeyframeTracks
 from .closed_form import closed_form
 from .gyroscope_bias import epipolar_bias
 from .window_tracks import first_inverse_depths, keyframe_tracks, rays_of, squared_residuals, window_points

@@ -14,7 +14,6 @@ from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
 from ..tables import run as tables
-from .environment import Picture, picture
 from .page import (
     Block,
     Folded,
@@ -32,6 +31,7 @@ from .page import (
 )
 from .plot_data import image_data, page_data
 from .plot_encoding import embedded_json
+from .templates import Picture, picture
 
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""

@@ -57,7 +57,7 @@ class _KnownLandmarks:
         front = predicted.depth > model.camera.min_depth
         if not front.any():
             return None
-        residual = (self._measured - predicted.pixel)[front] * model.white_scale
+        residual = (self._measured - predicted.pixel)[front] * model.whitening_scale
         root = np.sqrt(model.weight(np.einsum("ni,ni->n", residual, residual)))[:, None]
-        J = J[front] * (model.white_scale * root)[:, :, None]
+        J = J[front] * (model.whitening_scale * root)[:, :, None]
         return J.reshape(-1, 6), (residual * root).ravel()
