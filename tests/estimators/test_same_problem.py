@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fgbaseline.compare.residuals.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
-from fgbaseline.diagnosis.windows.residuals import WindowData, joined, pixel_terms
+from fgbaseline.diagnosis.windows.residuals import WindowData, concatenate_windows, pixel_terms
 from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
@@ -73,7 +73,7 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     frames = np.zeros(len(points), dtype=np.int64)
     still = np.zeros((1, 6))
     data = WindowData(frames, np.arange(len(points)), three_rows(pixel), still, np.ones(1), still)
-    one = joined([(data, np.stack([pose, pose]), points)])
+    one = concatenate_windows([(data, np.stack([pose, pose]), points)])
     window = pixel_terms(model, s.imu_T_cam, one, np.stack([pose, pose]), points, np.zeros((1, 8)))
     np.testing.assert_allclose(window.residual.T, white, rtol=1e-7, atol=1e-9)
     in_white = by_point / np.sqrt(model.row_variance)[:, None]
@@ -119,7 +119,7 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     still = np.zeros((1, 6))
     data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), three_rows(pixel), still, np.ones(1), still)
     two = np.stack([pose, pose])
-    terms = pixel_terms(model, s.imu_T_cam, joined([(data, two, points)]), two, points, np.zeros((1, 8)))
+    terms = pixel_terms(model, s.imu_T_cam, concatenate_windows([(data, two, points)]), two, points, np.zeros((1, 8)))
     np.testing.assert_allclose(terms.weight, expected, rtol=1e-9)
     # The graph: GTSAM multiplies residual and Jacobian by the root of the weight.
     values = values_from_state(estimate.world_T_imu, estimate.landmarks)
