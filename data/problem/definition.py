@@ -127,7 +127,7 @@ class Problem(Displayed):
     start: InertialStart | None = None
     """velocity, biases and covariance (15, 15) at frame 0; given together with `imu`"""
     inverse_depth_prior: InverseDepthPrior | None = None
-    """of the scene, for one camera"""
+    """prior of the depths of the scene, for one camera"""
     landmark_prior: LandmarkPrior | None = None
     kernel: HuberKernel | None = None
     mapping_pixel_variance: float | None = None

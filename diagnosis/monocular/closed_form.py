@@ -18,7 +18,7 @@ from ..inertial_initialization.states import Motions, States
 from .window_tracks import Rays
 
 ROUNDS = 5
-"""of depths, weights and gravity on the tangent plane of its sphere"""
+"""rounds of depths, weights and gravity on the tangent plane of its sphere"""
 PARALLEL = 1e-7
 """rad^2, smallest mean squared angle of a point's rays about their mean"""
 HUBER = 2.0

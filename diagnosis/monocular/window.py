@@ -46,7 +46,7 @@ class Rest(NamedTuple):
     """(k,) keyframes in which the body stands"""
     start: Start
     still: RelativePoses
-    """of these keyframes"""
+    """relative poses of these keyframes"""
 
 
 class Window(NamedTuple):

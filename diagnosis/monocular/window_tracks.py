@@ -13,7 +13,7 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from ..inertial_initialization.track_terms import KeyframeTracks
 
 MIN_OBSERVATIONS = 3
-"""of a track among the keyframes"""
+"""observations of a track among the keyframes"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
