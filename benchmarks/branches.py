@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from .rooms import ROOMS, TOP
+from .packages import ROOMS, TOP
 
 MEASURED = Path("out/coverage/coverage.json")
 

@@ -22,7 +22,7 @@ import click
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.measured import Row, row, table
+from benchmarks.claim_table import Row, row, table
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Problem, Sequence
 from tests.builders.dense_filter import DenseFilter

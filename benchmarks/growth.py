@@ -19,7 +19,7 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import Calibration, NoiseSettings
 
-from .apart import StoppedError, apart, forget_peak, memory, peak_memory
+from .subprocess_cost import StoppedError, apart, forget_peak, memory, peak_memory
 
 ESTIMATORS = ("dead-reckoning", "ekf", "joint-ekf", "isam2", "fixed-lag", "batch")
 PATIENCE = 100.0

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import click
 
-from .apart import MB, apart
-from .measured import Row, table
+from .claim_table import Row, table
+from .subprocess_cost import MB, apart
 
 FRAMES, FEATURES = 10_000, 20
 ESTIMATORS = "dead-reckoning,ekf,joint-ekf,isam2,isam2-online"

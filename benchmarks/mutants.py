@@ -19,8 +19,8 @@ from pathlib import Path
 import click
 from scipy.stats import beta
 
-from . import page
-from .rooms import ROOMS, TOP
+from . import docs_table
+from .packages import ROOMS, TOP
 
 PLACE = Path("out/mutants")
 PAGE = Path("docs/mutants.md")
@@ -133,7 +133,7 @@ def main(per_module: int, seed: int) -> None:
         f" {counts['no test']} are in functions that no selected test runs. {share:.1f} % died (95 % interval {low:.1f}"
         f" to {high:.1f} %); {weighted(everything, tried):.1f} % where each module counts by its mutants."
     )
-    page.write(PAGE, "mutants", [said, "", *table(everything, tried)])
+    docs_table.write(PAGE, "mutants", [said, "", *table(everything, tried)])
     for mutant in tried:
         if mutant.code not in DIED:
             click.echo(f"{mutant.name}\n    {difference(mutant.name)}")

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import click
 
-from . import filters, growth, growth_figure, long_run, page, reading, reference_speed, rest_of_run
-from .measured import Row, table
+from . import docs_table, filters, growth, growth_figure, long_run, reader_cost, reference_speed, rest_of_run
+from .claim_table import Row, table
 
 PLACE = Path("docs/performance.md")
 RECORDING = "03.npz"
@@ -36,7 +36,7 @@ def parts(recording: Path | None, runs: int, quick: bool) -> Iterator[tuple[str,
     yield "reference_speed", lambda: reference_speed.rows(recording, runs, drive)
     if recording is not None:
         yield "rest_of_run", lambda: rest_of_run.rows(recording, runs)
-    yield "reading", lambda: reading.rows(runs)
+    yield "reader_cost", lambda: reader_cost.rows(runs)
     yield "long_run", lambda: long_run.rows(run)
 
 
@@ -88,7 +88,7 @@ def main(recordings: Path, runs: int, quick: bool, wanted: bool | None, figure: 
     text = "\n\n".join([" ".join(notes), table(rows), growth.tables(points, growth.axes(quick))])
     click.echo(text)
     if wanted or (wanted is None and not quick):
-        page.write(PLACE, "performance", [text])
+        docs_table.write(PLACE, "performance", [text])
         click.echo(f"\n{PLACE} is written", err=True)
         if figure is not None:
             figure.write_bytes(growth_figure.drawn(points))

@@ -19,8 +19,8 @@ from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import Calibration, NoiseSettings
 
+from .claim_table import Row, row, table
 from .gtsam_time import INCREMENTAL, OTHER, gtsam_timed
-from .measured import Row, row, table
 
 MOST_OUTSIDE = 15.0
 """%"""

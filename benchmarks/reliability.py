@@ -18,7 +18,7 @@ import click
 from fgbaseline.compare.estimate_comparison import Result, Run
 from tests.builders.hostile import ESTIMATORS, RECORDINGS, REFUSED, Cell, Hostile, cell, error, sigmas, solved
 
-from . import page
+from . import docs_table
 
 PLACE = Path("docs/reliability.md")
 
@@ -50,7 +50,7 @@ def main() -> None:
         click.echo(f"{recording.name}: {time.monotonic() - start:.0f} s", err=True)
     lines += [f"| {name} | {' | '.join(['refused'] * len(ESTIMATORS))} | |" for name in REFUSED]
     notes = [f"- **{recording.name}**: {recording.note}." for recording in RECORDINGS if recording.note]
-    page.write(PLACE, "reliability", [*lines, "", *notes])
+    docs_table.write(PLACE, "reliability", [*lines, "", *notes])
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from benchmarks.measured import Row, table
+from benchmarks.claim_table import Row, table
 from fgbaseline.reports.cli.main import NEW_OBJECTS
 from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 

@@ -23,8 +23,8 @@ import numpy as np
 
 from fgbaseline import data
 
-from . import page
-from .measured import Row, table
+from . import docs_table
+from .claim_table import Row, table
 from .metrics import drive
 from .revision import BEFORE, ROOT, NoHistoryError, environment
 
@@ -301,7 +301,7 @@ def main(only: str, runs: int, recording: Path | None, write: bool) -> None:
     text = f"{note}\n\n{table(found)}"
     click.echo(text)
     if write:
-        page.write(PLACE, "waiting", [text])
+        docs_table.write(PLACE, "waiting", [text])
 
 
 if __name__ == "__main__":

@@ -86,8 +86,6 @@ class WorstSecond(NamedTuple):
     second: float
     """s from the first frame"""
     share: float
-    frame: int
-    """frame of this second with the most of them"""
 
 
 def worst_second(problem: Problem) -> WorstSecond | None:
@@ -103,10 +101,7 @@ def worst_second(problem: Problem) -> WorstSecond | None:
     every = np.bincount(place[frame[_chosen(problem)]], minlength=len(seconds))
     share = np.bincount(place[frame[wrong]], minlength=len(seconds)) / np.maximum(every, 1)
     worst = int(np.argmax(share))
-    by_frame = np.bincount(frame[wrong], minlength=len(t))
-    return WorstSecond(
-        float(seconds[worst]), float(share[worst]), int(np.argmax(np.where(place == worst, by_frame, -1)))
-    )
+    return WorstSecond(float(seconds[worst]), float(share[worst]))
 
 
 def _chosen(problem: Problem) -> BoolArray:

@@ -13,7 +13,7 @@ import numpy as np
 from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import distance, per_cent, plural
+from fgbaseline.data.wording import distance, per_cent, plural
 from fgbaseline.geometry import disparity
 
 from .residuals.cost import cost
@@ -140,7 +140,8 @@ def trust(
     given_up = len(lost) / problem.n_frames
     inflated = inflation_remark(problem)
     expected = (
-        f"{1.0 / problem.pixel_inflation:.2g} is expected for white track errors, because {inflated}"
+        f"{1.0 / problem.pixel_inflation:.2g} is expected for white track errors, because the pixel sigma is inflated "
+        f"{problem.pixel_inflation:.2g} times for time-correlated ones"
         if inflated
         else "1 is expected"
     )

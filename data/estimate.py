@@ -11,10 +11,10 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
+from .dataframes import axis_columns, path_length, plot_path, pose_columns, table
 from .display import Displayed
-from .frames import axis_columns, path_length, plot_path, pose_columns, table
 from .observations import BoolArray, IntArray
-from .plural import plural
+from .wording import plural
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import FgbaselineError, FloatArray
 
+from .dataframes import table
 from .display import Displayed
-from .frames import table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,13 +9,13 @@ import numpy as np
 from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera, se3, so3
 from fgbaseline.geometry.monocular import require_stereo
 
+from .dataframes import axis_columns, path_length, plot_over_time, pose_columns, table
 from .display import Displayed
 from .finding import Finding
-from .frames import axis_columns, path_length, plot_over_time, pose_columns, table
 from .imu import ImuSamples
 from .observations import BoolArray, Observations
-from .plural import plural
 from .value_range import LARGEST, measurable
+from .wording import plural
 
 if TYPE_CHECKING:
     import pandas as pd

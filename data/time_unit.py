@@ -15,8 +15,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from .finding import Finding
-from .plural import plural
 from .sequence import Sequence
+from .wording import plural
 
 
 class TimeUnit(StrEnum):

@@ -8,8 +8,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
 
+from .dataframes import path_length, plot_path, pose_columns, table
 from .display import Displayed
-from .frames import path_length, plot_path, pose_columns, table
 from .observations import BoolArray, IntArray
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from .inertial.result import InertialDiagnosis
 from .repair_overrides.settings import Repairs, read_repairs
 from .repair_overrides.template import repairs_text
 from .repairs.repaired_sequence import Repaired, repair
-from .tracks.unusable import unusable
+from .tracks.recording_faults import unusable
 
 __all__ = [
     "Calibration",

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
-from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import NoiseSettings, Problem
 from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
 from fgbaseline.data.sequence import Sequence, require_scale
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import HuberKernel, InputError
 
 from .estimation.pipeline import diagnose

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.data.estimate import Estimate, Landmarks, Progress
 from fgbaseline.data.problem import Problem
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 
 from .motion_model import predicted_history
 

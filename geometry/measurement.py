@@ -29,11 +29,11 @@ ROWS = ("uL", "uR", "v")
 MONOCULAR_ROWS = ("uL", "v")
 ROW_VARIANCE = np.array([1.0, 1.0, 0.5])
 """variances of (uL, uR, v), relative to the variance V of one of the four rows"""
-WHITE_SCALE = 1.0 / np.sqrt(ROW_VARIANCE)
+EQUALIZING_SCALE = 1.0 / np.sqrt(ROW_VARIANCE)
 """factors that give residuals of (uL, uR, v) the variance V"""
 
 
-def measured_rows(pixel: FloatArray) -> FloatArray:
+def three_rows(pixel: FloatArray) -> FloatArray:
     """Rows uL, uR, (vL + vR) / 2 (..., 3) of pixels or residuals uL, vL, uR, vR (..., 4)."""
     v = 0.5 * (pixel[..., 1] + pixel[..., 3])
     return np.stack([pixel[..., 0], pixel[..., 2], v], axis=-1)
@@ -122,14 +122,14 @@ class StereoMeasurement:
         return np.full(len(MONOCULAR_ROWS), self.variance) if self.monocular else self.variance * ROW_VARIANCE
 
     @property
-    def white_scale(self) -> FloatArray:
+    def whitening_scale(self) -> FloatArray:
         """Factors (r,) that whiten residuals of the rows, 1/px."""
-        scale = np.ones(len(MONOCULAR_ROWS)) if self.monocular else WHITE_SCALE
+        scale = np.ones(len(MONOCULAR_ROWS)) if self.monocular else EQUALIZING_SCALE
         return np.asarray(scale / np.sqrt(self.variance), dtype=np.float64)
 
     def measured(self, pixel: FloatArray) -> FloatArray:
         """Rows (..., r) of pixels or residuals uL, vL, uR, vR (..., 4)."""
-        return pixel[..., :2] if self.monocular else measured_rows(pixel)
+        return pixel[..., :2] if self.monocular else three_rows(pixel)
 
     def pixel_distance(self, residual: FloatArray) -> FloatArray:
         """Euclidean norms (n,), px, of what is measured in residuals (n, 4): of uL, vL, uR, vR, or of uL and vL."""
@@ -137,7 +137,7 @@ class StereoMeasurement:
 
     def whitened(self, residual: FloatArray) -> FloatArray:
         """Whitened residuals (..., r) of the rows, in sigmas, from residuals of uL, vL, uR, vR (..., 4), px."""
-        return np.asarray(self.measured(residual) * self.white_scale, dtype=np.float64)
+        return np.asarray(self.measured(residual) * self.whitening_scale, dtype=np.float64)
 
     def weight(self, squared: FloatArray) -> FloatArray:
         """Kernel weights of squared whitened norms (...); 1 without a kernel."""
@@ -169,7 +169,7 @@ class StereoMeasurement:
         if self.kernel is None:
             rows = list(PIXEL_ROWS)
             return DocumentedInnovation(pixel - predicted[:, rows], rows, np.full(4, self.variance))
-        return DocumentedInnovation(measured_rows(pixel) - predicted, [0, 1, 2], self.row_variance)
+        return DocumentedInnovation(three_rows(pixel) - predicted, [0, 1, 2], self.row_variance)
 
     def with_variance(self, variance: float) -> "StereoMeasurement":
         """Model with another variance V, px^2."""

@@ -42,7 +42,7 @@ _SERIES = np.array(
 )
 
 
-class ImuMotion(NamedTuple):
+class PreintegratedImu(NamedTuple):
     """Motion over an interval, relative to its first body frame and free of gravity and of the initial velocity."""
 
     rotation: FloatArray
@@ -99,7 +99,7 @@ def _pieces(phi: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]
 
 def integrate(
     angular_velocity: FloatArray, specific_force: FloatArray, dt: FloatArray, densities: FloatArray
-) -> ImuMotion:
+) -> PreintegratedImu:
     """Motion over n consecutive pieces: angular velocities (n, 3), rad/s, and specific forces (n, 3), m/s^2, less bias.
 
     `densities` (4,): noise density and random walk of the gyroscope (rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)), then of the
@@ -119,19 +119,19 @@ def integrate(
     end = R[-1].T.copy()
     columns *= np.repeat(np.stack([dt, dt**2, dt**2, dt**3], axis=1), 3, axis=1)[:, None, :]
     turned = (end @ R[:-1]) @ columns  # from here on in the axes of the last body frame
-    gain, lift, gain_slope, lift_slope = (turned[:, :, i : i + 3] for i in range(0, 12, 3))
+    J1_dt, J2_dt2, J1_dt_slope, J2_dt2_slope = (turned[:, :, i : i + 3] for i in range(0, 12, 3))
     steps = turned[:, :, :6].reshape(n, 3, 2, 3) @ specific_force[:, None, :, None]
     v = np.cumsum(steps[:, :, 0, 0], axis=0)  # after each piece
     p = np.cumsum(steps[:, :, 1, 0] + (v - steps[:, :, 0, 0]) * dt[:, None], axis=0)
     elapsed = np.cumsum(dt)
     left = (elapsed[-1] - elapsed)[:, None]  # after each piece
     v_left = v[-1] - v
-    by_turn = hat3(np.stack([p[-1] - p - v * left, v_left])) @ gain
+    by_turn = hat3(np.stack([p[-1] - p - v * left, v_left])) @ J1_dt
     G = np.zeros((n, 9, 6))
-    G[:, TRANSLATION, :3] = by_turn[0] - left[:, :, None] * gain_slope - lift_slope
-    G[:, TRANSLATION, 3:] = -lift - left[:, :, None] * gain
-    G[:, ROTATION, :3] = G[:, VELOCITY, 3:] = -gain
-    G[:, VELOCITY, :3] = by_turn[1] - gain_slope
+    G[:, TRANSLATION, :3] = by_turn[0] - left[:, :, None] * J1_dt_slope - J2_dt2_slope
+    G[:, TRANSLATION, 3:] = -J2_dt2 - left[:, :, None] * J1_dt
+    G[:, ROTATION, :3] = G[:, VELOCITY, 3:] = -J1_dt
+    G[:, VELOCITY, :3] = by_turn[1] - J1_dt_slope
     total = G.sum(axis=0)
     later = np.zeros((n, STATE, 6))  # derivatives by a step of the walk
     later[:, :9] = total - np.cumsum(G, axis=0)
@@ -145,7 +145,7 @@ def integrate(
     F[TRANSLATION, ROTATION], F[TRANSLATION, VELOCITY] = -P @ end, elapsed[-1] * end
     F[VELOCITY, ROTATION] = -V @ end
     F[:9, 9:] = total
-    return ImuMotion(R[-1], R[-1] @ v[-1], R[-1] @ p[-1], float(elapsed[-1]), F, Q)
+    return PreintegratedImu(R[-1], R[-1] @ v[-1], R[-1] @ p[-1], float(elapsed[-1]), F, Q)
 
 
 def _gram(factors: FloatArray, weight: FloatArray) -> FloatArray:
@@ -156,7 +156,7 @@ def _gram(factors: FloatArray, weight: FloatArray) -> FloatArray:
 
 
 def predict(
-    pose: FloatArray, velocity: FloatArray, motion: ImuMotion, gravity: FloatArray
+    pose: FloatArray, velocity: FloatArray, motion: PreintegratedImu, gravity: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Pose (4, 4) and velocity (3,), m/s, after a motion from `pose` and `velocity`, under gravity (3,), m/s^2."""
     R, dt = pose[:3, :3], motion.dt
@@ -166,7 +166,7 @@ def predict(
     return after, velocity + gravity * dt + R @ motion.velocity
 
 
-def world_axes(motion: ImuMotion, before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
+def world_axes(motion: PreintegratedImu, before: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Transition F and noise Q (15, 15) with velocity errors in world axes, for rotations (3, 3) before and after."""
     return rotated_velocity(motion.transition, after, before), rotated_velocity(motion.noise, after, after)
 

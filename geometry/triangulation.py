@@ -191,7 +191,7 @@ def _linearized(measurement: StereoMeasurement, observed: _Observed, q: FloatArr
     camera, along = measurement.camera, observed.along
     point = q[:, observed.row]
     seen = camera.rows(observed.constant + along[:, 0] * point[0] + along[:, 1] * point[1] + along[:, 2] * point[2])
-    white = measurement.white_scale[:, None]
+    white = measurement.whitening_scale[:, None]
     A = np.empty((len(seen.pixel), 4, len(observed.row)))
     np.multiply(camera.row_derivatives(seen, along), white[:, None], out=A[:, :3])
     np.multiply(observed.measured - seen.pixel, white, out=A[:, 3])

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from math import isfinite
 
-from fgbaseline.data.plural import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
+from fgbaseline.data.wording import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
 
 __all__ = ["DASH", "INFINITY", "MINUS", "distance", "listed", "number", "per_cent"]
 NO_BREAK = "\N{NO-BREAK SPACE}"

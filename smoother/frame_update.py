@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import gtsam
 
 from fgbaseline.data.estimate import Event, EventKind
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from .errors import IndeterminateSystemError, UnrecoverableError

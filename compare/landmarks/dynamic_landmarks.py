@@ -152,7 +152,7 @@ def _linearized(observations: _Observations, state: FloatArray) -> tuple[FloatAr
     p_cam = (R * points).sum(axis=1) + observations.shift
     front = p_cam[2] > 0.0
     p_cam[:, ~front] = [[0.0], [0.0], [1.0]]
-    seen, white = model.camera.rows(p_cam), model.white_scale[:, None]
+    seen, white = model.camera.rows(p_cam), model.whitening_scale[:, None]
     A = np.empty((model.n_rows, 4, len(s)))  # columns are d/dp, then the residual
     A[:, :3] = model.camera.row_derivatives(seen, R) * white[:, None]
     A[:, 3] = (observations.measured - seen.pixel) * white

@@ -13,7 +13,7 @@ from ..residuals.patterns import DEPTHS, depth_classes
 from ..statistics.chi_square import mahalanobis_squared
 
 MIN_WITH_SIGMAS = 10
-"""of a depth class that has a median in sigmas: few landmarks have a covariance of the difference"""
+"""landmarks of a depth class that has a median in sigmas: few have a positive definite P - P_ref"""
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
@@ -83,9 +83,9 @@ def _nearest_observation(sequence: Sequence, estimate: Estimate, reference: Esti
     position = np.full((sequence.n_landmarks, 3), np.nan)
     position[reference.landmarks.index] = reference.landmarks.position
     both = np.isfinite(estimate.world_T_imu[:, 0, 0]) & np.isfinite(reference.world_T_imu[:, 0, 0])
-    centre = (reference.world_T_imu @ sequence.imu_T_cam)[:, :3, 3]
+    center = (reference.world_T_imu @ sequence.imu_T_cam)[:, :3, 3]
     with np.errstate(invalid="ignore"):
-        distance = np.linalg.norm(position[o.landmark] - centre[o.frame], axis=1)
+        distance = np.linalg.norm(position[o.landmark] - center[o.frame], axis=1)
     distance[~both[o.frame]] = np.nan
     seen = np.flatnonzero(np.isfinite(distance))
     seen = seen[np.argsort(-distance[seen], kind="stable")]  # the last write wins: the nearest

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fgbaseline.data.display import Displayed
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
 
 from .wahba import solve_wahba, solve_wahba_about_axis

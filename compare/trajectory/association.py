@@ -9,7 +9,7 @@ import numpy as np
 from fgbaseline.data import Trajectory
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .alignment import Align, Alignment, align

@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..columns import Columns, to_frame

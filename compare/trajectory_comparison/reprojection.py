@@ -13,7 +13,7 @@ from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Tra
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 

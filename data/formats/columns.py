@@ -7,7 +7,7 @@ from typing import Literal
 
 from fgbaseline.geometry import InputError
 
-from ..plural import plural
+from ..wording import plural
 from .number_table import Lines, split
 
 Order = Literal["xyzw", "wxyz"]

@@ -11,9 +11,9 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, IntArray, Observations
-from ..plural import per_cent
 from ..sequence import Truth
 from ..time_unit import COARSE, lost_digits
+from ..wording import per_cent
 from .fields import finite_stamps
 
 MOST_REPEATED = 0.05

@@ -8,8 +8,8 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..observations import BoolArray, Observations
-from ..plural import per_cent, plural
 from ..sequence import Sequence
+from ..wording import per_cent, plural
 from .imu_csv import read_imu_csv
 from .imu_samples import RawSamples
 from .imu_yaml import ImuCalibration

@@ -8,8 +8,8 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..finding import Finding
 from ..imu import ImuNoise, ImuSamples
-from ..plural import noun, plural
 from ..time_unit import lost_digits
+from ..wording import noun, plural
 
 MOST_DOUBLED = 0.05
 """share of the samples that may repeat the stamp before; with more, the stamps lost their digits"""

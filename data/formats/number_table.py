@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from fgbaseline.geometry import InputError
 
-from .foreign_files import require_table
+from .wrong_file_type import require_table
 
 if TYPE_CHECKING:
     from fgbaseline.geometry import FloatArray

@@ -8,8 +8,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
-from ..plural import plural
 from ..time_unit import SAMPLE_PERIODS, TimeUnit, lost_digits, significant_digits, since_1970
+from ..wording import plural
 
 FASTEST, USUAL, SLOWEST = 5e-4, 20.0, 1e4
 """s between two poses: of no recorder, of a recorder, of keyframes at most"""

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
 
+from ..dataframes import plot_over_time
 from ..display import Displayed
 from ..finding import Finding
-from ..frames import plot_over_time
 from ..observations import BoolArray, IntArray, Observations
-from ..plural import per_cent, plural
 from ..sequence import Sequence
+from ..wording import per_cent, plural
 from .inertial import ImuIntervals, InertialStart
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Problem(Displayed):
     start: InertialStart | None = None
     """velocity, biases and covariance (15, 15) at frame 0; given together with `imu`"""
     inverse_depth_prior: InverseDepthPrior | None = None
-    """of the scene, for one camera"""
+    """prior of the depths of the scene, for one camera"""
     landmark_prior: LandmarkPrior | None = None
     kernel: HuberKernel | None = None
     mapping_pixel_variance: float | None = None

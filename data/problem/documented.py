@@ -6,8 +6,8 @@ from fgbaseline.geometry import FloatArray, InputError, disparity
 
 from ..motion import Shift, back_project, dead_reckoned_path, increments
 from ..observations import IntArray, Observations
-from ..plural import plural
 from ..sequence import Sequence, require_scale
+from ..wording import plural
 from .definition import Excluded, LandmarkMode, LandmarkPrior, Problem
 
 MOTION_NOISE = np.diag([0.5, 0.5, 0.5, 0.05, 0.05, 0.05])

@@ -77,7 +77,7 @@ class ImuIntervals(Displayed):
         """Pieces of the interval from frame k to k + 1."""
         return slice(int(self.starts[k]), int(self.starts[k + 1]))
 
-    def motion(self, k: int, gyroscope_bias: FloatArray, accelerometer_bias: FloatArray) -> strapdown.ImuMotion:
+    def motion(self, k: int, gyroscope_bias: FloatArray, accelerometer_bias: FloatArray) -> strapdown.PreintegratedImu:
         """Motion from frame k to k + 1 with the biases (3,) taken off the samples."""
         at = self.pieces(k)
         return strapdown.integrate(

@@ -10,6 +10,7 @@ from fgbaseline.geometry.monocular import left_of
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth
+from ..wording import per_cent
 from .camera_view import CameraView
 from .inertial import recorded_samples, standing_start
 from .match_errors import displaced, noisy_pixels, wrong_matches
@@ -214,9 +215,9 @@ def _remarks(settings: Simulation, wrong: BoolArray) -> tuple[str, ...]:
         return (
             f"simulated: raw inertial samples at {imu.rate:g} Hz with {imu.gyroscope_density:g} rad/s/sqrt(Hz) and "
             f"{imu.accelerometer_density:g} m/s^2/sqrt(Hz), pixels with {settings.sigma_pixel:g} px a row, "
-            f"{100.0 * share:.1f} % wrong matches",
+            f"{per_cent(share)} wrong matches",
         )
     return (
         f"simulated: velocities with noise of {settings.sigma_linear:g} m/s and {settings.sigma_angular:g} rad/s a "
-        f"sample, pixels with {settings.sigma_pixel:g} px a row, {100.0 * share:.1f} % wrong matches",
+        f"sample, pixels with {settings.sigma_pixel:g} px a row, {per_cent(share)} wrong matches",
     )

@@ -15,8 +15,8 @@ from ..formats.imu_attachment import attach_imu
 from ..formats.inertial_truth import inertial_truth
 from ..formats.npz_writer import write_npz, write_tracks
 from ..observations import BoolArray, Observations
-from ..plural import plural
 from ..sequence import Sequence, Truth
+from ..wording import plural
 from .monocular_tracker import MonocularTracker
 from .pictures import Pictures
 from .prediction import rotation_between

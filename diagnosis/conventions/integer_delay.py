@@ -16,7 +16,7 @@ SHIFTS = (-2.0, -1.0, 0.0, 1.0)
 """intervals"""
 ENOUGH = 25.0
 """log-likelihood lead over all other shifts; high, since time-correlated pixel errors exaggerate it"""
-INFLATION = 3.0
+STANDARD_ERROR_FACTOR = 3.0
 """factor on the standard error, for the same reason"""
 HELD = 0.5
 """share of the cost's fall that the parabola predicts, from which on it describes the cost"""
@@ -38,7 +38,7 @@ def integer_delay(cost: Callable[[float], float], dt: float) -> TimeDelay | None
     before, at, after = costs[best - 1 : best + 2]
     curvature = before - 2.0 * at + after
     shift = tried[best] + 0.5 * (before - after) / curvature
-    deviation = INFLATION / float(np.sqrt(curvature))
+    deviation = STANDARD_ERROR_FACTOR / float(np.sqrt(curvature))
     if at - cost(float(shift)) < HELD * 0.5 * curvature * (shift - tried[best]) ** 2:
         shift, deviation = tried[best], max(deviation, float(ROUNDING))
     return TimeDelay(float(shift) * dt, deviation * dt, True, tried, _relative(costs))

@@ -11,15 +11,15 @@ from .spline import Spline, spline_through
 
 MAX_SHIFT = 3.0
 """frames"""
-ENOUGH = 5.0
+MIN_LEAD = 5.0
 """log-likelihood by which the shift must lead those more than an interval away"""
 LONGEST_GAP = 2
 """intervals; longer gaps in the odometry are not interpolated"""
-GRID = 0.02
+SHIFT_STEP = 0.02
 """frames"""
-NOT_KNOWN = 0.2
+MAX_STANDARD_ERROR = 0.2
 """frames: a standard error beyond which the shift is not identifiable"""
-INFLATION = 2.0
+STANDARD_ERROR_FACTOR = 2.0
 """factor on the standard error, since residuals of neighboring frames are correlated"""
 
 
@@ -56,7 +56,7 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     residual = x[inside] - spline(k[inside])
     sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
     weight = 1.0 / sigma**2
-    shifts = np.arange(-MAX_SHIFT, MAX_SHIFT + GRID / 2, GRID)
+    shifts = np.arange(-MAX_SHIFT, MAX_SHIFT + SHIFT_STEP / 2, SHIFT_STEP)
     clipped = np.clip(x[inside], -6 * np.std(x[inside], axis=0), 6 * np.std(x[inside], axis=0))
     correlation = np.array([np.sum(weight * clipped * spline(k[inside] + shift)) for shift in shifts])
     energy = _energy(spline, k[inside], weight, shifts)
@@ -69,10 +69,10 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     # squared slope of a noisy signal overestimates it.
     pull = (residual - np.median(residual, axis=0)) * slope / sigma**2
     curvature = -float(np.sum(clipped * spline(k[inside] + shifts[peak], 2) / sigma**2))
-    deviation = INFLATION * float(np.sqrt(np.sum(pull**2))) / curvature if curvature > 0 else np.inf
+    deviation = STANDARD_ERROR_FACTOR * float(np.sqrt(np.sum(pull**2))) / curvature if curvature > 0 else np.inf
     at_edge = peak in (0, len(shifts) - 1)
     lead = float(score[peak] - score[np.abs(shifts - shifts[peak]) > 1.0].max())
-    identifiable = bool(deviation < NOT_KNOWN and lead > ENOUGH and not at_edge)
+    identifiable = bool(deviation < MAX_STANDARD_ERROR and lead > MIN_LEAD and not at_edge)
     return TimeDelay(float(shifts[peak]) * dt, deviation * dt, identifiable, shifts, 2.0 * score / energy)
 
 

@@ -15,7 +15,7 @@ from ..conventions.rig import doubt_of_position, extrinsic_unit, usual_rig
 from ..conventions.units import Units, rescaled, units_of
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.image_size import doubt_of_intrinsics
-from ..tracks.unusable import unusable
+from ..tracks.recording_faults import unusable
 from .result import Diagnosis
 from .velocity_calibration import calibrate_velocities
 

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 from fgbaseline.data.observations import IntArray
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 
 def spans(frames: IntArray, most: int = 4) -> str:

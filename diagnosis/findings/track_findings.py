@@ -4,9 +4,9 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import per_cent, plural
 from fgbaseline.data.problem.velocity_gaps import GAP
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import per_cent, plural
 
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY
 from .phrases import spans

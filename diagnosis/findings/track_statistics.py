@@ -12,7 +12,7 @@ from ..estimation.result import Diagnosis
 from ..odometry.ransac import TRUNCATION
 from ..repairs.repaired_sequence import Repaired, repair
 from ..tracks.observation_mask import MaskSettings
-from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, sound
+from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, is_usable
 
 BURST = 1.0 / 3.0
 """share of the links of an interval that contradict its motion, from which on it is a burst"""
@@ -99,7 +99,7 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
         tiny=int(np.sum((apart > 0) & (apart <= MIN_DISPARITY))),
         rows=int(np.sum(np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > MAX_ROW_MISMATCH)),
         copied=_copied(sequence, diagnosis.repeated),
-        usable=np.bincount(o.frame[sound(sequence)], minlength=n + 1),
+        usable=np.bincount(o.frame[is_usable(sequence)], minlength=n + 1),
         links=links,
         wrong=wrong,
         wrong_after=after,

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.motion import Shift, zero_order_hold
-from fgbaseline.data.plural import listed, noun, number, per_cent, plural, signed, vector
+from fgbaseline.data.wording import listed, noun, number, per_cent, plural, signed, vector
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes

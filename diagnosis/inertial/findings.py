@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.plural import plural
 from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import plural
 
 from ..estimation.result import Diagnosis
 from ..findings.track_findings import track_findings
@@ -15,7 +15,7 @@ from ..findings.track_statistics import TrackStatistics, track_statistics
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
 from ..tracks.image_size import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
-from .baseline import baseline_findings
+from .baseline_unit import baseline_findings
 from .result import InertialDiagnosis
 from .sensor_axes import axes_findings
 from .sensor_findings import sensor_findings

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.plural import vector
+from fgbaseline.data.wording import vector
 
 from ..findings.json_report import header
 from .findings import inertial_findings
@@ -83,7 +83,7 @@ def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
     if found.start is not None:
         state, deviation = found.start.state, np.sqrt(np.diag(found.start.state.covariance))
         said.append(
-            f"Start ({state.source}): velocity {vector(state.velocity, 3)} m/s, one standard error "
+            f"Start ({state.source}): velocity {vector(state.velocity, 3)} m/s, standard errors "
             f"{vector(deviation[6:9], 3)}; tilt known to {np.rad2deg(np.linalg.norm(deviation[3:6])):.2f}°."
         )
     checks = found.sensors
@@ -91,9 +91,9 @@ def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
         scale, error = checks.gyroscope_scale
         said.append(
             f"Gyroscope against the cameras: bias {vector(checks.gyroscope_bias[0], 4)} rad/s, offset "
-            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (one standard error {error:.3f}); "
+            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (standard error {error:.3f}); "
             f"accelerometer: bias {vector(checks.accelerometer_bias, 3)} m/s^2, gravity {checks.gravity[0]:.3f} m/s^2."
         )
     if found.fit is not None:
-        said.append(f"Noise (one sigma): {found.pixel:.2f} px of a pixel row.")
+        said.append(f"Noise (1-sigma): {found.pixel:.2f} px of a pixel row.")
     return tuple(said)

@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.plural import plural
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry.monocular import require_stereo
 
 from ..conventions.rig import usual_rig
 from ..conventions.units import Units, rescaled
-from ..inertial_start.path import InertialPath, inertial_path
-from ..inertial_start.start import Start, inertial_start
+from ..inertial_initialization.path import InertialPath, inertial_path
+from ..inertial_initialization.start import Start, inertial_start
 from ..noise.calibration_fit import fit_windows
 from ..odometry.stereo_odometry import Odometry, odometry
+from ..tracks.recording_faults import unusable
 from ..tracks.track_segments import repeated
-from ..tracks.unusable import unusable
-from .baseline import baseline_unit
+from .baseline_unit import baseline_unit
 from .result import InertialDiagnosis
 from .sensor_axes import SensorAxes, in_imu_axes, sensor_axes
 from .sensors import sensor_checks

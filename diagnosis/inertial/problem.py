@@ -6,24 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.plural import plural
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
 from ..conventions.rig import usual_rig
-from ..inertial_start.start import Start
+from ..inertial_initialization.start import Start
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, choose_features, exclusions
-from .baseline import BaselineUnit, baseline_findings, baseline_unit
+from .baseline_unit import BaselineUnit, baseline_findings, baseline_unit
 from .findings import inertial_findings, inertial_repairs
 from .pipeline import found_start
 from .result import InertialDiagnosis
 from .sensor_axes import in_imu_axes, sensor_axes
-from .truth_tie import path_from, tied_truth
+from .truth_alignment import path_from, tied_truth
 from .units import imu_unit_findings, imu_units, require_si, rescaled_samples
 
 

@@ -10,11 +10,11 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 
-from ..inertial_start.path import InertialPath
-from ..inertial_start.start import Start
+from ..inertial_initialization.path import InertialPath
+from ..inertial_initialization.start import Start
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
-from .baseline import BaselineUnit
+from .baseline_unit import BaselineUnit
 from .sensor_axes import SensorAxes
 from .sensors import SensorChecks
 from .spikes import Spikes

@@ -10,8 +10,8 @@ import numpy as np
 
 from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY, axes_matrix
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.plural import number
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import number
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes, angular_axes

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.plural import per_cent, vector
+from fgbaseline.data.wording import per_cent, vector
 
 from ..noise.calibration_fit import SIGNIFICANT
 from .sensors import SensorChecks

@@ -7,8 +7,8 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import noun, plural
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import noun, plural
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.jumps import FAR_BLIND, among_neighbors

@@ -13,12 +13,12 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
-from ..inertial_start.least_squares import ACCELEROMETER_BIAS_SIGMA
-from ..inertial_start.states import Motions, States
+from ..inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
+from ..inertial_initialization.states import Motions, States
 from .window_tracks import Rays
 
 ROUNDS = 5
-"""of depths, weights and gravity on the tangent plane of its sphere"""
+"""rounds of depths, weights and gravity on the tangent plane of its sphere"""
 PARALLEL = 1e-7
 """rad^2, smallest mean squared angle of a point's rays about their mean"""
 HUBER = 2.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from ..inertial_start.least_squares import GYROSCOPE_BIAS_SIGMA
-from ..inertial_start.states import Motions
+from ..inertial_initialization.least_squares import GYROSCOPE_BIAS_SIGMA
+from ..inertial_initialization.states import Motions
 from .window_tracks import Rays
 
 MIN_COMMON = 8

@@ -16,10 +16,10 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3
 
-from ..inertial_start.least_squares import solved
-from ..inertial_start.standing import keyframes_of, standing_frames, stands
-from ..inertial_start.start import Start, standing_states, start_of
-from ..inertial_start.states import RelativePoses
+from ..inertial_initialization.least_squares import solve_least_squares
+from ..inertial_initialization.start import Start, standing_states, start_of
+from ..inertial_initialization.states import RelativePoses
+from ..inertial_initialization.stationary import keyframes_of, standing_frames, stands
 from .window import Rest, Window, moving_window
 
 LONGEST_STAND = 10.0
@@ -98,7 +98,7 @@ def _rest(sequence: Sequence, imu: ImuIntervals, frames: IntArray) -> Rest:
     still = _still(len(keyframes))
     seconds = float(sequence.t[frames[-1]] - sequence.t[0])
     source = f"standing start of {seconds:.2f} s, in which the camera sees no motion"
-    start = start_of(solved(standing_states(imu, keyframes), imu, keyframes, still), source, seconds)
+    start = start_of(solve_least_squares(standing_states(imu, keyframes), imu, keyframes, still), source, seconds)
     return Rest(keyframes, start, still)
 
 

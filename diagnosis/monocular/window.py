@@ -13,10 +13,10 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, strapdown
 
-from ..inertial_start.least_squares import Solution, solved
-from ..inertial_start.start import NO_POSES, Start
-from ..inertial_start.states import RelativePoses, States, motions_between
-from ..inertial_start.track_terms import KeyframeTracks
+from ..inertial_initialization.least_squares import Solution, solve_least_squares
+from ..inertial_initialization.start import NO_POSES, Start
+from ..inertial_initialization.states import RelativePoses, States, motions_between
+from ..inertial_initialization.track_terms import KeyframeTracks
 from .closed_form import closed_form
 from .gyroscope_bias import epipolar_bias
 from .window_tracks import first_inverse_depths, keyframe_tracks, rays_of, squared_residuals, window_points
@@ -46,7 +46,7 @@ class Rest(NamedTuple):
     """(k,) keyframes in which the body stands"""
     start: Start
     still: RelativePoses
-    """of these keyframes"""
+    """relative poses of these keyframes"""
 
 
 class Window(NamedTuple):
@@ -123,10 +123,10 @@ def _solved(sequence: Sequence, imu: ImuIntervals, window: IntArray, rest: Rest 
     still = NO_POSES if rest is None else rest.still
     with np.errstate(all="ignore"):
         states = _in_motion(sequence, imu, frames, tracks) if rest is None else _from_rest(imu, frames, rest)
-        first = solved(states, imu, frames, still, tracks)
+        first = solve_least_squares(states, imu, frames, still, tracks)
         pixel = max(_pixel_noise(tracks, first), least)
         tracks = keyframe_tracks(sequence, frames, pixel)
-        solution = solved(first.states, imu, frames, still, tracks)
+        solution = solve_least_squares(first.states, imu, frames, still, tracks)
     pose = solution.states.pose
     if not (np.isfinite(pose).all() and np.isfinite(solution.scale_sigma)):
         raise ValueError("its least squares does not converge")

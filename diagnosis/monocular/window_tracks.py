@@ -10,10 +10,10 @@ from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import predict
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
-from ..inertial_start.track_terms import KeyframeTracks
+from ..inertial_initialization.track_terms import KeyframeTracks
 
 MIN_OBSERVATIONS = 3
-"""of a track among the keyframes"""
+"""observations of a track among the keyframes"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,7 +63,7 @@ def squared_residuals(tracks: KeyframeTracks, pose: FloatArray, points: FloatArr
     for i, world_T_imu in enumerate(pose):
         at = np.flatnonzero(tracks.keyframe == i)
         seen = predict(model.camera, cam_T_imu, world_T_imu, points[tracks.point[at]])
-        residual = (model.measured(tracks.pixel[at]) - seen.pixel) * model.white_scale
+        residual = (model.measured(tracks.pixel[at]) - seen.pixel) * model.whitening_scale
         squared[at] = np.where(seen.depth > model.camera.min_depth, np.sum(residual**2, axis=1), np.nan)
     return squared
 

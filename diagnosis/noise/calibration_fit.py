@@ -9,8 +9,8 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
-from ..windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_windows_alike
-from ..windows.residuals import SHARED
+from ..windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_each_window
+from ..windows.residuals import N_CALIBRATION
 from ..windows.selection import spread_spans, unbroken_spans, windows_of
 from .correlated_noise import Inflation, inflation_of
 
@@ -36,7 +36,7 @@ class CalibrationFit:
     sigmas: NoiseSettings
     """noise for a filter, correlated errors included"""
     shared: FloatArray
-    """(8,) see `residuals.SHARED`"""
+    """(8,) see `residuals.N_CALIBRATION`"""
     deviation: FloatArray
     """(8,) standard errors, from the spread between windows where that is larger than the formal ones
 
@@ -70,10 +70,10 @@ def fit_windows(
         return None
     baseline = sequence.stereo_camera.baseline
     sigmas = replace(START, linear_velocity=START.linear_velocity * baseline)
-    shared = [np.zeros(SHARED)] * len(windows)
+    shared = [np.zeros(N_CALIBRATION)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
+        fits = fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
         shared = [fit.shared for fit in fits]
         sigmas = _components(fits, sigmas, baseline)
@@ -112,8 +112,8 @@ def half_cost(
     whiten = np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3)
     total = 0.0
     windows = windows_of(sequence, odometry, twist, spread_spans(sequence.n_frames), deviation)
-    start = [np.zeros(SHARED)] * len(windows)
-    for fit in fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
+    start = [np.zeros(N_CALIBRATION)] * len(windows)
+    for fit in fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, start, 5, processes):
         total += 0.5 * float(fit.pixel_squared.sum() + np.sum((fit.motion_residual / whiten) ** 2))
     return total
 

@@ -14,7 +14,7 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, so3
 
-from ..windows.bundle_adjustment import fit_windows_alike
+from ..windows.bundle_adjustment import fit_each_window
 from ..windows.residuals import SCALE, TURN, Window, WindowData
 
 LOOSE = 30.0
@@ -86,7 +86,7 @@ def _ends(
 ) -> list[End]:
     """Last pose of each window from the tracks."""
     common = [shared] * len(windows)
-    fits = fit_windows_alike(sequence.stereo_camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
+    fits = fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
     return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 

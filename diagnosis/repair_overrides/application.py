@@ -16,7 +16,7 @@ from ..noise.calibration_fit import CalibrationFit
 from ..noise.correlated_noise import Inflation
 from ..repairs.repaired_sequence import TrackRepairs
 from ..tracks.observation_mask import MaskSettings
-from ..windows.residuals import OFFSET, SCALE, SHARED, TURN
+from ..windows.residuals import N_CALIBRATION, OFFSET, SCALE, TURN
 from .settings import Repairs
 
 SAME = 1e-3
@@ -88,7 +88,13 @@ def _turned(axes: Axes, name: str | None) -> Axes:
 
 def _fit(found: Diagnosis, repairs: Repairs) -> CalibrationFit:
     fit = found.fit or CalibrationFit(
-        NoiseSettings(), np.zeros(SHARED), np.full(SHARED, np.inf), 0, Inflation(), NoiseSettings(), np.empty((0, 6))
+        NoiseSettings(),
+        np.zeros(N_CALIBRATION),
+        np.full(N_CALIBRATION, np.inf),
+        0,
+        Inflation(),
+        NoiseSettings(),
+        np.empty((0, 6)),
     )
     shared, deviation = fit.shared.copy(), fit.deviation.copy()
     if repairs.gyro_bias is not None:

@@ -7,7 +7,7 @@ from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 PIECE = 8
@@ -47,7 +47,7 @@ def _moving(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o:
     piece, n_pieces = _pieces(row, o.frame)
     position = triangulate_tracks(model, world_T_cam, piece, o.pixel, n_pieces).position
     residual = o.pixel - model.camera.project(se3.transform(se3.inverse(world_T_cam), position[piece]))
-    squared = np.nan_to_num((measured_rows(residual) ** 2).sum(axis=1))
+    squared = np.nan_to_num((three_rows(residual) ** 2).sum(axis=1))
     error = np.sqrt(np.bincount(piece, squared) / np.bincount(piece))
     misfit = error > max(MOVING * float(np.median(error)), MOVING_LEAST)
     return np.asarray(np.bincount(row, misfit[piece]) > 0.5 * np.bincount(row), dtype=np.bool_)

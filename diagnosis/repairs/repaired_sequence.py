@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from fgbaseline.data.axis_conventions import twist_in_imu_axes
 from fgbaseline.data.motion import dead_reckoned_path, zero_order_hold
 from fgbaseline.data.observations import Observations
-from fgbaseline.data.plural import signed, vector
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence, Truth
+from fgbaseline.data.wording import signed, vector
 from fgbaseline.geometry import FloatArray, so3
 
 from ..estimation.result import Diagnosis
@@ -24,7 +24,7 @@ from ..tracks.observation_mask import (
     prediction_gate,
     split_tracks,
 )
-from ..tracks.track_segments import consecutive, sound
+from ..tracks.track_segments import consecutive, is_usable
 from .landmark_mask import exclude_landmarks
 from .significance import significant_bias, significant_misalignment, significant_offset, significant_scale
 
@@ -78,7 +78,7 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     offset = significant_offset(diagnosis)
     if offset:
         sequence = _without_offset(sequence, offset)
-        done.append(f"uR {'reduced' if offset > 0 else 'increased'} by {abs(offset):.2f} px")
+        done.append(f"columns uR {'reduced' if offset > 0 else 'increased'} by {abs(offset):.2f} px")
     if diagnosis.shift != 0.0:
         done.append(f"velocities shifted by {signed(diagnosis.shift, 2)} intervals{_estimated_shift(diagnosis)}")
     path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)
@@ -164,7 +164,7 @@ def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: Tra
         copied[after[same]] = True
     gate = tracks.gate
     if gate is None:
-        links, usable = TrackConsistency(sequence, path, mask.prediction_gate), sound(sequence)
+        links, usable = TrackConsistency(sequence, path, mask.prediction_gate), is_usable(sequence)
         checked = usable[before] & usable[after] & ~same
         gate = prediction_gate(links.error(before[checked], after[checked]))
     split = split_tracks(sequence, path, replace(mask, prediction_gate=gate), copied)

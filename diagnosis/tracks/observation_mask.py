@@ -10,7 +10,7 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.problem.documented import most_observed
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 
 GATE_RANGE = (3.0, 12.0)
 """px"""
@@ -141,7 +141,7 @@ class TrackConsistency:
         motion = se3.inverse(self.world_T_cam[o.frame[after]]) @ self.world_T_cam[o.frame[before]]
         predicted = se3.transform(motion, camera.triangulate(o.pixel[before]))
         residual = camera.project(predicted) - o.pixel[after]
-        error = np.linalg.norm(measured_rows(residual), axis=1)
+        error = np.linalg.norm(three_rows(residual), axis=1)
         return np.where(predicted[:, 2] > 0, error, np.inf)
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:

@@ -8,7 +8,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 
 MIN_DISPARITY = 1.0
 """px"""
@@ -52,7 +52,7 @@ class TrackSegments:
                 start = end
 
 
-def sound(sequence: Sequence) -> BoolArray:
+def is_usable(sequence: Sequence) -> BoolArray:
     """(n,) observations whose disparity and rows allow a triangulation."""
     pixel = sequence.observations.pixel
     rows = np.abs(pixel[:, 1] - pixel[:, 3]) <= MAX_ROW_MISMATCH
@@ -85,10 +85,10 @@ def repeated(sequence: Sequence) -> BoolArray:
 
 
 def track_segments(sequence: Sequence) -> TrackSegments:
-    """All segments between sound observations, without intervals of copied tracks."""
+    """All segments between usable observations, without intervals of copied tracks."""
     o = sequence.observations
     before, after = consecutive(sequence)
-    use = sound(sequence)
+    use = is_usable(sequence)
     chosen = use[before] & use[after] & ~repeated(sequence)[o.frame[before]]
     before, after = before[chosen], after[chosen]
     return TrackSegments(
@@ -96,7 +96,7 @@ def track_segments(sequence: Sequence) -> TrackSegments:
         after=after,
         frame=o.frame[before],
         point=sequence.stereo_camera.triangulate(o.pixel[before]),
-        pixel=measured_rows(o.pixel[after]),
+        pixel=three_rows(o.pixel[after]),
     )
 
 

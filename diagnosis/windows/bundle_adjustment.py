@@ -13,8 +13,16 @@ from fgbaseline.data.parallel import background_map
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, StereoMeasurement, se3
 
-from .normal_equations import Landmarks, Reduced, around_intervals, landmark_steps, moved_along, reduced, terms_of
-from .residuals import SHARED, Joined, MotionTerms, Window, joined, motion_terms, pixel_terms
+from .normal_equations import (
+    Landmarks,
+    Reduced,
+    around_intervals,
+    back_substitute,
+    landmark_steps,
+    schur_complement,
+    terms_of,
+)
+from .residuals import N_CALIBRATION, Joined, MotionTerms, Window, concatenate_windows, motion_terms, pixel_terms
 
 TOGETHER = 8000
 """observations, up to which windows are computed together: their arrays should fit into a cache"""
@@ -31,7 +39,7 @@ class WindowFit:
     points: FloatArray
     """(m, 3) m"""
     shared: FloatArray
-    """(8,) calibration parameters: see `residuals.SHARED`"""
+    """(8,) calibration parameters: see `residuals.N_CALIBRATION`"""
     shared_information: FloatArray
     """(8, 8) information about `shared`, marginal over poses and landmarks, without the prior"""
     motion_residual: FloatArray
@@ -46,7 +54,7 @@ class WindowFit:
     """(6, 6) of the right perturbation of the last pose"""
 
 
-def fit_windows_alike(
+def fit_each_window(
     camera: StereoCamera,
     imu_T_cam: FloatArray,
     windows: Sequence[Window],
@@ -78,17 +86,17 @@ def _fitted(
     shared: FloatArray,
     iterations: int,
 ) -> list[WindowFit]:
-    data, numbers = joined(windows), range(len(windows))
+    data, numbers = concatenate_windows(windows), range(len(windows))
     model = StereoMeasurement(camera, sigmas.pixel**2, HuberKernel())
     poses, points = (np.concatenate(parts) for parts in list(zip(*windows, strict=True))[1:])
     for step in range(iterations + 1):
         pixels = pixel_terms(model, imu_T_cam, data, poses, points, shared)
         motions = motion_terms(data, poses, sigmas, shared)
         landmarks, frames = terms_of(data, pixels, motions, model)
-        systems = [reduced(data, i, landmarks, frames, pixels.turn) for i in numbers]
+        systems = [schur_complement(data, i, landmarks, frames, pixels.turn) for i in numbers]
         for system, common in zip(systems, shared, strict=True):
-            system.H[-SHARED:, -SHARED:] += SHARED_PRIOR
-            system.g[-SHARED:] -= SHARED_PRIOR @ common
+            system.H[-N_CALIBRATION:, -N_CALIBRATION:] += SHARED_PRIOR
+            system.g[-N_CALIBRATION:] -= SHARED_PRIOR @ common
         if step == iterations:
             break
         poses, points, shared = _stepped(data, systems, landmarks, poses, points, shared)
@@ -111,10 +119,10 @@ def _stepped(
     deltas = [np.asarray(np.linalg.solve(system.H, system.g), dtype=np.float64) for system in systems]
     dx, pull = np.zeros((len(poses), 6)), landmarks.pull.copy()
     for system, delta, f, p in zip(systems, deltas, data.frames, data.points, strict=True):
-        dx[f.start + 1 : f.stop] = delta[:-SHARED].reshape(-1, 6)
-        pull[:, p] -= moved_along(system, poses[f.start + 1 : f.stop, :3, :3], delta)
+        dx[f.start + 1 : f.stop] = delta[:-N_CALIBRATION].reshape(-1, 6)
+        pull[:, p] -= back_substitute(system, poses[f.start + 1 : f.stop, :3, :3], delta)
     points = points + landmark_steps(landmarks.factor, pull)
-    return poses @ se3.exp(dx), points, shared + np.array([delta[-SHARED:] for delta in deltas])
+    return poses @ se3.exp(dx), points, shared + np.array([delta[-N_CALIBRATION:] for delta in deltas])
 
 
 def _redundancy(data: Joined, motions: MotionTerms, covariance: FloatArray) -> FloatArray:
@@ -142,11 +150,11 @@ def _fit(
         poses=poses[f],
         points=points[p],
         shared=shared,
-        shared_information=np.linalg.inv(covariance[-SHARED:, -SHARED:]) - SHARED_PRIOR,
+        shared_information=np.linalg.inv(covariance[-N_CALIBRATION:, -N_CALIBRATION:]) - SHARED_PRIOR,
         motion_residual=residual[k],
         motion_redundancy=redundancy[k],
         pixel_squared=squared[o],
         # 6 rows of each interval stand against the 6 unknowns of a pose
-        degrees_of_freedom=3.0 * (o.stop - o.start) - 3.0 * (p.stop - p.start) - SHARED - left,
-        last_covariance=covariance[-SHARED - 6 : -SHARED, -SHARED - 6 : -SHARED],
+        degrees_of_freedom=3.0 * (o.stop - o.start) - 3.0 * (p.stop - p.start) - N_CALIBRATION - left,
+        last_covariance=covariance[-N_CALIBRATION - 6 : -N_CALIBRATION, -N_CALIBRATION - 6 : -N_CALIBRATION],
     )

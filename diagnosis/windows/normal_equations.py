@@ -13,7 +13,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, StereoMeasurement
 
-from .residuals import OFFSET, SHARED, Joined, MotionTerms, PixelTerms
+from .residuals import N_CALIBRATION, OFFSET, Joined, MotionTerms, PixelTerms
 
 DAMPING = 3e-10
 """1/baseline^2, on each coordinate of a landmark"""
@@ -80,7 +80,7 @@ def terms_of(
     return landmarks, _frames(joined, _summed_by_frame(parts, joined.frame, F), pixels.turn, motions)
 
 
-def reduced(joined: Joined, window: int, landmarks: Landmarks, frames: Frames, turn: FloatArray) -> Reduced:
+def schur_complement(joined: Joined, window: int, landmarks: Landmarks, frames: Frames, turn: FloatArray) -> Reduced:
     """The equations of one window, its landmarks eliminated; the poses (F) have rotations `turn` (F, 3, 3)."""
     o, f, p = joined.observations[window], joined.frames[window], joined.points[window]
     K, m = f.stop - f.start - 1, p.stop - p.start
@@ -95,10 +95,10 @@ def reduced(joined: Joined, window: int, landmarks: Landmarks, frames: Frames, t
     poses[k, :, k] = frames.H[own]
     off = frames.with_next[f.start + 1 : f.stop - 1]
     poses[k[:-1], :, k[1:]], poses[k[1:], :, k[:-1]] = off, off.swapaxes(1, 2)
-    H, g = np.empty((n + SHARED, n + SHARED)), np.empty(n + SHARED)
-    right, shared = frames.right[own].reshape(n, SHARED + 1), frames.shared[f].sum(axis=0)
-    H[:n, :n], H[:n, n:], H[n:, :n] = poses.reshape(n, n), right[:, :SHARED], right[:, :SHARED].T
-    H[n:, n:], g[:n], g[n:] = shared[:, :SHARED], right[:, SHARED], shared[:, SHARED]
+    H, g = np.empty((n + N_CALIBRATION, n + N_CALIBRATION)), np.empty(n + N_CALIBRATION)
+    right, shared = frames.right[own].reshape(n, N_CALIBRATION + 1), frames.shared[f].sum(axis=0)
+    H[:n, :n], H[:n, n:], H[n:, :n] = poses.reshape(n, n), right[:, :N_CALIBRATION], right[:, :N_CALIBRATION].T
+    H[n:, n:], g[:n], g[n:] = shared[:, :N_CALIBRATION], right[:, N_CALIBRATION], shared[:, N_CALIBRATION]
     schur = _turned(_turned(cross @ cross.T, turn[own]).T, turn[own])
     H[:n, :n] -= schur[:n, :n]
     H[:n, n + OFFSET] -= schur[:n, n]
@@ -110,7 +110,7 @@ def reduced(joined: Joined, window: int, landmarks: Landmarks, frames: Frames, t
     return Reduced(H, g, cross)
 
 
-def moved_along(system: Reduced, turn: FloatArray, delta: FloatArray) -> FloatArray:
+def back_substitute(system: Reduced, turn: FloatArray, delta: FloatArray) -> FloatArray:
     """(3, m) what the solution `delta` (6K + 8,) takes off the pull of a window's landmarks."""
     n = 6 * len(turn)
     moved = (np.repeat(turn, 2, axis=0) @ delta[:n].reshape(-1, 3, 1)).reshape(n)
@@ -129,16 +129,17 @@ def around_intervals(covariance: FloatArray) -> FloatArray:
     """(K, 20, 20) the parts of a window's covariance (6K + 8, 6K + 8) that an interval's residual depends on: of the
     poses before and after it and of the shared parameters. Before the first is the held pose: that part means nothing.
     """
-    K = (len(covariance) - SHARED) // 6
+    K = (len(covariance) - N_CALIBRATION) // 6
     own = 6 * np.arange(K)[:, None] + np.arange(6)
-    shared = np.broadcast_to(6 * K + np.arange(SHARED), (K, SHARED))
+    shared = np.broadcast_to(6 * K + np.arange(N_CALIBRATION), (K, N_CALIBRATION))
     index = np.concatenate([np.concatenate([own[:1], own[:-1]]), own, shared], axis=1)
     return np.asarray(covariance[index[:, :, None], index[:, None, :]], dtype=np.float64)
 
 
 def _frames(joined: Joined, sums: FloatArray, turn: FloatArray, motions: MotionTerms) -> Frames:
     F = joined.n_frames
-    H, right, shared = np.empty((F, 6, 6)), np.zeros((F, 6, SHARED + 1)), np.zeros((F, SHARED, SHARED + 1))
+    H, right = np.empty((F, 6, 6)), np.zeros((F, 6, N_CALIBRATION + 1))
+    shared = np.zeros((F, N_CALIBRATION, N_CALIBRATION + 1))
     back = turn.swapaxes(1, 2)
     H[:, :3, :3] = back @ _blocks(sums[:9]) @ turn
     H[:, 3:, :3] = back @ _blocks(sums[9:18]) @ turn
@@ -146,8 +147,8 @@ def _frames(joined: Joined, sums: FloatArray, turn: FloatArray, motions: MotionT
     H[:, 3:, 3:] = back @ _blocks(sums[18:27]) @ turn
     columns = -(back @ sums[27:39].reshape(4, 3, F).transpose(2, 1, 0))
     right[:, :3, OFFSET], right[:, 3:, OFFSET] = columns[:, :, 0], columns[:, :, 1]
-    right[:, :3, SHARED], right[:, 3:, SHARED] = columns[:, :, 2], columns[:, :, 3]
-    shared[:, OFFSET, OFFSET], shared[:, OFFSET, SHARED] = sums[39], sums[40]
+    right[:, :3, N_CALIBRATION], right[:, 3:, N_CALIBRATION] = columns[:, :, 2], columns[:, :, 3]
+    shared[:, OFFSET, OFFSET], shared[:, OFFSET, N_CALIBRATION] = sums[39], sums[40]
     before, after = joined.interval, joined.interval + 1
     J_before, J_after, J_shared = motions.by_before, motions.by_after, motions.by_shared
     on = np.concatenate([J_shared, motions.residual[:, :, None]], axis=2)

@@ -10,7 +10,7 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3, so3
 
-SHARED = 8
+N_CALIBRATION = 8
 """gyroscope bias (3, rad/s), velocity scale minus one, the rotation vector (3, rad) by which the axes of the recorded
 velocities are turned against those of imu_T_cam: recorded = [(1 + s) exp(phi) v, exp(phi) w + b]; and the disparity
 offset d (px) by which uR is recorded too far to the right, all disparities too small: recorded uR = uR + d"""
@@ -78,7 +78,7 @@ class Joined:
         return slice(self.frames[window].start - window, self.frames[window].stop - window - 1)
 
 
-def joined(windows: Sequence[Window]) -> Joined:
+def concatenate_windows(windows: Sequence[Window]) -> Joined:
     """The windows concatenated."""
     data = [window[0] for window in windows]
     observations = _slices([len(d.frame) for d in data])
@@ -150,7 +150,7 @@ def pixel_terms(
     q = (axes * (point - seen_from)[:, None]).sum(axis=0)
     front = q[2] > model.camera.min_depth
     q[:, ~front] = [[0.0], [0.0], [1.0]]
-    seen, white = model.camera.rows(q), model.white_scale[:, None]
+    seen, white = model.camera.rows(q), model.whitening_scale[:, None]
     by_point = model.camera.row_derivatives(seen, axes.transpose(1, 0, 2)) * white[:, None]
     residual = data.pixel.T - seen.pixel
     residual[1] -= np.repeat(shared[:, OFFSET], [o.stop - o.start for o in data.observations])
@@ -177,7 +177,7 @@ def motion_terms(data: Joined, poses: FloatArray, sigmas: NoiseSettings, shared:
     curly = se3.curly_hat(twist)
     J_after = turn @ (np.eye(6) + 0.5 * curly + curly @ curly / 12.0) / data.dt[:, None, None]
     J_before = -J_after @ se3.adjoint(se3.inverse(relative))
-    J_shared = np.zeros((len(twist), 6, SHARED))
+    J_shared = np.zeros((len(twist), 6, N_CALIBRATION))
     J_shared[:, 3:, :3] = np.eye(3)
     J_shared[:, :3, SCALE] = predicted[:, :3] / (1.0 + shared[:, SCALE, None])
     J_shared[:, :3, TURN] = -along

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..odometry.stereo_odometry import Odometry
@@ -78,7 +78,7 @@ def windows_of(
         poses = se3.compose(step[intervals])
         row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
-        rows_of_pixels = measured_rows(o.pixel[chosen])
+        rows_of_pixels = three_rows(o.pixel[chosen])
         data = WindowData(frame, row, rows_of_pixels, twist[intervals], dt[intervals], deviation[intervals])
         parts.append((data, poses))
         observed.append(chosen)

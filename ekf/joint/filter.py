@@ -89,7 +89,7 @@ class JointFilter:
         if self.settings.coordinates is LandmarkRepresentation.WORLD:  # where nothing is at infinity
             wanted &= self.measured[index, 0] > self.measured[index, 1]
         if (wanted != new).any():
-            self._reject(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
+            self._record_rejection(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
         selected = self._select(k, index, wanted)
         if selected.any():
             self._initialize_from_observation(index[selected])
@@ -112,7 +112,7 @@ class JointFilter:
         deferred = wanted & ~selected
         self.n_deferred += int(np.count_nonzero(deferred))
         self.map.deferred[self.feature[index[deferred]]] = True
-        self._reject(k, EventKind.STATE_FULL, deferred)
+        self._record_rejection(k, EventKind.STATE_FULL, deferred)
         return selected
 
     def _predict(self, k: int) -> None:
@@ -153,7 +153,7 @@ class JointFilter:
             self.n_rejected += 1
         variance = variance[order]
         if verdict.rejection is not None:
-            self._reject(k, verdict.rejection, ~verdict.accepted)
+            self._record_rejection(k, verdict.rejection, ~verdict.accepted)
             if not verdict.accepted.any():
                 return verdict.rejection is not EventKind.FRAME_DISAGREES
         try:
@@ -167,7 +167,7 @@ class JointFilter:
                 factor = factor.reweighted(innovation.residual, added)
             self._apply_correction(kalman_update(innovation, factor, state.P))
         except NotPositiveDefiniteError:
-            self._reject(k, EventKind.COVARIANCE_LOST, verdict.accepted)
+            self._record_rejection(k, EventKind.COVARIANCE_LOST, verdict.accepted)
             return False
         self.used[seen.observed[verdict.accepted]] = True
         if not state.P.diagonal().min() >= 0.0:
@@ -240,7 +240,7 @@ class JointFilter:
         front = seen.cosine > MIN_COSINE
         if front.all():
             return seen
-        self._reject(k, EventKind.BEHIND_CAMERA, ~front)
+        self._record_rejection(k, EventKind.BEHIND_CAMERA, ~front)
         return _LinearizedObservations(
             seen.observed[front], seen.H.select(front), seen.residual[front], seen.cosine[front]
         )
@@ -310,6 +310,6 @@ class JointFilter:
             self.map.store(row, self.state.world_points(row))
             self.state.marginalize(row)
 
-    def _reject(self, k: int, why: EventKind, rejected: BoolArray) -> None:
+    def _record_rejection(self, k: int, why: EventKind, rejected: BoolArray) -> None:
         n = int(np.count_nonzero(rejected))
-        self.events.append(Event(k, why, f"{n} of {len(rejected)} observations take no part"))
+        self.events.append(Event(k, why, f"{n} of {len(rejected)} observations rejected"))

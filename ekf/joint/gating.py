@@ -19,7 +19,7 @@ from fgbaseline.geometry.measurement import squared_norm
 
 from .settings import JointSettings
 
-DISAGREEMENT = 1.0 - 1e-6
+OUTLIER_PROBABILITY = 1.0 - 1e-6
 """Chi-square probability (5.5 sigma) beyond which an observation counts as an outlier for the rejection of its frame.
 With noise of twice the modeled sigma, 5 % of the correct matches do."""
 MIN_VOTES = 5
@@ -58,7 +58,7 @@ def gate_observations(
     n = len(squared_norm)
     weight = measurement.weight(squared_norm)
     if settings.disagreeing_share is not None and n >= MIN_VOTES:
-        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(DISAGREEMENT, measurement.n_rows)))
+        disagreeing = np.count_nonzero(~(squared_norm <= chi2_quantile(OUTLIER_PROBABILITY, measurement.n_rows)))
         if disagreeing > settings.disagreeing_share * n:
             return GatedObservations(np.zeros(n, dtype=np.bool_), weight, EventKind.FRAME_DISAGREES)
     if settings.gate is not None:

@@ -36,7 +36,7 @@ class SceneDepth(NamedTuple):
     covariance: FloatArray
     """(size,) of the error of c with that of the state"""
     variance: float
-    """of c"""
+    """variance of c"""
 
 
 def scene_depth(prior: InverseDepthPrior, state: JointState, cam_T_imu: FloatArray) -> SceneDepth:

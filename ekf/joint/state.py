@@ -29,7 +29,7 @@ class CommonError(NamedTuple):
     covariance: FloatArray
     """(size,) of c with the error state"""
     variance: float
-    """of c"""
+    """variance of c"""
 
 
 class JointState:

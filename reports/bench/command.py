@@ -7,7 +7,7 @@ import click
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.formats.named_file import shown
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..phrases.bench import sentences
 from ..results.bench import ANSWERED

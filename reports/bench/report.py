@@ -15,8 +15,8 @@ from ..figures.bench import draw
 from ..figures.saving import encoded
 from ..figures.style import colors
 from ..formatting import counted
-from ..html.environment import picture
 from ..html.page import Grid, Note, Page, Section, folded, render_page
+from ..html.templates import picture
 from ..phrases.bench import FIGURES, NEES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results

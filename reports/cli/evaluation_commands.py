@@ -139,7 +139,7 @@ def compare(
         option, what = ("force", "folder to replace") if force else ("open", "page")
         raise InputError(f"{option}: there is no {what}; add --out DIR")
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
-    from ..announced import announce, print_sentences
+    from ..open_page import announce, print_sentences
     from ..phrases.evidence import FIRST
     from ..tables import print_table
 
@@ -217,7 +217,7 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     Exits 0, or 2 on bad input.
     """
     from fgbaseline.data.formats.atomic_folder import atomic_folder
-    from fgbaseline.data.plural import plural
+    from fgbaseline.data.wording import plural
 
     from ..results.documents import COMPARISON, drawn_file, read_document
 

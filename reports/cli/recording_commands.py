@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from ..names import names_in
+from ..name_list import names_in
 from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from . import options
 from .options import PATH, Numbers
@@ -149,7 +149,7 @@ def estimators() -> None:
     """
     from fgbaseline.data import estimator_summaries
 
-    from ..announced import print_sentences
+    from ..open_page import print_sentences
 
     summaries = estimator_summaries()
     width = max(map(len, summaries))
@@ -305,9 +305,9 @@ def simulate(
     """
     from fgbaseline.data import read, write_npz
     from fgbaseline.data.formats.atomic_write import require_new
-    from fgbaseline.data.plural import plural
     from fgbaseline.data.simulate import SimulatedImu, Simulation
     from fgbaseline.data.simulate import simulate as simulated
+    from fgbaseline.data.wording import plural
     from fgbaseline.geometry import InputError
 
     if output.suffix != ".npz":

@@ -24,7 +24,7 @@ from fgbaseline.data.formats.trajectory_reader import read_extrinsic
 from fgbaseline.data.formats.trajectory_text import OpenedTrajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ..names import names_in
+from ..name_list import names_in
 from .opening import split_name
 from .sources import TrajectoryLike, opened
 

@@ -14,8 +14,8 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Resu
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
+from fgbaseline.data.dataframes import as_cell_value
 from fgbaseline.data.formats.named_file import FilePath
-from fgbaseline.data.frames import as_cell_value
 
 from ..keywords import for_python
 from ..notebook import NotebookResult, write_report

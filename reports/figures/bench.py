@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fgbaseline import compare
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from .layout import lay_out

@@ -40,7 +40,7 @@ from .style import (
     swatch,
     title_and_legend,
 )
-from .window import common_window
+from .view_limits import common_window
 
 if TYPE_CHECKING:
     from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result

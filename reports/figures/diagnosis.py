@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.data.axis_conventions import IDENTITY, twist_in_imu_axes
 from fgbaseline.data.motion import Shift, zero_order_hold
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import per_cent, plural
 from fgbaseline.diagnosis import Diagnosis, TrackStatistics
 from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
@@ -156,7 +156,7 @@ def velocity_residuals(diagnosis: Diagnosis) -> Figure:
         panel.hist(np.clip(values, BINS[0], BINS[-1]), BINS, density=len(values) > 0, color=OTHERS)
         handles = panel.plot(BINS, bell, color=SEEN, linewidth=1.2, label="normal distribution")
         beyond = float(np.mean(np.abs(values) > 3.0)) if len(values) else 0.0
-        panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {100.0 * beyond:.1f} % beyond 3 sigma")
+        panel.set_title(f"{'vw'[i // 3]}_{'xyz'[i % 3]}: {per_cent(beyond)} beyond 3 sigma")
     for panel in panels[3:]:
         panel.set_xlabel("residual, sigmas")
     for panel in panels[::3]:

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
-from ..formatting import RESOLUTION
+from ..formatting import RESOLUTION, per_cent
 from .over_time import Expected, Panel, time_panels
 from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
 from .reprojection import medians_by_class
@@ -132,7 +132,7 @@ def _between_three_sigmas(
         panel.set_ylim(-(reach := _reach(e, s)), reach)
         both = np.isfinite(e) & np.isfinite(s) & (s > 0)
         inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
-        panel.set_title(f"{axis}: {100.0 * inside:.1f} %{within}")
+        panel.set_title(f"{axis}: {per_cent(inside)}{within}")
         handles = handles or [*drawn, band]
     for panel in panels[-1]:
         panel.set_xlim(float(t[0]), float(t[-1]))

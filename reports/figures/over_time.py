@@ -25,7 +25,7 @@ from .panels import (
 )
 from .run_data import RunData
 from .style import SCREEN, Style, safe_text, stacked_panels, title_and_legend
-from .window import common_window, signed_range
+from .view_limits import common_window, signed_range
 
 COMPONENTS = {
     "position": "distance, m",

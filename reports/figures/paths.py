@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from .run_data import RunData
 from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, label, note, safe_text, swatch, title_and_legend
-from .window import Window, common_window, known, robust_window
+from .view_limits import Window, common_window, known, robust_window
 
 ARROWS = 40
 """along a path"""

@@ -15,15 +15,15 @@ from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import distance_traveled
 from fgbaseline.data import Status
-from fgbaseline.data.plural import plural
 from fgbaseline.data.top_view import TopView
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
 from .layout import lay_out
 from .paths import frame_top_view
 from .style import SCREEN, in_style, note, safe_text, swatch, title_and_legend
-from .window import Window, common_window, known, robust_window
+from .view_limits import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
     from fgbaseline.reports.reproduction.study import Outcome, Study

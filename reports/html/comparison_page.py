@@ -15,8 +15,8 @@ from ..results.comparison import Summary
 from ..tables import Row
 from ..tables.comparison import comparison_table
 from .comparison_plots import comparison_plots
-from .environment import picture
 from .page import Folded, Grid, Live, Page, Section, figure_blocks, render_page, still_figures, trust
+from .templates import picture
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from ..results.diagnosis import Found
 from ..tables.run_details import findings_table
-from .environment import picture
 from .page import Grid, Page, Section, Sentences, render_page
+from .templates import picture
 
 CAPTIONS: Mapping[str, str] = {
     "angular_rates": "About each axis of imu_T_cam, moving averages. The repaired rates follow visual odometry.",

@@ -11,9 +11,9 @@ from ..figures.style import TRUTH
 from ..phrases.evidence import FIRST
 from ..results.metric import TERMS
 from ..tables import Table
-from .environment import NO_SCRIPT, Picture, asset, environment
-from .explore import line_rules, policy, script
+from .interactive import line_rules, policy, script
 from .plot_encoding import TRUTH_LINE, embedded_json
+from .templates import NO_SCRIPT, Picture, asset, environment
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,7 +137,7 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
     spent = {name: ms for name, ms in spent.items() if ms.any()}
     interval = 1e3 * float(np.median(run.problem.sequence.dt))
     look = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
-    yield chart("Cost", "time", "Time per frame", "ms", _numbered(run, spent), middle=interval, **look)
+    yield chart("Runtime", "time", "Time per frame", "ms", _numbered(run, spent), middle=interval, **look)
 
 
 def _column(run: Run, table: str, column: str) -> Lines:
@@ -250,5 +250,7 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
             bookmarks.append({"frame": left.frame, "text": text})
     worst = worst_second(run.problem)
     if worst is not None:
-        bookmarks.append({"frame": worst.frame, "text": "most wrong or moving points"})
+        t = run.problem.sequence.t
+        middle = int(np.argmin(np.abs(t - t[0] - worst.second - 0.5)))
+        bookmarks.append({"frame": middle, "text": "most wrong or moving points"})
     return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))

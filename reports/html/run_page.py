@@ -15,7 +15,6 @@ from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
 from ..tables import run as tables
 from ..tables import run_details as details
-from .environment import Picture, picture
 from .page import (
     Block,
     Folded,
@@ -33,6 +32,7 @@ from .page import (
 )
 from .plot_data import image_data, page_data
 from .plot_encoding import embedded_json
+from .templates import Picture, picture
 
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""

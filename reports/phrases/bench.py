@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from fgbaseline.compare.estimate_comparison import SAME_GRAPH
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..formatting import interval, listed, number
 from ..results.bench import ANSWERED, METRICS, Results, consistency, judge, overall, rankings, records

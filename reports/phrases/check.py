@@ -1,7 +1,7 @@
 """Sentences and texts of a check, for every form of output."""
 
 from fgbaseline.compare.limits import Bounds, Outcome
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..results.check import NEW, Checked, Line
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..formatting import listed, number, per_cent
 

@@ -50,11 +50,11 @@ def _claim(run: Run, result: Result) -> str:
         "sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
     }
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
-    measured = f" ({known})" if known else ""
+    measured = f"; {known}" if known else ""
     claimed = number(_claimed(result))
     return (
-        f"{result.name} claims a 1-sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m (RMSE)"
-        f"{measured}"
+        f"{result.name} claims a 1-sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m "
+        f"(RMSE{measured})"
     )
 
 

@@ -132,7 +132,7 @@ def _share(result: Result, name: str) -> str:
     value, low, high = result.share_intervals.by_name[name]
     if not np.isfinite(low):
         return per_cent(max(value, 0.0))
-    return f"{100.0 * max(value, 0.0):.0f} % [{100.0 * low:.0f}, {100.0 * high:.0f}]"
+    return f"{per_cent(max(value, 0.0))} [{number(100.0 * low)}, {number(100.0 * high)}]"
 
 
 def path_lengths(comparison: Comparison) -> list[str]:

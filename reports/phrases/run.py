@@ -140,10 +140,10 @@ def _maximum_divergence(run: Run) -> list[str]:
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     wrong = {name: onset.wrong for name, onset in found.items() if onset.wrong is not None}
     if wrong and overall is not None:
-        each = listed(f"{per_cent(share)} of the observations ({name})" for name, share in wrong.items())
+        each = listed(f"{per_cent(share)} ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Within {AROUND:g} s of these onsets the mask excluded {each} as {SUSPECTED}; {per_cent(overall)} in the "
-            "whole recording."
+            f"Within {AROUND:g} s of these onsets the mask excluded {each} of the observations as {SUSPECTED}; "
+            f"{per_cent(overall)} in the whole recording."
         )
     return sentences
 

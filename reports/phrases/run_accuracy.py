@@ -22,11 +22,10 @@ from fgbaseline.compare.divergence_onset import path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.reference_trust import BATCH_CRITERIA
 from fgbaseline.compare.sample_sizes import insufficient_truth
-from fgbaseline.compare.statistics.block_bootstrap import MIN_BLOCKS
 from fgbaseline.data import EventKind
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
-from ..formatting import counted, distance, interval, listed, number, per_cent, resolved
+from ..formatting import counted, distance, listed, number, per_cent, resolved
 from ..results.metrics import ate_resolution
 from .evidence import causal_estimate, no_difference
 
@@ -150,8 +149,8 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
     if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
         return []
     return [
-        f"All of them are within {WITHIN_SIGMAS:g} of {run.reference}'s own 1-sigma ({number(sigma)} m RMS): this "
-        "order shows closeness to it, not accuracy."
+        f"All of them are within {WITHIN_SIGMAS:g} times the 1-sigma of {run.reference} itself, {number(sigma)} m RMS: "
+        "this order shows closeness to it, not accuracy."
     ]
 
 
@@ -161,15 +160,14 @@ def _share(rmse: float, result: Result) -> str:
 
 
 def _rough(differences: Mapping[str, RmseDifference]) -> str:
-    """Intervals of differences that are not reliable, and the number of independent blocks that they rest on."""
+    """Intervals of differences that are not reliable, and the number of blocks that they rest on."""
     each = [
-        f"{name} {interval(d.value, d.low, d.high)} m ({plural(int(d.blocks), 'block')})"
+        f"{name} {number(d.value)} m [{number(d.low)}, {number(d.high)}] from {plural(int(d.blocks), 'block')}"
         for name, d in differences.items()
         if not d.reliable
     ]
-    if not each:
-        return ""
-    return f" Interval of the difference, rough with fewer than {MIN_BLOCKS} independent blocks: {listed(each)}."
+    why = "as the errors stay correlated over much of the recording"
+    return f" The interval of the difference is rough, {why}: {listed(each)}." if each else ""
 
 
 def _over(run: Run, found: PairedRanking) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fgbaseline.data import Sequence
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import listed, number, per_cent

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from fgbaseline.data import Status
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..formatting import meters, per_cent, pixels
 from .recordings import PAPER_RECORDINGS, PaperRecording

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure
 
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 
 from ..formatting import meters, number, per_cent
-from ..html.environment import environment, picture
+from ..html.templates import environment, picture
 from ..tables import Cell, Column, Row, Table
 from .claims import Claim, Verdict
 from .study import Outcome, Study

@@ -10,9 +10,9 @@ import numpy as np
 from fgbaseline.data import Observations, Sequence, read
 from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.plural import plural
 from fgbaseline.data.simulate import Simulation, Velocities, simulate_with_labels
 from fgbaseline.data.simulate.rig import rig_of
+from fgbaseline.data.wording import per_cent, plural
 from fgbaseline.geometry import FloatArray, InputError
 
 MAPPED = (700, 1000)
@@ -153,7 +153,7 @@ def stand_in(recorded: Sequence, seed: int = 0) -> StandIn:
         f"Simulated: {recorded.name} has no features here, so "
         f"{plural(sequence.n_landmarks, 'track was', 'tracks were')} simulated "
         f"along its real velocities, the rates recorded in other axes ({ANGULAR_AXES}, as found in 03.npz), {remark}, "
-        f"{wrong.mean():.0%} of the matches wrong."
+        f"{per_cent(float(wrong.mean()))} of the matches wrong."
     )
     return StandIn(replace(sequence, name=f"{recorded.name} (simulated)"), ANGULAR_AXES, bias, wrong, text)
 

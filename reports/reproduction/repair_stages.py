@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.data import Excluded, Sequence
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix
 from fgbaseline.data.motion import Shift, zero_order_hold
+from fgbaseline.data.wording import per_cent
 from fgbaseline.diagnosis import Diagnosis, repair
 from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
@@ -55,7 +56,7 @@ def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
             truth=repaired.sequence.truth,
         )
         copied = ", copied frames" if (repaired.excluded == Excluded.COPIED).any() else ""
-        cause = f"wrong matches{copied} and other unusable observations ({np.mean(~good):.0%} of all)"
+        cause = f"wrong matches{copied} and other unusable observations ({per_cent(float(np.mean(~good)))} of all)"
         stages.append(Stage("right matches", cause, tracked))
     return stages
 
@@ -69,7 +70,7 @@ def simulated_stages(simulated: StandIn) -> list[Stage]:
         now = replace(now, angular_velocity=now.angular_velocity - bias @ axes_matrix(axes).T)
         stages.append(Stage("without bias", f"gyroscope bias of {_vector(bias)} rad/s", now))
     if simulated.wrong.any():
-        cause = f"wrong matches ({simulated.wrong.mean():.0%} of the observations)"
+        cause = f"wrong matches ({per_cent(float(simulated.wrong.mean()))} of the observations)"
         stages.append(
             Stage("right matches", cause, replace(now, observations=now.observations.select(~simulated.wrong)))
         )

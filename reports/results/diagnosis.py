@@ -7,7 +7,7 @@ import numpy as np
 
 from fgbaseline.data import Sequence
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.diagnosis import (
     Diagnosis,
     TrackStatistics,

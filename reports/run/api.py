@@ -26,7 +26,7 @@ from fgbaseline.geometry import InputError
 from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..keywords import for_python
-from ..names import names_in
+from ..name_list import names_in
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
 from .problem import (
     RunSettings,

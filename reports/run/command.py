@@ -7,11 +7,11 @@ import click
 from fgbaseline.data import Excluded, Problem, write_npz
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import background_map, cores
-from fgbaseline.data.plural import plural
 from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.data.tracking import Pictures
+from fgbaseline.data.wording import plural
 
-from ..announced import announce, print_sentences
+from ..open_page import announce, print_sentences
 from .problem import (
     MARK,
     TRACKS,

@@ -12,7 +12,7 @@ from fgbaseline.data.formats.atomic_write import atomic_write, require_new
 from fgbaseline.diagnosis import diagnose, repairs_text
 from fgbaseline.geometry import InputError
 
-from ..announced import announce, print_sentences
+from ..open_page import announce, print_sentences
 from ..results.diagnosis import Found, found_by, found_of_inertial
 
 MARK = "diagnosis.json"

@@ -8,7 +8,6 @@ from fgbaseline.data import Sequence
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.formats.atomic_write import require_new
 from fgbaseline.data.formats.named_file import shown
-from fgbaseline.data.plural import plural
 from fgbaseline.data.toml_file import read_toml
 from fgbaseline.data.tracking import (
     ImageOptions,
@@ -20,6 +19,7 @@ from fgbaseline.data.tracking import (
     track_images,
 )
 from fgbaseline.data.tracking.sources.image_recording import TruthFile
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.progress import reporter
 

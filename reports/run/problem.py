@@ -73,7 +73,7 @@ class RunSettings:
     extrinsic: Path | None = None
     """imu_T_cam of the left camera, in place of the recording's"""
     cameras: Cameras | None = None
-    """of a recording of images: a pair, or the left one alone; None for a pair where there is one"""
+    """cameras of a recording of images: a pair, or the left one alone; None for a pair where there is one"""
     right: Path | None = None
     """folder of right images, where the sequence is that of the left ones"""
     calibration: Path | None = None

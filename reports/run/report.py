@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data.frames import as_cell_value
+from fgbaseline.data.dataframes import as_cell_value
 
 from ..keywords import for_python
 from ..notebook import NotebookResult, write_report

@@ -14,7 +14,7 @@ from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory, find_estimator
 from fgbaseline.data.solving import Watch, no_progress, solve_all
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import InputError
 
 from ..comparison.inputs import frame_times, in_one_body, valid_file_name

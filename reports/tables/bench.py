@@ -12,7 +12,7 @@ from ..formatting import counted, interval, number
 from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
 from ..results.metric import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value
 from ..results.metrics import shown_in
-from .table import Cell, Column, Row, Table, compared
+from .table import Cell, Column, Row, Table, mark_best
 
 Key: TypeAlias = tuple[str, str]
 """case and estimator"""
@@ -77,7 +77,7 @@ def _cells(better: Better, values: Mapping[Key, Value], *, above_zero: bool = Fa
         own = {name: value for (other, name), value in values.items() if other == case}
         rivals = [name for name, value in own.items() if value and (value.value > 0.0 or not above_zero)]
         alike = len({own[name].value for name in rivals}) < 2
-        cells |= {(case, name): cell for name, cell in compared(better, own, () if alike else rivals).items()}
+        cells |= {(case, name): cell for name, cell in mark_best(better, own, () if alike else rivals).items()}
     return cells
 
 

@@ -12,7 +12,7 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 from ..formatting import resolution, resolved
 from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
 from ..results.metrics import over_deltas, shown_in
-from .table import Cell, Column, Row, Table, compared
+from .table import Cell, Column, Row, Table, mark_best
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ def comparison_table(comparison: Comparison, results: Results, caption: str, *, 
     for m in metrics:
         better = m.better if m.same_data or comparison.ranking.same else Better.NEITHER
         values = {name: m.value(results[name]) for name in names}
-        cells.append(compared(better, values, rivals) | _unresolved(comparison, m, values))
+        cells.append(mark_best(better, values, rivals) | _unresolved(comparison, m, values))
     rows = tuple(
         Row(name, tuple(of[name] for of in cells), reference=mark_reference and name == reference) for name in names
     )

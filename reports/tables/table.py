@@ -114,7 +114,7 @@ class Table:
         return replace(self, columns=columns, rows=rows, name=name)
 
 
-def compared(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
+def mark_best(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
     """The cells of a column by name; the best among the rivals are marked, all of equal printed value."""
     first = best(better, {name: value.value for name, value in values.items() if name in rivals})
     text = None if first is None else interval(first, nan, nan)

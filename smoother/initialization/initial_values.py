@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.estimate import Landmarks
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.problem import Excluded, Problem
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.triangulation import triangulate_tracks
 

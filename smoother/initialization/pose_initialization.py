@@ -66,7 +66,7 @@ class _KnownLandmarks:
             if not front.any():
                 return None
             J[:, :, ~front] = 0.0
-        white = model.white_scale[:, None]
+        white = model.whitening_scale[:, None]
         residual = np.where(front, (self._measured - seen.pixel) * white, 0.0)
         root = np.sqrt(model.weight(np.einsum("in,in->n", residual, residual)))
         J *= (white * root)[:, None]

@@ -22,7 +22,7 @@ from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.reports import html
 from fgbaseline.reports.html import page
-from fgbaseline.reports.html.environment import environment
+from fgbaseline.reports.html.templates import environment
 
 from .commands import fgbaseline
 from .empty_figures import figures_left_out

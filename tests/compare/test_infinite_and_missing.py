@@ -14,7 +14,7 @@ from fgbaseline import compare, ekf
 from fgbaseline.compare import estimate_comparison as comparison
 from fgbaseline.compare.statistics.descriptive import quantile
 from fgbaseline.data import Estimate, Landmarks, Problem
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.run import summarize

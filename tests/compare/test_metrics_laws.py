@@ -12,7 +12,7 @@ from fgbaseline import compare
 from fgbaseline.compare import Align, MatchedTrajectories
 from fgbaseline.compare.trajectory.wahba import solve_wahba
 from fgbaseline.data import Trajectory
-from fgbaseline.data.plural import plural
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, se3, so3
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -16,7 +16,7 @@ from fgbaseline.compare.landmarks.map_difference import MIN_WITH_SIGMAS
 from fgbaseline.compare.residuals.patterns import _p95
 from fgbaseline.compare.residuals.whitening import whitened_rows
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import FloatArray, se3
 
 from ..builders.synthetic import Scene, plain_problem, with_pixels
@@ -151,7 +151,7 @@ def test_classes_hold_every_observation_once_and_show_where_a_bias_is() -> None:
     assert sides.loc["left camera", "median"] == pytest.approx(sides.loc["right camera", "median"], rel=0.2)
 
 
-def test_maps_are_matched_by_landmark_and_measured_in_metres_and_sigmas() -> None:
+def test_maps_are_matched_by_landmark_and_measured_in_meters_and_sigmas() -> None:
     problem = plain_problem(recording())
     reference = true_answer(problem)
     index, position = reference.landmarks.index, reference.landmarks.position

@@ -14,7 +14,7 @@ from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.motion import Shift
-from fgbaseline.data.triangulated import landmarks_along
+from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import disparity
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import values_from_state

@@ -12,7 +12,7 @@ from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
 from fgbaseline.diagnosis import diagnose, track_statistics
 from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..builders.rendered import CAMERA, IMU_T_CAM, Room
@@ -184,7 +184,7 @@ def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     measurement = StereoMeasurement(found.camera, 1.0, None)
     points = triangulate_tracks(measurement, poses[frame], landmark, pixel, n).position
     seen = se3.transform(se3.inverse(poses[frame]), points[landmark])
-    error = np.linalg.norm(measured_rows(pixel).T - found.camera.rows(seen.T).pixel, axis=0)
+    error = np.linalg.norm(three_rows(pixel).T - found.camera.rows(seen.T).pixel, axis=0)
     error = np.where(np.isfinite(error) & (seen[:, 2] > 0), error, np.inf)
     assert np.median(error) < 0.8
     assert np.mean(error > 5.0) < 0.025

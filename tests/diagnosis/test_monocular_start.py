@@ -12,7 +12,7 @@ from fgbaseline.data.imu import ImuSamples
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis import Calibration
-from fgbaseline.diagnosis.inertial_start.states import motions_between
+from fgbaseline.diagnosis.inertial_initialization.states import motions_between
 from fgbaseline.diagnosis.monocular.gyroscope_bias import epipolar_bias
 from fgbaseline.diagnosis.monocular.start import LOOSENED, MonocularStart, monocular_start
 from fgbaseline.diagnosis.monocular.window_tracks import keyframe_tracks, rays_of

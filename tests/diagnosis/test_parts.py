@@ -19,10 +19,16 @@ from fgbaseline.diagnosis.conventions.spline import spline_through
 from fgbaseline.diagnosis.conventions.time_delay import timing
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions, split_tracks
 from fgbaseline.diagnosis.windows import bundle_adjustment as adjustment
-from fgbaseline.diagnosis.windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_windows_alike
-from fgbaseline.diagnosis.windows.residuals import SHARED, WindowData, joined, motion_terms, pixel_terms
+from fgbaseline.diagnosis.windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_each_window
+from fgbaseline.diagnosis.windows.residuals import (
+    N_CALIBRATION,
+    WindowData,
+    concatenate_windows,
+    motion_terms,
+    pixel_terms,
+)
 from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 
 from ..builders.synthetic import Scene
 
@@ -38,7 +44,7 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
     assert truth is not None
     assert truth.landmarks is not None
     twist = zero_order_hold(sequence)
-    data = WindowData(o.frame, o.landmark, measured_rows(o.pixel), twist, sequence.dt, np.zeros_like(twist))
+    data = WindowData(o.frame, o.landmark, three_rows(o.pixel), twist, sequence.dt, np.zeros_like(twist))
     random = np.random.default_rng(seed)
     off = 0.01 * random.normal(size=(frames, 6))
     off[0] = 0.0
@@ -48,8 +54,8 @@ def window(frames: int = 6, seed: int = 0) -> tuple[Scene, WindowData, FloatArra
 def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
     scene, data, poses, points = window()
     sequence = scene.sequence()
-    windows, start = [(data, poses, points)], [np.zeros(SHARED)]
-    (fit,) = fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, iterations)
+    windows, start = [(data, poses, points)], [np.zeros(N_CALIBRATION)]
+    (fit,) = fit_each_window(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, iterations)
     return fit, data
 
 
@@ -57,9 +63,9 @@ def test_windows_are_fitted_alike_by_one_process_and_by_three(monkeypatch: pytes
     monkeypatch.setattr(adjustment, "TOGETHER", 1)  # every window is a piece of work
     scenes = [window(seed=seed) for seed in range(5)]
     windows = [(data, poses, points) for _, data, poses, points in scenes]
-    sequence, start = scenes[0][0].sequence(), [np.zeros(SHARED)] * 5
+    sequence, start = scenes[0][0].sequence(), [np.zeros(N_CALIBRATION)] * 5
     one, three = (
-        fit_windows_alike(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, 2, processes)
+        fit_each_window(sequence.camera, sequence.imu_T_cam, windows, SIGMAS, start, 2, processes)
         for processes in (1, 3)
     )
     assert len(one) == len(three) == 5
@@ -80,7 +86,7 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
     scene, data, poses, points = window()
     sequence, h = scene.sequence(), 1e-6
     shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
-    one = joined([(data, poses, points)])
+    one = concatenate_windows([(data, poses, points)])
     _, before, after, by_shared = motion_terms(one, poses, SIGMAS, shared[None])
     model = StereoMeasurement(sequence.camera, 0.5**2, KERNEL)
     terms = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
@@ -103,8 +109,8 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
         as_if = -(move.T + np.cross(turn.T, terms.arm.T[seen]))
         difference = -(pixel(ahead, points) - pixel(behind, points))[seen] / (2 * h)
         assert np.allclose(difference, (by_point[seen] @ as_if[:, :, None])[:, :, 0], rtol=1e-4, atol=1e-3)
-    for i in range(SHARED):
-        step = h * np.eye(SHARED)[i]
+    for i in range(N_CALIBRATION):
+        step = h * np.eye(N_CALIBRATION)[i]
         difference = -(motion(poses, shared + step) - motion(poses, shared - step)) / (2 * h)
         assert np.allclose(difference, by_shared[:, :, i], atol=2e-2 * np.abs(by_shared).max())
     for i in range(3):
@@ -118,12 +124,12 @@ def test_a_window_ends_where_scipy_ends() -> None:
     sequence = window()[0].sequence()
     model = StereoMeasurement(sequence.camera, SIGMAS.pixel**2, KERNEL)
     W, m = len(fit.poses), len(fit.points)
-    root, one = np.sqrt(np.diag(SHARED_PRIOR)), joined([(data, fit.poses, fit.points)])
+    root, one = np.sqrt(np.diag(SHARED_PRIOR)), concatenate_windows([(data, fit.poses, fit.points)])
 
     def residual(x: FloatArray) -> FloatArray:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
-        shared = fit.shared + x[-SHARED:]
+        shared = fit.shared + x[-N_CALIBRATION:]
         pixels = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
         r = pixels.residual.T
         norm, k = np.linalg.norm(r, axis=1), KERNEL.threshold
@@ -133,7 +139,7 @@ def test_a_window_ends_where_scipy_ends() -> None:
             [r.ravel(), motion_terms(one, poses, SIGMAS, shared[None]).residual.ravel(), root * shared]
         )
 
-    start = np.zeros(6 * (W - 1) + 3 * m + SHARED)
+    start = np.zeros(6 * (W - 1) + 3 * m + N_CALIBRATION)
     best = least_squares(residual, start, x_scale="jac")
     cost = 0.5 * float(np.sum(residual(start) ** 2))
     assert best.cost <= cost * (1 + 1e-9)
@@ -144,7 +150,7 @@ def test_redundancies_add_up_to_the_degrees_of_freedom() -> None:
     fit, data = fitted()
     assert ((fit.motion_redundancy > 0.0) & (fit.motion_redundancy < 1.0)).all()
     rows = 3 * len(data.frame) + 6 * len(data.dt)
-    unknowns = 6 * len(data.dt) + 3 * len(fit.points) + SHARED
+    unknowns = 6 * len(data.dt) + 3 * len(fit.points) + N_CALIBRATION
     assert fit.degrees_of_freedom + fit.motion_redundancy.sum() == pytest.approx(rows - unknowns)
 
 

@@ -16,7 +16,7 @@ from fgbaseline.ekf.decoupled_ekf import _standard_form_failure
 from fgbaseline.ekf.landmark_mapping import map_landmarks
 from fgbaseline.ekf.landmark_update import IndependentLandmarks
 from fgbaseline.geometry import FloatArray, HuberKernel, se3
-from fgbaseline.geometry.measurement import measured_rows, predict
+from fgbaseline.geometry.measurement import predict, three_rows
 
 from ..builders.synthetic import Scene, drive, first_innovation, matched, plain_problem, position_errors
 
@@ -236,7 +236,7 @@ def test_mapping_weighs_an_innovation_by_its_own_covariance(seed: int, threshold
     for each in (blocks, expected):
         each.update(np.eye(4), np.arange(5), pixel[:5])
     sigma, predicted = blocks.covariance(), predict(KITTI.camera, cam_T_imu, np.eye(4), blocks.mean)
-    H, residual = predicted.point_jacobian()[:, :, :3], measured_rows(wrong) - predicted.pixel
+    H, residual = predicted.point_jacobian()[:, :, :3], three_rows(wrong) - predicted.pixel
     S = H @ sigma @ np.swapaxes(H, 1, 2) + 0.25 * np.diag([1.0, 1.0, 0.5])
     norm = np.sqrt([r @ np.linalg.solve(s, r) for r, s in zip(residual, S, strict=True)])
     expected.update(np.eye(4), np.arange(5), wrong, np.minimum(1.0, threshold / norm))

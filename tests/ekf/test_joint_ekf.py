@@ -24,7 +24,7 @@ from fgbaseline.ekf.joint.landmark_representation import (
 )
 from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, measured_rows, predict
+from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, predict, three_rows
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 
@@ -92,7 +92,7 @@ def test_three_rows_have_the_information_of_four(seed: int) -> None:
     H = H.reshape(4 * n, size)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V * np.eye(4 * n))
     updated = P.copy()
-    innovation = Innovation.of(three, measured_rows(residual), updated)
+    innovation = Innovation.of(three, three_rows(residual), updated)
     delta = kalman_update(innovation, innovation.factorize(V * ROW_VARIANCE), updated)
     np.testing.assert_allclose(delta, K @ residual.reshape(-1), rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(updated, (np.eye(size) - K @ H) @ P, rtol=1e-6, atol=1e-9 * np.abs(P).max())
@@ -159,7 +159,7 @@ def test_initialization_without_prior_is_the_limit_of_an_uninformative_prior(
     plain = ekf.joint_ekf(two, settings=JointSettings(coordinates))
     # At its back-projection, where it is linearized the same, but with 1 km of doubt.
     world_T_cam = two.initial_pose @ SCENE.imu_T_cam
-    first = measured_rows(two.observations().pixel[:4])
+    first = three_rows(two.observations().pixel[:4])
     X = back_projected(SCENE.camera, first) @ world_T_cam.T
     prior = data.LandmarkPrior(np.zeros((len(two.features), 3)), 1e6 * np.eye(3))
     prior.mean[:4] = X[:, :3] / X[:, 3:]
@@ -560,14 +560,14 @@ def test_a_covariance_that_becomes_indefinite_is_an_event_with_its_frame() -> No
     noise = problem.increment_covariance.copy()
     noise[4] = -np.eye(6)
     estimate = ekf.joint_ekf(replace(problem, increment_covariance=noise))
-    assert estimate.events[0] == data.Event(5, EventKind.COVARIANCE_LOST, "12 of 12 observations take no part")
+    assert estimate.events[0] == data.Event(5, EventKind.COVARIANCE_LOST, "12 of 12 observations rejected")
     assert not estimate.used[SCENE.observations.frame == 5].any()
     assert estimate.used[SCENE.observations.frame < 5].all()
 
 
 def test_deferred_landmarks_are_counted_in_every_frame_and_reported_at_their_last() -> None:
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
-    said = (f"2 of {2 if k else 12} observations take no part" for k in range(10))
+    said = (f"2 of {2 if k else 12} observations rejected" for k in range(10))
     put_off = [data.Event(k, EventKind.INITIALIZATION_DEFERRED, text) for k, text in enumerate(said)]
     never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no frame that was believed saw it", j) for j in (0, 1)]
     assert list(estimate.events) == [*put_off, *never]

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from fgbaseline.compare.residuals.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
-from fgbaseline.diagnosis.windows.residuals import WindowData, joined, pixel_terms
+from fgbaseline.diagnosis.windows.residuals import WindowData, concatenate_windows, pixel_terms
 from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
-from fgbaseline.geometry.measurement import measured_rows, predict, squared_norm
+from fgbaseline.geometry.measurement import predict, squared_norm, three_rows
 from fgbaseline.geometry.stereo import PIXEL_ROWS
 from fgbaseline.geometry.triangulation import triangulate_tracks
 from fgbaseline.smoother.batch.full_graph import full_graph
@@ -60,20 +60,20 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     points, pixel = points[o.landmark[seen]], o.pixel[seen]
     documented = pose_innovation(model, cam_T_imu, pose, points, pixel)
     predicted = predict(s.camera, cam_T_imu, pose, points)
-    residual, pose_jacobian = measured_rows(pixel) - predicted.pixel, predicted.pose_jacobian()
+    residual, pose_jacobian = three_rows(pixel) - predicted.pixel, predicted.pose_jacobian()
     by_point = predicted.point_jacobian()[:, :, :3]
     np.testing.assert_array_equal(documented.residual, residual)
     np.testing.assert_array_equal(documented.jacobian, pose_jacobian)
     # The judges: residuals of the comparison, and those of the reprojection in four rows.
     four = pixel - s.camera.project(se3.transform(cam_T_imu @ se3.inverse(pose), points))
-    np.testing.assert_allclose(measured_rows(four), residual, atol=1e-9)
+    np.testing.assert_allclose(three_rows(four), residual, atol=1e-9)
     white = residual / np.sqrt(model.row_variance)
     np.testing.assert_allclose(pixel_squares(problem, four), (white**2).sum(axis=1), rtol=1e-8)
     # The diagnosis: its rows are whitened, its point moves against the pose.
     frames = np.zeros(len(points), dtype=np.int64)
     still = np.zeros((1, 6))
-    data = WindowData(frames, np.arange(len(points)), measured_rows(pixel), still, np.ones(1), still)
-    one = joined([(data, np.stack([pose, pose]), points)])
+    data = WindowData(frames, np.arange(len(points)), three_rows(pixel), still, np.ones(1), still)
+    one = concatenate_windows([(data, np.stack([pose, pose]), points)])
     window = pixel_terms(model, s.imu_T_cam, one, np.stack([pose, pose]), points, np.zeros((1, 8)))
     np.testing.assert_allclose(window.residual.T, white, rtol=1e-7, atol=1e-9)
     in_white = by_point / np.sqrt(model.row_variance)[:, None]
@@ -85,7 +85,7 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     )
     turned = np.r_[3:6, 0:3]
     for i, j in enumerate(o.landmark[seen]):
-        factor = factors.observation(k, landmark_key(int(j)), measured_rows(pixel[i]))
+        factor = factors.observation(k, landmark_key(int(j)), three_rows(pixel[i]))
         np.testing.assert_allclose(-np.asarray(factor.unwhitenedError(values)), residual[i], atol=1e-8)
         A, b = factor.linearize(values).jacobian()
         np.testing.assert_allclose(b, white[i], rtol=1e-7, atol=1e-8)
@@ -104,7 +104,7 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     seen, cam_T_imu, pose = list(o.by_frame(4))[1], se3.inverse(s.imu_T_cam), estimate.world_T_imu[1]
     points, pixel = estimate.landmarks.position[o.landmark[seen]], o.pixel[seen]
     predicted = predict(s.camera, cam_T_imu, pose, points)
-    residual = measured_rows(pixel) - predicted.pixel
+    residual = three_rows(pixel) - predicted.pixel
     norm = np.sqrt((residual**2 / (V * np.array([1.0, 1.0, 0.5]))).sum(axis=1))
     expected = np.minimum(1.0, threshold / norm)
     # The documented filter and the joint one, with Sigma = 0.
@@ -117,16 +117,16 @@ def test_one_observation_has_one_robust_weight_where_the_state_is_known(seed: in
     np.testing.assert_allclose(joint, expected, rtol=1e-9)
     # The diagnosis.
     still = np.zeros((1, 6))
-    data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), measured_rows(pixel), still, np.ones(1), still)
+    data = WindowData(np.zeros(n, dtype=np.int64), np.arange(n), three_rows(pixel), still, np.ones(1), still)
     two = np.stack([pose, pose])
-    terms = pixel_terms(model, s.imu_T_cam, joined([(data, two, points)]), two, points, np.zeros((1, 8)))
+    terms = pixel_terms(model, s.imu_T_cam, concatenate_windows([(data, two, points)]), two, points, np.zeros((1, 8)))
     np.testing.assert_allclose(terms.weight, expected, rtol=1e-9)
     # The graph: GTSAM multiplies residual and Jacobian by the root of the weight.
     values = values_from_state(estimate.world_T_imu, estimate.landmarks)
     robust, plain = FactorBuilder(problem), FactorBuilder(replace(problem, kernel=None))
     for i, j in enumerate(o.landmark[seen]):
         weighted, full = (
-            factors.observation(1, landmark_key(int(j)), measured_rows(pixel[i])).linearize(values).jacobian()[1]
+            factors.observation(1, landmark_key(int(j)), three_rows(pixel[i])).linearize(values).jacobian()[1]
             for factors in (robust, plain)
         )
         assert weighted @ weighted == pytest.approx(expected[i] * (full @ full), rel=1e-7)
@@ -143,7 +143,7 @@ def test_three_rows_and_the_printed_four_weigh_a_residual_alike_but_for_what_no_
     whole = np.einsum("ni,ni->n", residual, np.linalg.solve(S, residual[:, :, None])[:, :, 0])
     three = H @ sigma @ np.swapaxes(H, 1, 2) + np.diag(V * np.array([1.0, 1.0, 0.5]))
     apart = (residual[:, 1] - residual[:, 3]) ** 2 / (2.0 * V)
-    np.testing.assert_allclose(squared_norm(measured_rows(residual), three) + apart, whole, rtol=1e-9)
+    np.testing.assert_allclose(squared_norm(three_rows(residual), three) + apart, whole, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kernel", [None, HuberKernel(1.0), HuberKernel()])

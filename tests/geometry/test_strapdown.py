@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown
-from fgbaseline.geometry.strapdown import ImuMotion
+from fgbaseline.geometry.strapdown import PreintegratedImu
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 DENSITIES = np.array([2e-3, 2e-5, 2e-2, 3e-3])
@@ -27,7 +27,7 @@ class Samples(NamedTuple):
 
     def motion(
         self, gyroscope_bias: FloatArray | float = 0.0, accelerometer_bias: FloatArray | float = 0.0
-    ) -> ImuMotion:
+    ) -> PreintegratedImu:
         return strapdown.integrate(self.rate - gyroscope_bias, self.force - accelerometer_bias, self.dt, DENSITIES)
 
     def part(self, chosen: slice) -> "Samples":
@@ -57,7 +57,7 @@ def state(seed: int) -> tuple[FloatArray, FloatArray]:
     return se3.exp(rng.normal(size=6)), rng.normal(size=3)
 
 
-def assert_motions_agree(actual: ImuMotion, expected: ImuMotion, atol: float = 1e-12) -> None:
+def assert_motions_agree(actual: PreintegratedImu, expected: PreintegratedImu, atol: float = 1e-12) -> None:
     for name in ("rotation", "velocity", "position", "dt", "transition"):
         np.testing.assert_allclose(getattr(actual, name), getattr(expected, name), atol=atol, rtol=0.0, err_msg=name)
 
@@ -98,7 +98,7 @@ def test_one_motion_after_another_is_the_motion_over_both(seed: int, rate: float
     samples = random(seed, 6, rate)
     first, second, both = samples.part(slice(n)).motion(), samples.part(slice(n, None)).motion(), samples.motion()
     R, F = first.rotation, second.transition
-    expected = ImuMotion(
+    expected = PreintegratedImu(
         R @ second.rotation,
         first.velocity + R @ second.velocity,
         first.position + first.velocity * second.dt + R @ second.position,

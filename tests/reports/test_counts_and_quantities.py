@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.data.plural import noun, plural
+from fgbaseline.data.wording import noun, plural
 from fgbaseline.geometry import se3
 from fgbaseline.reports.comparison import compare as compared
 from fgbaseline.reports.formatting import counted, number, per_cent

@@ -24,7 +24,7 @@ from fgbaseline.reports.figures.style import (
     on_dark,
 )
 from fgbaseline.reports.html import comparison_page, diagnosis_page
-from fgbaseline.reports.html.explore import policy
+from fgbaseline.reports.html.interactive import policy
 from fgbaseline.reports.html.plot_encoding import embedded_json, floats
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.diagnosis import found_by

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import rich.console
 
-from fgbaseline.reports.announced import print_sentences
+from fgbaseline.reports.open_page import print_sentences
 from fgbaseline.reports.tables import Cell, Column, Row, Table, print_table
 
 HEADINGS = ("ATE RMSE", "divergence RMSE", "median reprojection", "claimed sigma", "reference NEES", "time")

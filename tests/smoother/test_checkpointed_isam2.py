@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key
@@ -36,7 +36,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     values.insert(pose_key(k), gtsam.Pose3(TRUTH.world_T_imu[k]))
     o = PROBLEM.observations()
     for i in np.flatnonzero(o.frame == k):
-        graph.push_back(FACTORS.observation(k, landmark_key(int(o.landmark[i])), measured_rows(o.pixel[i])))
+        graph.push_back(FACTORS.observation(k, landmark_key(int(o.landmark[i])), three_rows(o.pixel[i])))
     if k == 0:
         for j, point in enumerate(TRUTH.landmarks):
             values.insert(landmark_key(j), point)

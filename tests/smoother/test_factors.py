@@ -12,7 +12,7 @@ from fgbaseline import data
 from fgbaseline.data import HuberKernel, Problem
 from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key
@@ -32,7 +32,7 @@ def graph_of(problem: Problem, factors: FactorBuilder) -> gtsam.NonlinearFactorG
         graph.push_back(factors.between(k))
     o = problem.observations()
     for k, j, pixel in zip(o.frame.tolist(), o.landmark.tolist(), o.pixel, strict=True):
-        graph.push_back(factors.observation(k, landmark_key(j), measured_rows(pixel)))
+        graph.push_back(factors.observation(k, landmark_key(j), three_rows(pixel)))
     if problem.landmark_prior is not None:
         for j in problem.features.tolist():
             graph.push_back(factors.landmark_prior(j, landmark_key(j)))
@@ -99,7 +99,7 @@ def test_the_kernel_is_huber_on_the_norm_of_the_three_rows() -> None:
     norm = np.sqrt(r[:, 0] ** 2 + r[:, 2] ** 2 + 2.0 * (0.5 * (r[:, 1] + r[:, 3])) ** 2)
     expected = np.where(norm <= k, 0.5 * norm**2, k * norm - 0.5 * k**2)
     errors = [
-        factors.observation(int(o.frame[i]), landmark_key(int(o.landmark[i])), measured_rows(o.pixel[i])).error(values)
+        factors.observation(int(o.frame[i]), landmark_key(int(o.landmark[i])), three_rows(o.pixel[i])).error(values)
         for i in range(len(o))
     ]
     assert (norm > k).any()
@@ -114,7 +114,7 @@ def test_the_stereo_factor_is_predicted_minus_measured_through_the_extrinsic(see
     i = int(random.integers(len(problem.observations())))
     o, s = problem.observations(), problem.sequence
     frame, landmark = int(o.frame[i]), int(o.landmark[i])
-    factor = factors.observation(frame, landmark_key(landmark), measured_rows(o.pixel[i]))
+    factor = factors.observation(frame, landmark_key(landmark), three_rows(o.pixel[i]))
 
     def error(moved: State) -> FloatArray:
         cam_T_world = se3.inverse(moved.world_T_imu[frame] @ s.imu_T_cam)
@@ -184,7 +184,7 @@ def test_a_point_behind_the_camera_raises_no_exception() -> None:
     state = near_truth(problem, np.random.default_rng(0), 0.0)
     behind = State(state.world_T_imu, state.landmarks + problem.sequence.imu_T_cam[:3, 2] * -100.0)
     values = values_of(behind, problem, factors)
-    factor = factors.observation(0, landmark_key(0), measured_rows(problem.observations().pixel[0]))
+    factor = factors.observation(0, landmark_key(0), three_rows(problem.observations().pixel[0]))
     assert np.isfinite(factor.error(values))
     np.testing.assert_array_equal(factor.linearize(values).jacobian()[0], 0.0)
 

@@ -9,7 +9,7 @@ import pytest
 from fgbaseline import smoother
 from fgbaseline.data import HuberKernel, Observations, Status
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.smoother import FixedLagSettings
 from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.fixed_lag.checkpointed_fixed_lag import CheckpointedFixedLag
@@ -153,7 +153,7 @@ def frame(k: int) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values, dict[int, f
     times = {pose_key(k): now}
     for i in np.flatnonzero(o.frame == k):
         key = near_key(int(o.landmark[i]))
-        graph.push_back(FACTORS.observation(k, key, measured_rows(o.pixel[i])))
+        graph.push_back(FACTORS.observation(k, key, three_rows(o.pixel[i])))
         times[key] = now
         if k == 0:
             values.insert(key, truth.landmarks[o.landmark[i]])

@@ -11,7 +11,7 @@ from fgbaseline import smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown
-from fgbaseline.geometry.measurement import measured_rows
+from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.smoother import FixedLagSettings, ISAM2Settings
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.errors import IndeterminateSystemError
@@ -87,7 +87,7 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
         apart = np.concatenate([twist, se3.log(turn)[:3], drift])  # GTSAM's chart of the navigation state
         parts.append(np.linalg.solve(np.linalg.cholesky(motion.noise), apart))
     o = problem.observations()
-    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured_rows(o.pixel), strict=True):
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), three_rows(o.pixel), strict=True):
         cam_T_world = se3.inverse(states.world_T_imu[k] @ problem.sequence.imu_T_cam)
         uL, vL, uR, _ = model.camera.project(se3.transform(cam_T_world, points[j]))
         parts.append((np.array([uL, uR, vL]) - rows) / np.sqrt(model.row_variance))

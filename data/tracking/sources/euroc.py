@@ -20,7 +20,7 @@ from ...formats.imu_attachment import read_imu
 from ...formats.imu_yaml import ImuCalibration, calibration_or_assumed
 from ...formats.named_file import reading, shown
 from ...observations import IntArray
-from ...plural import plural
+from ...wording import plural
 from .camera_yaml import Rig, read_rig, read_sensor_yaml
 from .image_files import file_pairs, image_files
 from .image_recording import ONE_CAMERA, ImageRecording, TruthFile

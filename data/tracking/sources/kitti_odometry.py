@@ -17,7 +17,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.kitti import read_times
 from ...formats.named_file import reading, regular_file, shown
-from ...plural import plural
+from ...wording import plural
 from ..rig import CameraModel, Distortion
 from .image_files import file_pairs, image_files, size_of
 from .image_recording import ONE_CAMERA, ImageRecording, TruthFile

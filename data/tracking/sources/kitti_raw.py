@@ -18,8 +18,8 @@ from fgbaseline.geometry import FloatArray, InputError, se3, so3
 from ...formats.kitti import nearest_rotations
 from ...formats.named_file import reading, regular_file, shown
 from ...observations import IntArray
-from ...plural import plural
 from ...sequence import Truth
+from ...wording import plural
 from .image_files import file_pairs, image_files, size_of
 from .image_recording import ONE_CAMERA, ImageRecording
 from .kitti_odometry import rectified_cameras

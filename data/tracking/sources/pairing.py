@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.ground_truth import match_stamps
 from ...observations import IntArray
-from ...plural import plural
+from ...wording import plural
 
 APART = 0.1
 """largest interval between the images of a pair, as a share of the median interval between frames"""

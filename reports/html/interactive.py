@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ..figures.style import DASHES, on_dark
-from .environment import NO_SCRIPT, asset
+from .templates import NO_SCRIPT, asset
 
 SCRIPTS = ("data.js", "drawing.js", "chart.js", "path.js", "frame.js", "page.js")
 """a page's script in the order of its dependencies"""

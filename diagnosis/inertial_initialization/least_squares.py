@@ -48,7 +48,7 @@ class Solution:
     """(m,) squared whitened residual of each relative pose"""
 
 
-def solved(
+def solve_least_squares(
     states: States, imu: ImuIntervals, frames: IntArray, seen: RelativePoses, tracks: KeyframeTracks | None = None
 ) -> Solution:
     """States of keyframes at `frames` (n,) of the imu, from an initial value, by relative poses or by their tracks."""

@@ -50,7 +50,7 @@ class KeyframeTracks:
         world_T_cam = (pose @ self.imu_T_cam)[self.keyframe]
         points = triangulate_tracks(self.model, world_T_cam, self.point, self.pixel, m).position
         information, gradient, cross = np.zeros((m, 3, 3)), np.zeros((m, 3)), np.zeros((m, k, 6, 3))
-        cam_T_imu, white = se3.inverse(self.imu_T_cam), self.model.white_scale
+        cam_T_imu, white = se3.inverse(self.imu_T_cam), self.model.whitening_scale
         bounds = np.searchsorted(self.keyframe, np.arange(k + 1))
         for i in range(k):
             at = slice(int(bounds[i]), int(bounds[i + 1]))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fgbaseline.data.plural import plural
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, disparity
 
 SWAPPED = 0.9

@@ -1,4 +1,4 @@
-"""Time and memory of reading a file of the shape of 10.npz, in a separate process: `python -m benchmarks.reading`.
+"""Time and memory of reading a file of the shape of 10.npz, in a separate process: `python -m benchmarks.reader_cost`.
 
 10.npz itself is at hand nowhere but at its course. What is written here has its shape, and tracks as long as its.
 """
@@ -17,8 +17,8 @@ from numpy.lib import format as npy
 from fgbaseline import data
 from fgbaseline.geometry import FloatArray, InputError
 
-from .apart import apart
-from .measured import Row, row, table
+from .claim_table import Row, row, table
+from .subprocess_cost import apart
 
 LANDMARKS, FRAMES = 13_289, 3_026
 TRACK = 15
@@ -38,7 +38,7 @@ def rows(runs: int) -> list[Row]:
             path = Path(folder) / f"{kind}.npz"
             write(path, method)
             size = path.stat().st_size / 1e6
-            taken = [apart("benchmarks.reading:read", str(path)) for _ in range(runs)]
+            taken = [apart("benchmarks.reader_cost:read", str(path)) for _ in range(runs)]
             what = f"reading 4 x {LANDMARKS:,} x {FRAMES} doubles ({GIGABYTES:.2f} GB), {kind} ({size:,.0f} MB on disk)"
             measured += [
                 row(f"{what}: peak memory", [t.peak for t in taken], " MB", most=MOST_MEMORY),

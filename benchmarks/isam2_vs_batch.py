@@ -1,4 +1,4 @@
-"""Distance of iSAM2 from batch, with and without the final relinearization: `python benchmarks/reference.py FILE...`.
+"""Distance of iSAM2 from batch, with and without final relinearization: `python benchmarks/isam2_vs_batch.py FILE...`.
 
 Costs are those of `compare.cost`, over the observations that batch used, so that they compare. Exits 1 where a limit
 is passed: 0.05 m between the paths, and a cost above batch's by 0.01 % without a kernel, by 0.5 % with one.

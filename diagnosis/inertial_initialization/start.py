@@ -15,10 +15,10 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
-from .least_squares import Solution, solved
+from .least_squares import Solution, solve_least_squares
 from .linear_alignment import aligned
-from .standing import keyframes_of, standing_frames, stands
 from .states import RelativePoses, States
+from .stationary import keyframes_of, standing_frames, stands
 from .track_terms import keyframe_tracks
 
 WINDOW = 0.5
@@ -55,7 +55,7 @@ def inertial_start(sequence: Sequence, seen: Odometry, imu: ImuIntervals, pixel:
         span = float(sequence.t[keyframes[-1]] - sequence.t[0])
         source = f"tracks and inertial samples of the first {span:.2f} s, from linear alignment"
     tracks = keyframe_tracks(sequence, seen, keyframes, pixel)
-    return start_of(solved(initial, imu, keyframes, NO_POSES, tracks), source, standing)
+    return start_of(solve_least_squares(initial, imu, keyframes, NO_POSES, tracks), source, standing)
 
 
 def inflated(relative: RelativePoses, factor: float) -> RelativePoses:

@@ -10,7 +10,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
-from .least_squares import Solution, solved
+from .least_squares import Solution, solve_least_squares
 from .start import Start, inflated, neighbors
 from .states import RelativePoses, States, motions_between
 
@@ -45,7 +45,7 @@ def inertial_path(sequence: Sequence, seen: Odometry, imu: ImuIntervals, start: 
     states = _initial(imu, frames, relative, start)
     solution: Solution | None = None
     for _ in range(ROUNDS):
-        solution = solved(states, imu, frames, inflated(relative, inflation))
+        solution = solve_least_squares(states, imu, frames, inflated(relative, inflation))
         states = solution.states
         inflation = max(1.0, _factor(states, relative, 1), _factor(states, relative, _intervals(sequence)))
     assert solution is not None

@@ -58,15 +58,15 @@ class Motions:
     dt: FloatArray
     """(m,) s"""
     transition: FloatArray
-    """(m, 15, 15) velocity errors in body axes, as `strapdown.ImuMotion` has them"""
+    """(m, 15, 15) velocity errors in body axes, as `strapdown.PreintegratedImu` has them"""
     noise: FloatArray
     """(m, 15, 15)"""
     biases: FloatArray
     """(m, 6) with which they were integrated"""
 
-    def between(self, i: int) -> strapdown.ImuMotion:
+    def between(self, i: int) -> strapdown.PreintegratedImu:
         """The motion of interval i."""
-        return strapdown.ImuMotion(
+        return strapdown.PreintegratedImu(
             self.rotation[i],
             self.velocity[i],
             self.position[i],

@@ -1,6 +1,6 @@
 """Time and memory of a function in a separate process, with none of the caller's in them.
 
-`python -m benchmarks.apart MODULE FUNCTION JSON` is that process; it answers in one line of JSON.
+`python -m benchmarks.subprocess_cost MODULE FUNCTION JSON` is that process; it answers in one line of JSON.
 """
 
 # ruff: noqa: E402
@@ -49,7 +49,7 @@ def apart(function: str, *arguments: Any, limit: int | None = None) -> Taken:
     """
     arguments_text = json.dumps({"arguments": arguments, "limit": limit})
     ended = subprocess.run(
-        [sys.executable, "-m", "benchmarks.apart", *function.split(":"), arguments_text],
+        [sys.executable, "-m", "benchmarks.subprocess_cost", *function.split(":"), arguments_text],
         cwd=Path(__file__).parents[1],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
