@@ -190,7 +190,7 @@ class Run(Displayed):
 
     @property
     def same_graph(self) -> frozenset[str]:
-        """Estimators that find other minima of the reference's graph."""
+        """Estimators that minimize the cost of the reference's graph as well."""
         return frozenset(SAME_GRAPH) - {self.reference} if self.reference in SAME_GRAPH else frozenset()
 
     @property
