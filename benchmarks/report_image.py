@@ -11,7 +11,7 @@ import click
 from playwright.sync_api import sync_playwright
 
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
-SIZE = {"width": 1240, "height": 1030}
+SIZE = {"width": 1400, "height": 1250}
 
 
 @click.command()

@@ -126,7 +126,7 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
         )
         for name, result in run.results.items()
     )
-    away = f"divergence from {run.reference}, unaligned"
+    away = f"divergence from {run.reference}"
     columns = tuple(Column.of(m, away if m.group == DIVERGENCE else "") for m in shown)
     return Table(columns, rows, notes=tuple((mark, text) for text, mark in notes.items()))
 
