@@ -16,7 +16,7 @@ DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
 AGES = (1, 2, 4, 7, 13, 26)
 """first observation of each class of track age"""
 DISTANCE, AGE, REGION, SIDE = "distance", "track age", "region", "side"
-ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "middle", "right")
+ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "center", "right")
 
 
 def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:

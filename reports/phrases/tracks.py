@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from fgbaseline.compare.residuals.patterns import COLUMNS, ROWS
 from fgbaseline.data import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import listed, number, per_cent
 
-ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "center", "right")
 SPARSE = 0.25
 """part of an even share of the observations, below which a cell of the 3 x 3 grid is sparse"""
 

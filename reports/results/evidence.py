@@ -115,7 +115,7 @@ class HeldOutError(Part):
 
 
 REFERENCE = "it is the reference"
-SAME_GRAPH = "same graph as the reference's: P - P_ref is zero up to rounding"
+SAME_GRAPH = "same graph as the reference's: P − P_ref is zero up to rounding"
 
 
 def summarize_evidence(run: Run, result: Result) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
         if is_alone
         else no_covariance
         or (
-            same_graph or "P - P_ref is positive definite in no frame"
+            same_graph or "P − P_ref is positive definite in no frame"
             if comparable
             else "no frame has two positive definite covariances"
         ),
@@ -166,7 +166,7 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
         "whitened": no_tracks,
         "moved_points.share": no_tracks,
         "map": alone if is_alone else "it has no landmark in common with the reference",
-        "map.median_sigmas": "no common landmark has covariances with P - P_ref positive definite",
+        "map.median_sigmas": "no common landmark has covariances with P − P_ref positive definite",
         "held_out": "no tracks were held out" if run.held_out is None else "no held-out track remains",
         "held_out.p95": "more than 5 % of the points lie behind the camera",
     }

@@ -21,9 +21,9 @@ from .table import Cell, Column, Row, Table, best
 OVERCONFIDENT = "overconfident"
 """in place of a reference NEES, for which P - P_ref has to be positive definite"""
 NOT_POSITIVE_DEFINITE = (
-    "in most frames P - P_ref is not positive definite: the claimed covariance is below the reference's"
+    "in most frames P − P_ref is not positive definite: the claimed covariance is below the reference's"
 )
-NOT_DEFINED = "P - P_ref is not positive definite in the others"
+NOT_DEFINED = "P − P_ref is not positive definite in the others"
 Estimators = Mapping[str, Mapping[str, Any]]
 
 

@@ -71,7 +71,7 @@ def findings_table(findings: Iterable[Finding]) -> Table:
 def _residuals(run: Run) -> Table:
     """Reprojection errors in classes."""
     tables = {r.name: r.evidence.patterns for r in run.answered}
-    figures = {"n": "n", "median, px": "median", "mean, px": "mean", "95 %, px": "p95"}
+    figures = {"observations": "n", "median, px": "median", "mean, px": "mean", "95th percentile, px": "p95"}
     title = "Reprojection errors by distance, track age, place in the image and camera"
     return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"median u, px": "u", "median v, px": "v"})
 

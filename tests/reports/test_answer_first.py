@@ -80,8 +80,8 @@ def test_a_reference_nees_over_part_of_the_frames_says_so_and_causes_have_a_note
     for table in (main_table(run, estimators), evidence_table(run, estimators)):
         column = next(i for i, c in enumerate(table.columns) if "reference NEES" in f"{c.group} {c.title}")
         notes = {row.name: dict(table.notes).get(row.cells[column].note) for row in table.rows}
-        assert notes["ekf"] == f"over 40 of {T} frames: P - P_ref is not positive definite in the others"
-        assert notes["batch"] == "same graph as the reference's: P - P_ref is zero up to rounding"
+        assert notes["ekf"] == f"over 40 of {T} frames: P − P_ref is not positive definite in the others"
+        assert notes["batch"] == "same graph as the reference's: P − P_ref is zero up to rounding"
         assert notes["isam2"] == "it is the reference"
     overconfident = run_with_claims("ekf")
     estimators = summarize(overconfident).model_dump(mode="json")["estimators"]
