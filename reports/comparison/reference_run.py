@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.compare import Trust, Verdict
+from fgbaseline.compare import Criterion, Trust, Verdict
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence, Trajectory, read, read_problem
@@ -64,7 +64,8 @@ def read_reference_run(folder: Path) -> ReferenceRun:
             summary = json.loads(regular_file(path).read_text(encoding="utf-8"))
             reference, estimators = summary["reference"], summary["estimators"]
             chosen = str(reference["name"])
-            trust = Trust(Verdict[str(reference["trust"]).upper()], tuple(map(str, reference["reasons"])))
+            criteria = tuple(map(_criterion, reference.get("criteria", ())))
+            trust = Trust(Verdict[str(reference["trust"]).upper()], tuple(map(str, reference["reasons"])), criteria)
             names = tuple(str(name) for name, e in estimators.items() if e["status"] != "failed")
             settings = dict(summary["settings"])
             up = summary["sequence"].get("up")
@@ -74,6 +75,11 @@ def read_reference_run(folder: Path) -> ReferenceRun:
         if chosen not in names:
             raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
     return ReferenceRun(RunFolder(folder), chosen, trust, names, settings, up)
+
+
+def _criterion(found: dict[str, Any]) -> Criterion:
+    value = float("nan") if found["value"] is None else float(found["value"])
+    return Criterion(**{**found, "value": value, "verdict": Verdict[str(found["verdict"]).upper()]})
 
 
 def reference_in_memory(run: Run) -> ReferenceRun:

@@ -13,7 +13,7 @@ from fgbaseline import data
 from ..builders.commands import undrawn
 from ..builders.synthetic import drive
 
-TIMINGS = ("seconds", "seconds_total", "frames_per_second", "cost: time, s")
+TIMINGS = ("seconds", "seconds_total", "frames_per_second", "runtime: time, s")
 COMMANDS = {
     "run": ("run", "drive.npz", "--estimators", "dead-reckoning,ekf,joint-ekf,isam2,isam2-online,batch,fixed-lag"),
     "diagnose": ("diagnose", "drive.npz"),

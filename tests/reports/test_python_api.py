@@ -232,7 +232,7 @@ def test_a_function_is_a_row_with_its_measured_time_and_a_crash_is_a_row_with_it
 
     found = fgbaseline.run(sequence, estimators=["dead-reckoning", mine, crash], as_recorded=True)
     assert list(found.table.columns) == ["dead-reckoning", "mine", "crash"]
-    assert found.table.loc["cost: time, s", "mine"] > 0.0
+    assert found.table.loc["runtime: time, s", "mine"] > 0.0
     assert found.table["crash"].isna().all()
     assert "no luck" in found.results["crash"].estimate.reason
     assert len(repr(found).splitlines()) <= 5
@@ -261,8 +261,8 @@ def test_truth_and_added_trajectories_may_be_arrays(sequence: Sequence) -> None:
         ((sequence.t, camera), "camera"),
     ]
     for given, frame in forms:
-        found = fgbaseline.run(bare, truth=given, truth_frame=frame, **options).table.drop(index="cost: time, s")
-        pd.testing.assert_frame_equal(found, expected.drop(index="cost: time, s"), rtol=1e-6, atol=1e-9)
+        found = fgbaseline.run(bare, truth=given, truth_frame=frame, **options).table.drop(index="runtime: time, s")
+        pd.testing.assert_frame_equal(found, expected.drop(index="runtime: time, s"), rtol=1e-6, atol=1e-9)
     turned = se3.exp([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]) @ truth.world_T_imu
     added = fgbaseline.run(sequence, add={"true": (sequence.t, turned)}, **options)
     assert added.table.loc["ATE: RMSE, aligned, m", "true"] < 1e-6
