@@ -29,6 +29,8 @@ from ..formatting import counted, distance, listed, number, per_cent, resolved
 from ..results.metrics import ate_resolution
 from .evidence import causal_estimate, no_difference
 
+FEW = 2
+"""differences whose intervals stand in a sentence"""
 WITHIN_SIGMAS = 3.0
 """1-sigmas of the reference up to which an order by divergence says nothing on accuracy"""
 
@@ -160,14 +162,19 @@ def _share(rmse: float, result: Result) -> str:
 
 
 def _rough(differences: Mapping[str, RmseDifference]) -> str:
-    """Intervals of differences that are not reliable, and the number of blocks that they rest on."""
+    """Intervals of differences that are not reliable, or of many the fewest blocks that these rest on."""
+    rough = {name: d for name, d in differences.items() if not d.reliable}
+    if not rough:
+        return ""
+    why = "as the errors stay correlated over much of the recording"
+    if len(rough) > FEW:
+        blocks = plural(min(int(d.blocks) for d in rough.values()), "block")
+        return f" The intervals of {len(rough)} of these differences are rough, {why}: they rest on {blocks}."
     each = [
         f"{name} {number(d.value)} m [{number(d.low)}, {number(d.high)}] from {plural(int(d.blocks), 'block')}"
-        for name, d in differences.items()
-        if not d.reliable
+        for name, d in rough.items()
     ]
-    why = "as the errors stay correlated over much of the recording"
-    return f" The interval of the difference is rough, {why}: {listed(each)}." if each else ""
+    return f" The interval of the difference is rough, {why}: {listed(each)}."
 
 
 def _over(run: Run, found: PairedRanking) -> str:

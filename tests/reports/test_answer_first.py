@@ -183,3 +183,14 @@ def test_a_claim_above_the_error_is_not_called_overconfident() -> None:
 def test_an_inflation_of_a_few_percent_is_not_mentioned() -> None:
     problem = replace(plain_problem(scene()), pixel_inflation=1.04)
     assert not any("inflated" in reason for reason in run_of(problem, answer(problem, "isam2")).trust.reasons)
+
+
+@pytest.mark.parametrize("n", [2, 6])
+def test_rough_intervals_of_many_estimators_are_counted_and_not_listed(n: int) -> None:
+    problem = plain_problem(scene())
+    filters = [answer(problem, f"filter-{i}", (3.0 * i, 0.0, 0.0)) for i in range(n + 1)]
+    run = run_of(problem, answer(problem, "isam2"), *filters)
+    (sentence,) = (s for s in verdict(run) if "rough" in s and s.startswith("Larger divergence"))
+    assert sentence.count("[") == (n if n == 2 else 0)
+    assert (f"The intervals of {n} of these differences are rough" in sentence) == (n > 2)
+    assert "block" in sentence
