@@ -21,8 +21,7 @@ from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3, strapdown
 
 from ..builders.inertial import inertial_problem, simulated_problem
 
-SEEDS, SECONDS = 50, 5.0
-"""problems and their length; benchmarks.inertial_consistency has twice the length"""
+SEEDS = 50
 JOINT = (ekf.joint_ekf, ekf.joint_ekf_ungated, ekf.joint_ekf_textbook, ekf.joint_ekf_first_estimate)
 
 
@@ -88,8 +87,7 @@ def test_dead_reckoning_and_the_joint_filter_are_consistent(motion: str, solve: 
     low, high = (float(chi2.ppf(p, 15 * SEEDS)) / SEEDS for p in (0.025, 0.975))
     total, blocks = np.zeros(0), np.zeros(5)
     for seed in range(SEEDS):
-        waves = motion == "waves"
-        problem = inertial_problem(seed) if waves else simulated_problem(cast(PathName, motion), seed, SECONDS)
+        problem = inertial_problem(seed) if motion == "waves" else simulated_problem(cast(PathName, motion), seed)
         estimate = solve(problem, None)
         total = total if len(total) else np.zeros(problem.n_frames - 1)
         errors, P = state_errors(estimate, problem), estimate.state_covariance
