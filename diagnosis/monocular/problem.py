@@ -11,7 +11,9 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
+from ..conventions.rig import doubt_of_position, is_far
 from ..inertial.problem import imu_remarks, problem_of
+from ..tracks.image_size import intrinsics_findings
 from .start import EXCITED, MonocularStart, monocular_start
 
 SHORTEST = 3
@@ -32,6 +34,8 @@ def monocular_problem(
     found.
     """
     assert sequence.imu is not None
+    if is_far(sequence):
+        raise InputError(f"{sequence.source or sequence.name}: {doubt_of_position(sequence)}")
     imu = imu_intervals(sequence.imu, sequence.t)
     try:
         with threadpool_limits(limits=1, user_api="blas"):
@@ -53,7 +57,7 @@ def monocular_problem(
     return replace(
         problem_of(sequence, excluded, features, noise, kernel, found.start, found.path(sequence.n_frames), remarks),
         inverse_depth_prior=found.depths,
-        findings=(*sequence.findings, *_scale_findings(found)),
+        findings=(*sequence.findings, *intrinsics_findings(sequence), *_scale_findings(found)),
         diagnosed=pixel is None and found.window is not None,
     )
 

@@ -27,6 +27,11 @@ class FixedLagSettings:
     """s"""
     isam2: ISAM2Settings = field(default_factory=ISAM2Settings)
 
+    @classmethod
+    def of(cls, problem: Problem) -> "FixedLagSettings":
+        """Default settings for a problem: with one camera, the parallax of `isam2` for landmarks."""
+        return cls(isam2=ISAM2Settings.of(problem)) if problem.sequence.monocular else cls()
+
 
 def fixed_lag(problem: Problem, progress: Progress | None = None, settings: FixedLagSettings | None = None) -> Estimate:
     """Fixed-lag smoothing: variables that leave the window are marginalized into a linear prior.
@@ -37,7 +42,7 @@ def fixed_lag(problem: Problem, progress: Progress | None = None, settings: Fixe
     """
     with threadpool_limits(limits=1, user_api="blas"):
         posed, world_T_solver = in_solver_frame(problem)
-        return _solve(posed, progress, settings or FixedLagSettings()).transformed(world_T_solver)
+        return _solve(posed, progress, settings or FixedLagSettings.of(problem)).transformed(world_T_solver)
 
 
 def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettings) -> Estimate:

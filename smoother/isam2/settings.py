@@ -16,8 +16,8 @@ default of GTSAM, 1e-3, leaves an error of 0.1 mm in the online estimate and sav
 
 
 PARALLAX_SUFFICES = 0.2
-"""largest deviation of a landmark over its distance, with one camera. It holds for exact poses; with little parallax
-the errors of the poses exceed those of the pixels."""
+"""largest deviation of a landmark over its distance, with one camera: a parallax of five of its own sigmas. Depth is
+the inverse of parallax: the second-order term, which a linearized graph loses, is this share of the sigma."""
 ONE_CAMERA_SKIP = 1
 """updates from one relinearization to the next, with one camera: depths start far off, and the path with them"""
 

@@ -125,3 +125,10 @@ def test_too_few_tracks_are_refused_in_a_sentence(recordings: list[Sequence]) ->
     few = sequence.observations.select(sequence.observations.landmark < 4)
     with pytest.raises(InputError, match="the start of one camera is not found"):
         diagnosis.calibrated(replace(sequence, observations=few))
+
+
+def test_a_camera_far_from_the_imu_is_refused_in_a_sentence(recordings: list[Sequence]) -> None:
+    imu_T_cam = recordings[0].imu_T_cam.copy()
+    imu_T_cam[:3, 3] *= 1000.0
+    with pytest.raises(InputError, match=r"imu_T_cam places the camera .* m from the IMU, and nothing confirms that"):
+        diagnosis.calibrated(replace(recordings[0], imu_T_cam=imu_T_cam))
