@@ -67,6 +67,12 @@ ELSEWHERE = {
             ("track V1_01_easy --settings tracker.toml --out more.npz", "test_track_writes_a_recording"),
         )
     },
+    "fgbaseline track V1_01_easy --cameras left --out v1_01_left.npz": (
+        "tests/data/test_one_camera_images.py::test_cam0_alone_and_the_left_camera_of_a_pair_have_the_same_tracks"
+    ),
+    "fgbaseline run V1_01_easy --cameras left --out out/v1_01_left": (
+        "tests/reports/test_run_one_camera.py::test_scale_and_path_are_found"
+    ),
     "fgbaseline run V1_01_easy --out out/v1_01": (
         "tests/reports/test_run_images.py::test_a_folder_of_images_becomes_a_run_with_the_truth_in_it"
     ),

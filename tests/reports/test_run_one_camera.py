@@ -21,7 +21,16 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = SwayingRoom(N).write_euroc(tmp_path_factory.mktemp("images") / "room_01", n_cameras=1)
     (folder.parent / "tracker.toml").write_text("max_features = 100\n")
     result = fgbaseline(
-        "run", "room_01", "--settings", "tracker.toml", "--out", "out", cwd=folder.parent, drawing=False
+        "run",
+        "room_01",
+        "--cameras",
+        "left",
+        "--settings",
+        "tracker.toml",
+        "--out",
+        "out",
+        cwd=folder.parent,
+        drawing=False,
     )
     assert result.returncode == 0, result.stderr
     return folder.parent / "out"
