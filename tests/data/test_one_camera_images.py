@@ -149,7 +149,7 @@ def test_damaged_images_of_one_camera_are_left_out(euroc: Path) -> None:
     files = sorted((euroc / "mav0" / "cam0" / "data").iterdir())
     files[3].write_bytes(b"\x89PNG")
     found = track(euroc, ImageOptions(cameras="left"))
-    assert f"1 image of {N} cannot be read and are left out: {files[3]}." in found.recording.remarks
+    assert f"1 image of {N} cannot be read: {files[3]}; left out." in found.recording.remarks
     assert found.left_out == (3,)
 
 

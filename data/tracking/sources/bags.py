@@ -112,6 +112,8 @@ def _chosen(bag: Bag, given: tuple[str, ...], *, left_alone: bool) -> Topics:
         n = sum(name in images for name in given)
         if n not in (1, 2) or len(given) - n > 1 or given[:n] != tuple(name for name in given if name in images):
             raise InputError(f"topics: expected LEFT,RIGHT or LEFT, and IMU after them if any, got {','.join(given)}")
+        if n == 2 and given[0] == given[1]:
+            raise InputError(f"topics: left and right are both {given[0]}; give the topics of two cameras")
         return Topics(given[0], given[1] if n == 2 and not left_alone else None, given[n] if len(given) > n else None)
     if len(images) == 1 and len(imus) <= 1:
         return Topics(images[0], None, imus[0] if imus else None)

@@ -78,6 +78,7 @@ def open_euroc(folder: Path, *, left_alone: bool = False) -> ImageRecording:
         imu=None if calibration is None else read_imu(samples, calibration._replace(body_T_imu=None)),
         imu_source=shown(samples),
         truth=None if truth is None else TruthFile(truth, "imu"),
+        absent=(shown(samples),) if calibration is None else (),
         body_T_imu=body_T_imu,
         remarks=(*rig.remarks, *remarks),
     )
@@ -116,7 +117,7 @@ def _images(folder: Path) -> _Images:
     kept = [(int(row[0]), folder / "data" / row[1].strip()) for row in rows if row[1].strip() in there]
     found = _rising(np.array([stamp for stamp, _ in kept], np.int64), [file for _, file in kept], folder)
     missing = len(rows) - len(kept)
-    text = f"{shown(table)} lists {plural(missing, 'image')} that are not there: skipped."
+    text = f"{shown(table)}: {plural(missing, 'image')} of {len(rows)} not found: skipped."
     return found._replace(remarks=(text,)) if missing else found
 
 

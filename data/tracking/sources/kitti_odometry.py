@@ -42,7 +42,7 @@ def open_kitti_odometry(folder: Path, *, left_alone: bool = False) -> ImageRecor
     size = size_of(files[0][0])
     P0, P1 = _projections(folder / "calib.txt")
     alone = sum(map(len, numbered)) - len(folders) * len(common)
-    remarks = [ONE_CAMERA] if left_alone else [f"{plural(alone, 'image')} have no partner: skipped."] if alone else []
+    remarks = [ONE_CAMERA] if left_alone else [f"{plural(alone, 'image')} without a partner: skipped."] if alone else []
     cameras = rectified_cameras(P0, P1, size, np.eye(4))
     poses = _poses(folder) if len(common) == last + 1 else None  # line k is frame k
     return ImageRecording(

@@ -8,6 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.kitti import read_times
 from ...formats.named_file import shown
+from ...wording import plural
 from .camera_yaml import read_rig
 from .image_files import file_pairs, image_files, size_of
 from .image_recording import ONE_CAMERA, ImageRecording
@@ -41,7 +42,7 @@ def open_two_folders(left: Path, right: Path | None, calibration: Path | None, t
             raise InputError(
                 f"{shown(right or left)}: {len(files)} of its images have the name of one in {shown(left)}"
             )
-        remarks += (f"{alone} images have no partner of their name: skipped.",) if alone else ()
+        remarks += (f"{plural(alone, 'image')} without a partner of its name: skipped.",) if alone else ()
         t = t[kept]
     elif stamps[0] is not None and right is None:
         t, files = seconds(stamps[0]), [(file,) for file in both[0]]
