@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+PIECE = 2**16
+"""observations in a piece"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -74,6 +76,11 @@ class Observations(Displayed):
     def select(self, chosen: BoolArray | IntArray) -> "Observations":
         """Observations where `chosen` (n,) is true, or with the increasing indices `chosen`."""
         return Observations(self.frame[chosen], self.landmark[chosen], self.pixel[chosen])
+
+    def pieces(self) -> Iterator["Observations"]:
+        """Observations a few at a time, in order."""
+        for first in range(0, len(self), PIECE):
+            yield self.select(np.arange(first, min(first + PIECE, len(self))))
 
     def of_frames(self, first: int, last: int) -> "Observations":
         """Observations of the frames first to last, both included."""

@@ -14,6 +14,8 @@ from .named_file import FilePath, shown
 MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 """first bytes of ROS 1 bags, and of the two storage formats of ROS 2"""
 METADATA = "metadata.yaml"
+STORAGE = (".db3", ".mcap")
+"""ends of the files of ROS 2 bags"""
 
 
 def is_bag(path: Path) -> bool:
@@ -54,6 +56,14 @@ class Bag:
             header = getattr(message, "header", None)
             stamp = 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
             yield connection.topic, stamp or recorded, message
+
+    def last_message(self, topic: str) -> Any | None:
+        """The message of a topic that was recorded last; None without one. No other is decoded."""
+        chosen = [connection for connection in self._reader.connections if connection.topic == topic]
+        last = None
+        for connection, _, data in self._reader.messages(chosen):
+            last = data, connection.msgtype
+        return None if last is None else self._reader.deserialize(*last)
 
 
 @contextmanager

@@ -33,8 +33,8 @@ def read_bag_trajectory(path: Path, topic: str, name: str | None) -> ParsedTraje
     with open_bag_file(path) as bag:
         kind = _type(bag, topic)
         if kind == "nav_msgs/Path":
-            paths = [message.poses for _, _, message in bag.messages((topic,))]
-            poses = list(paths[-1]) if paths else []
+            path_message = bag.last_message(topic)  # each repeats those before it
+            poses = [] if path_message is None else path_message.poses
             stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in poses]
             rows = [_numbers(pose.pose) for pose in poses]
             covariances: list[FloatArray] = []

@@ -5,9 +5,10 @@ import re
 from fgbaseline.geometry import InputError
 
 TABLE = "write a line of t x y z qx qy qz qw for each pose"
+BAG = "it is a bag or a database, not one trajectory; name a topic of the bag, as in run.bag:/odom"
 KINDS = (
     (rb"\x93NUMPY", "it is a NumPy array without names; write an npz with t and world_T_body"),
-    (rb"#ROSBAG V|\x89MCAP0|SQLite format 3\0", f"it is a bag or a database, not one trajectory; {TABLE}"),
+    (rb"#ROSBAG V|\x89MCAP0|SQLite format 3\0", BAG),
     (rb"\x80[\x02-\x05]", f"it is a pickle, which is not opened, since it can run programs; {TABLE}"),
     (rb"\x89HDF|MATLAB 5\.0", f"it is a MATLAB or HDF5 file; {TABLE}"),
     (rb"\s*(\{|\[\s*[\[{\"])", f"it is JSON; {TABLE}"),

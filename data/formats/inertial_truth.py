@@ -8,6 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import IntArray
 from ..sequence import Truth
+from .bag_file import split_topic
 from .named_file import FilePath, regular_file
 from .number_table import numbers_of, read_lines
 
@@ -35,6 +36,8 @@ def with_state(truth: Truth, path: FilePath, line: IntArray) -> Truth:
     The axes of the world are those of the file, whose z axis points up. Raises InputError naming the line for what is
     no number.
     """
+    if split_topic(path) is not None:
+        return truth
     file = regular_file(path)
     with file.open("rb") as opened:
         if opened.read(2) == b"PK":

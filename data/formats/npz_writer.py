@@ -7,28 +7,32 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera
 
-from ..observations import IntArray, Observations
+from ..observations import IntArray
 from ..sequence import Sequence
 from .atomic_write import atomic_write
 from .feature_block import CHUNK, UNOBSERVED
 from .imu_arrays import imu_arrays, state_truth_arrays
 from .named_file import FilePath
 from .npz_member import write_member
-from .observation_list import observation_arrays
+from .observation_list import ObservationPieces, write_observations
 
 
-def write_npz(sequence: Sequence, path: FilePath, *, flat: bool = False, force: bool = True) -> None:
+def write_npz(
+    sequence: Sequence, path: FilePath, *, tracks: ObservationPieces | None = None, force: bool = True
+) -> None:
     """Writes a recording with its truth, all or nothing; `read` gives every array back bit by bit.
 
-    The dense feature block is made and compressed a few landmarks at a time; `flat` writes the observations as a list
-    instead, for recordings of many short tracks. Raises InputError when the file cannot be written, exists and `force`
-    is false, or a pixel coordinate is exactly -1, which in the block means 'not observed'.
+    The dense feature block is made and compressed a few landmarks at a time. `tracks`, the observations in pieces, are
+    written as a list in its place, for recordings of many short tracks. Raises InputError when the file cannot be
+    written, exists and `force` is false, or a pixel coordinate is exactly -1, which in the block means 'not observed'.
     """
-    if not flat and (sequence.observations.pixel == UNOBSERVED).any():
+    if tracks is None and (sequence.observations.pixel == UNOBSERVED).any():
         raise InputError("features: a pixel coordinate is exactly -1, which in an npz means that it was not observed")
     with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
-        _write(archive, _arrays(sequence) | (observation_arrays(sequence.observations) if flat else {}))
-        if not flat and sequence.n_landmarks:
+        _write(archive, _arrays(sequence))
+        if tracks is not None:
+            write_observations(archive, tracks)
+        elif sequence.n_landmarks:
             shape = (4, sequence.n_landmarks, sequence.n_frames)
             write_member(archive, "features", shape, _feature_chunks(sequence))
 
@@ -37,7 +41,7 @@ def write_tracks(
     path: FilePath,
     t: FloatArray,
     camera: StereoCamera,
-    observations: Observations,
+    tracks: ObservationPieces,
     imu_T_cam: FloatArray | None,
     *,
     force: bool = True,
@@ -46,11 +50,12 @@ def write_tracks(
 
     Raises InputError when the file cannot be written, or exists and `force` is false.
     """
-    arrays = {"time_stamps": t[None, :], **_calibration(camera), **observation_arrays(observations)}
+    arrays = {"time_stamps": t[None, :], **_calibration(camera)}
     if imu_T_cam is not None:
         arrays["imu_T_cam"] = imu_T_cam
     with atomic_write(path, force=force) as file, zipfile.ZipFile(file, "w") as archive:
         _write(archive, arrays)
+        write_observations(archive, tracks)
 
 
 def _write(archive: zipfile.ZipFile, arrays: dict[str, FloatArray]) -> None:

@@ -6,24 +6,38 @@
 | `observation_pixel` | (4, n) px, rows uL, vL, uR, vR |
 """
 
+import zipfile
+from collections.abc import Iterator
+from typing import Protocol
+
 import numpy as np
 
-from fgbaseline.geometry import FgbaselineError, FloatArray, InputError
+from fgbaseline.geometry import FgbaselineError, InputError
 
 from ..observations import IntArray, Observations
 from .npz_archive import NpzArchive
+from .npz_member import write_member
 
 FRAME, LANDMARK, PIXEL = "observation_frame", "observation_landmark", "observation_pixel"
 LARGEST_INDEX = 2**40
 
 
-def observation_arrays(observations: Observations) -> dict[str, FloatArray]:
-    """The arrays of observations, by their keys."""
-    return {
-        FRAME: observations.frame.astype(np.float64),
-        LANDMARK: observations.landmark.astype(np.float64),
-        PIXEL: observations.pixel.T,
-    }
+class ObservationPieces(Protocol):
+    """n observations in consecutive pieces, which need not be in memory together."""
+
+    def __len__(self) -> int: ...
+
+    def pieces(self) -> Iterator[Observations]:
+        """The pieces, in order."""
+        ...
+
+
+def write_observations(archive: zipfile.ZipFile, observations: ObservationPieces) -> None:
+    """Writes observations as a list, a piece at a time."""
+    n = len(observations)
+    write_member(archive, FRAME, (n,), (o.frame for o in observations.pieces()))
+    write_member(archive, LANDMARK, (n,), (o.landmark for o in observations.pieces()))
+    write_member(archive, PIXEL, (4, n), (o.pixel[:, row] for row in range(4) for o in observations.pieces()))
 
 
 def read_observation_list(archive: NpzArchive, T: int) -> tuple[Observations, int]:

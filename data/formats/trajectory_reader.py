@@ -6,11 +6,12 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..plural import plural
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
 from .bag_trajectory import read_bag_trajectory
 from .columns import Order
-from .named_file import FilePath, reading
+from .named_file import FilePath, reading, regular_file
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
 from .trajectory_from_text import parsed
@@ -81,10 +82,14 @@ def read_kitti(path: FilePath) -> FloatArray:
 
 def read_extrinsic(path: FilePath) -> FloatArray:
     """The pose (4, 4) of the left camera on the IMU, in one line of 12 numbers. Raises InputError."""
-    poses = read_kitti(path)
     with reading(path):
-        if len(poses) != 1:
-            raise InputError(f"expected imu_T_cam in one line of 12 numbers, got {len(poses)} lines")
+        text = regular_file(path).read_text("utf-8-sig", errors="replace")
+        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        n_words = len(lines[0].replace(",", " ").split()) if lines else 0
+        if len(lines) != 1 or n_words != 12:
+            got = plural(len(lines), "line") if len(lines) != 1 else f"a line of {n_words}"
+            raise InputError(f"expected imu_T_cam in one line of 12 numbers, got {got}")
+    poses = read_kitti(path)
     return np.asarray(poses[0], dtype=np.float64)
 
 

@@ -10,8 +10,9 @@ from typing import Literal, get_args
 
 from fgbaseline.geometry import InputError
 
-from .bag_file import split_topic
+from .bag_file import is_bag, split_topic
 from .columns import Columns, counted_columns, named_columns
+from .foreign_files import BAG
 from .named_file import FilePath, reading, regular_file, shown
 from .number_table import Lines, NumberTable, numbers_of, read_lines
 
@@ -66,6 +67,8 @@ def open_trajectory(path: FilePath, form: TrajectoryFormat | None = None, name: 
     if (in_bag := split_topic(path)) is not None:
         return TrajectoryTopic(name, *in_bag)
     with reading(path):
+        if Path(path).is_dir() and is_bag(Path(path)):
+            raise InputError(BAG)
         file = regular_file(path)
         name = name or file.stem.removesuffix(".txt")
         if form == "npz" or (form is None and _is_zip(file)):

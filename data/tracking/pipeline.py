@@ -1,11 +1,9 @@
 """Images to tracks: pairs are read, rectified and tracked one at a time."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, se3
 
@@ -24,6 +22,7 @@ from .settings import TrackerSettings
 from .sources import ImageOptions, ImageRecording, open_recording
 from .sources.image_recording import TruthFile
 from .stereo_tracker import StereoTracker
+from .track_file import TrackFile
 
 NAMED = 4
 """unreadable images that a remark names"""
@@ -39,22 +38,34 @@ class TrackedRecording:
     """rectified"""
     imu_T_cam: FloatArray
     """(4, 4) of the rectified left camera, where the recording's extrinsic is known"""
-    observations: Observations
-    n_landmarks: int
+    tracks: TrackFile
     left_out: tuple[int, ...] = ()
     """frames without a readable pair"""
 
     @property
-    def has_motion(self) -> bool:
-        """Whether there is all that a run needs."""
-        r = self.recording
-        return r.extrinsic_known and (r.velocities is not None or r.imu is not None)
+    def n_landmarks(self) -> int:
+        """Number of tracks."""
+        return self.tracks.n_landmarks
+
+    @property
+    def observations(self) -> Observations:
+        """Observations of the tracks, read from their file."""
+        return self.tracks.observations()
+
+    @property
+    def no_motion(self) -> str | None:
+        """What a run lacks, and what to add; None where it has everything."""
+        return _no_motion(self.recording)
 
     def sequence(self, truth: TruthFile | None = None) -> Sequence:
         """The recording with its motion, and the truth of a file or else its own.
 
-        Raises InputError where it has no motion, or the pose of the camera on the IMU is not known.
+        Its observations are in memory. Raises InputError where it has no motion, or the pose of the camera on the IMU
+        is not known.
         """
+        return self._sequence(truth, self.observations)
+
+    def _sequence(self, truth: TruthFile | None, observations: Observations) -> Sequence:
         r = self.recording
         _require_motion(r)
         T = len(r.t)
@@ -66,7 +77,7 @@ class TrackedRecording:
             angular_velocity=angular,
             camera=self.camera,
             imu_T_cam=self.imu_T_cam,
-            observations=self.observations,
+            observations=observations,
             n_landmarks=self.n_landmarks,
             truth=r.truth if isinstance(r.truth, Truth) else None,
             up_imu=r.up_imu,
@@ -95,11 +106,11 @@ class TrackedRecording:
 
         Raises InputError, also where the file exists and `force` is false.
         """
-        if self.has_motion:
-            write_npz(self.sequence(), path, flat=True, force=force)
+        if self.no_motion is None:
+            write_npz(self._sequence(None, Observations.none()), path, tracks=self.tracks, force=force)
         else:
             imu_T_cam = self.imu_T_cam if self.recording.extrinsic_known else None
-            write_tracks(path, self.recording.t, self.camera, self.observations, imu_T_cam, force=force)
+            write_tracks(path, self.recording.t, self.camera, self.tracks, imu_T_cam, force=force)
 
 
 def track(
@@ -139,8 +150,7 @@ def track_images(
     T = len(recording.t)
     kept: list[int] = []
     unreadable: list[str] = []
-    numbers: list[NDArray[np.int32]] = []
-    pixels: list[NDArray[np.float32]] = []
+    tracks = TrackFile()
     for k, pair in enumerate(recording.pairs()):
         if pair.left is None or pair.right is None:
             unreadable.append(pair.name)
@@ -152,53 +162,41 @@ def track_images(
         if pictures is not None:
             pictures.add(len(kept), float(recording.t[k]), left, right)
         kept.append(k)
-        numbers.append(points.number.astype(np.int32))
-        pixels.append(points.pixel.astype(np.float32))  # as OpenCV gives them
+        tracks.append(points)
         if progress is not None:
             progress(k + 1, T)
     if len(kept) < 2:
         raise InputError(f"{recording.source}: {plural(len(kept), 'pair')} of {T} can be read; check the images")
-    observations, n_landmarks = _observations(numbers, pixels)
+    if tracks.n_landmarks == 0:
+        raise InputError(
+            f"{recording.source}: no point is tracked from one pair to the next; check that left and right are not "
+            "exchanged and that the calibration is that of these images"
+        )
     is_kept = np.zeros(T, dtype=np.bool_)
     is_kept[kept] = True
     left_out = tuple(np.flatnonzero(~is_kept).tolist())
     recording = _of_frames(recording, is_kept)
     if unreadable:
         names = ", ".join(unreadable[:NAMED]) + (" and more" if len(unreadable) > NAMED else "")
-        text = f"{plural(len(unreadable), 'pair')} of {T} cannot be read and are left out: {names}."
+        text = f"{plural(len(unreadable), 'pair')} of {T} cannot be read: {names}; left out."
         recording = replace(recording, remarks=(*recording.remarks, text))
-    return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, observations, n_landmarks, left_out)
-
-
-def _observations(numbers: list[NDArray[np.int32]], pixels: list[NDArray[np.float32]]) -> tuple[Observations, int]:
-    """Observations of the tracks with two or more, and the number of these tracks; empties both lists.
-
-    `numbers` has the tracks of each frame, rising, and `pixels` (n, 4) their points. A long recording has gigabytes of
-    them: they are copied once, frame by frame.
-    """
-    each = np.array([len(number) for number in numbers])
-    number = np.concatenate(numbers)
-    numbers.clear()
-    is_track = np.bincount(number, minlength=1) > 1  # what is seen once says nothing of the motion
-    chosen = is_track[number]
-    landmark = (np.cumsum(is_track) - 1)[number[chosen]]
-    frame = np.repeat(np.arange(len(each)), each)[chosen]
-    pixel, starts = np.empty((len(frame), 4)), np.concatenate([[0], np.cumsum(each)])
-    pixels.reverse()
-    done = 0
-    for first, last in pairwise(starts.tolist()):
-        points = pixels.pop()[chosen[first:last]]
-        pixel[done : done + len(points)] = points
-        done += len(points)
-    return Observations(frame, landmark, pixel), int(is_track.sum())
+    return TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, tracks, left_out)
 
 
 def _require_motion(r: ImageRecording) -> None:
     """Raises InputError where a recording has no motion, or the pose of the camera on the IMU is not known."""
+    if (why := _no_motion(r)) is not None:
+        raise InputError(f"{r.source}: {why}")
+
+
+def _no_motion(r: ImageRecording) -> str | None:
+    """What a run lacks, and what to add; None where it has everything."""
+    absent = f"{', '.join(r.absent)} missing: " if r.absent else ""
     if r.velocities is None and r.imu is None:
-        raise InputError(f"{r.source}: it has images and no motion; add --imu CSV or --velocities CSV")
+        return f"{absent}it has images and no motion; add --imu CSV or --velocities CSV"
     if not r.extrinsic_known:
-        raise InputError(f"{r.source}: the pose of its left camera on the IMU is not known; add --extrinsic FILE")
+        return f"{absent}the pose of its left camera on the IMU is not known; add --extrinsic FILE"
+    return None
 
 
 def _require_size(left: Image, right: Image, recording: ImageRecording, name: str) -> None:

@@ -71,7 +71,9 @@ class Rectified(NamedTuple):
 def rectify(left: CameraModel, right: CameraModel) -> Rectified:
     """Rectification of a pair (Bouguet's, `cv2.stereoRectify`). Raises InputError for what is no stereo pair.
 
-    A pair without distortion, with equal cameras displaced along x only, is used as it is.
+    A pair without distortion, with equal cameras displaced along x only, is used as it is. A pair of fisheye cameras
+    keeps its focal length, so that the image's middle keeps its resolution; what a pinhole camera of this focal length
+    and size does not see is left out.
     """
     if left.size != right.size:
         raise InputError(f"images: the left camera has {left.size} px, the right one {right.size}; they must be equal")
@@ -91,9 +93,8 @@ def rectify(left: CameraModel, right: CameraModel) -> Rectified:
     cv2, R, t = opencv(), right_T_left[:3, :3].copy(), right_T_left[:3, 3:].copy()
     D = [np.array(model.coefficients) for model in (left, right)]
     if left.distortion is Distortion.EQUIDISTANT:
-        R1, R2, P1, P2, _ = cv2.fisheye.stereoRectify(
-            left.K, D[0], right.K, D[1], left.size, R, t, flags=cv2.CALIB_ZERO_DISPARITY
-        )
+        R1, R2, *_ = cv2.fisheye.stereoRectify(left.K, D[0], right.K, D[1], left.size, R, t, flags=0)
+        P1 = P2 = _centered(float(np.mean([left.intrinsics[:2], right.intrinsics[:2]])), left.size)
         init = cv2.fisheye.initUndistortRectifyMap
     else:
         R1, R2, P1, P2, *_ = cv2.stereoRectify(
@@ -104,16 +105,21 @@ def rectify(left: CameraModel, right: CameraModel) -> Rectified:
         init(model.K, d, turn, projection, model.size, cv2.CV_16SC2)
         for model, d, turn, projection in zip((left, right), D, (R1, R2), (P1, P2), strict=True)
     )
-    camera = StereoCamera(
-        float(P1[0, 0]), float(P1[1, 1]), float(P1[0, 2]), float(P1[1, 2]), float(-P2[0, 3] / P2[0, 0])
-    )
+    camera = StereoCamera(float(P1[0, 0]), float(P1[1, 1]), float(P1[0, 2]), float(P1[1, 2]), baseline)
     turn = np.eye(4)
     turn[:3, :3] = R1.T
     return Rectified(camera, left.imu_T_cam @ turn, maps)
+
+
+def _centered(focal_length: float, size: tuple[int, int]) -> FloatArray:
+    """Camera matrix (3, 3) with the principal point in the middle of the image."""
+    width, height = size
+    return np.array([[focal_length, 0.0, (width - 1) / 2], [0.0, focal_length, (height - 1) / 2], [0.0, 0.0, 1.0]])
 
 
 def _is_rectified(left: CameraModel, right: CameraModel, right_T_left: FloatArray, baseline: float) -> bool:
     turned = np.linalg.norm(se3.log(right_T_left)[3:])
     off_axis = np.linalg.norm(right_T_left[1:3, 3]) / baseline
     equal = left.intrinsics == right.intrinsics and not any(left.coefficients) and not any(right.coefficients)
+    equal &= left.distortion is not Distortion.EQUIDISTANT  # which maps angles also where its coefficients are 0
     return bool(equal and turned < ALIGNED and off_axis < ALIGNED)

@@ -89,7 +89,7 @@ def run(
     with atomic_folder(place, force=force, mark=MARK) as folder:
         summary = write_run(solved, folder, cores(), pictures)
         if pictures.size is not None:
-            write_npz(sequence, folder / TRACKS, flat=True)
+            write_npz(sequence, folder / TRACKS, tracks=sequence.observations)
         if rerun_file is not None:
             from .rerun import write_rerun
 

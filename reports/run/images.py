@@ -59,18 +59,19 @@ def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path 
     """Tracks the images in `source` and writes `out`; prints what was found. Raises InputError."""
     if not has_images(source):
         raise InputError(f"{shown(source)}: this is no folder of images and no bag; check the path")
+    if out.suffix != ".npz":
+        raise InputError(f"{shown(out)}: tracks are written as .npz; give a name that ends with it")
     require_new(out, force=force)
     found = tracked(source, options, settings)
     found.write(out, force=force)
-    o, T = found.observations, len(found.recording.t)
+    n, T = len(found.tracks), len(found.recording.t)
     for remark in found.recording.remarks:
         click.echo(remark)
     click.echo(
         f"{found.recording.name}: {plural(T, 'frame')}, {plural(found.n_landmarks, 'track')}, "
-        f"{len(o) / T:.0f} observations a frame, {len(o) / max(found.n_landmarks, 1):.1f} frames a track"
+        f"{n / T:.0f} observations a frame, {n / max(found.n_landmarks, 1):.1f} frames a track"
     )
-    if not found.has_motion:
-        click.echo("It has no motion of an IMU: fgbaseline run needs --imu or --velocities, and --extrinsic where the "
-                   "pose of the camera on the IMU is not known.")  # fmt: skip
+    if found.no_motion is not None:
+        click.echo(f"fgbaseline run cannot use them as they are: {found.no_motion}.")
     click.echo(f"The tracks are in {out}")
     return 0

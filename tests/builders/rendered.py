@@ -168,14 +168,14 @@ distortion_coefficients: [0.0, 0.0, 0.0, 0.0]
 """
 
 
-def camchain_yaml(shift: float = 0.0, *, imu: bool = True) -> str:
+def camchain_yaml(shift: float = 0.0, *, imu: bool = True, model: str = "radtan") -> str:
     """Kalibr's chain of the rig."""
     left = f"  T_cam_imu: {se3.inverse(IMU_T_CAM).tolist()}\n  timeshift_cam_imu: {shift}\n" if imu else ""
     right = np.eye(4)
     right[0, 3] = -CAMERA.baseline
     camera = f"""  camera_model: pinhole
   distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
-  distortion_model: equidistant
+  distortion_model: {model}
   intrinsics: [{CAMERA.fu}, {CAMERA.fv}, {CAMERA.cu}, {CAMERA.cv}]
   resolution: [{WIDTH}, {HEIGHT}]
 """

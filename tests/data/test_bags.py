@@ -7,12 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from fgbaseline.data.formats import read_trajectory, write_tum
 from fgbaseline.data.formats.bag_file import is_bag
+from fgbaseline.data.formats.bag_trajectory import read_bag_trajectory
 from fgbaseline.data.tracking import ImageOptions, track
 from fgbaseline.data.tracking.sources import open_recording
+from fgbaseline.data.tracking.sources.image_recording import TruthFile
 from fgbaseline.geometry import FloatArray, InputError, so3
+from fgbaseline.reports.cli.main import group
 
 from ..builders.rendered import IMU_YAML, Room, camchain_yaml
 
@@ -184,8 +188,14 @@ def test_topics_are_given_where_types_leave_them_open(room: Room, tmp_path: Path
         open_recording(bag.path, options)
     recording = open_recording(bag.path, ImageOptions(calibration=calibration(tmp_path), topics=("/a", "/c")))
     assert "Topics: /a, /c." in recording.remarks
-    with pytest.raises(InputError, match="/d is no topic of images"):
-        open_recording(bag.path, ImageOptions(calibration=calibration(tmp_path), topics=("/a", "/d")))
+    for topics, sentence in (
+        (("/a", "/d"), "/d is no topic of images"),
+        (("/a", "/c", "/b"), "/b is no topic of inertial samples; it has /a"),
+        (("/a", "/a"), "left and right are both /a"),
+        (("/a",), "expected LEFT,RIGHT or LEFT,RIGHT,IMU, got 1 topic"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            open_recording(bag.path, ImageOptions(calibration=calibration(tmp_path), topics=topics))
     with pytest.raises(InputError, match="needs the calibration of its cameras"):
         open_recording(bag.path)
 
@@ -201,6 +211,50 @@ def test_trajectories_of_a_bag(kind: str, topic: str, room: Room, tmp_path: Path
     assert found.name == topic.strip("/").replace("/", "-")
     np.testing.assert_array_equal(found.t, np.array([stamp / 10**9 for stamp in room.stamps]))
     np.testing.assert_allclose(found.world_T_body, room.world_T_imu, atol=1e-12)
+    covariance = read_bag_trajectory(bag.path, topic, None).covariance()
+    assert (covariance is not None) == (topic in ("/odom", "/covariant"))
+    if covariance is not None:  # of x, y, z and rotations about them, in the axes that the first pose shares
+        np.testing.assert_allclose(covariance[0], np.diag([1.0, 2.0, 3.0, 0.1, 0.2, 0.3]), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_truth_may_be_a_topic_of_a_bag(kind: str, room: Room, tmp_path: Path) -> None:
+    bag = BagWriter(kind, tmp_path)
+    with bag.writer:
+        bag.trajectory(room.stamps, room.world_T_imu)
+    sequence = track(room.write_euroc(tmp_path / "room")).sequence(TruthFile(Path(f"{bag.path}:/odom"), "imu"))
+    assert sequence.truth is not None
+    assert sequence.truth.source.endswith(":/odom")
+    np.testing.assert_allclose(sequence.truth.world_T_imu, room.world_T_imu, atol=1e-9)
+
+
+def test_topics_of_a_bag_are_compared(room: Room, tmp_path: Path) -> None:
+    bag = BagWriter("mcap", tmp_path)
+    with bag.writer:
+        bag.trajectory(room.stamps, room.world_T_imu)
+    topics = [f"{bag.path}:{topic}" for topic in ("/pose", "/odom", "/covariant", "/vicon/body", "/path")]
+    result = CliRunner().invoke(group, ["compare", *topics, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    for name in ("odom", "covariant", "vicon-body", "path"):
+        assert name in result.output
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bag_in_place_of_a_trajectory_is_refused_with_what_to_name(kind: str, room: Room, tmp_path: Path) -> None:
+    bag = BagWriter(kind, tmp_path)
+    with bag.writer:
+        bag.trajectory(room.stamps, room.world_T_imu)
+    with pytest.raises(InputError, match=r"not one trajectory; name a topic of the bag, as in run.bag:/odom"):
+        read_trajectory(bag.path)
+
+
+def test_a_ros_2_bag_without_its_description_is_refused_with_what_is_missing(room: Room, tmp_path: Path) -> None:
+    path = stereo_bag("mcap", tmp_path, room)
+    (path / "metadata.yaml").unlink()
+    options = ImageOptions(calibration=calibration(tmp_path))
+    with pytest.raises(InputError, match=r"metadata.yaml is missing.*give run.mcap itself"):
+        open_recording(path, options)
+    assert len(open_recording(path / "run.mcap", options).t) == N
 
 
 def test_a_topic_without_poses_is_refused_with_those_that_have_them(room: Room, tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def tum_vi(euroc: Path, shift: float = 0.0) -> Path:
     for i in (0, 1):
         (euroc / "mav0" / f"cam{i}" / "sensor.yaml").unlink()
     (euroc / "dso").mkdir()
-    (euroc / "dso" / "camchain.yaml").write_text(camchain_yaml(shift))
+    (euroc / "dso" / "camchain.yaml").write_text(camchain_yaml(shift, model="equidistant"))
     (euroc / "mav0" / "state_groundtruth_estimate0").rename(euroc / "mav0" / "mocap0")
     return euroc
 
@@ -224,9 +224,9 @@ def test_damaged_and_missing_images_are_counted_and_named(euroc: Path, room: Roo
     right[3].unlink()
     found = track(euroc)
     remarks = " ".join(found.recording.remarks)
-    assert f"1 pair of {N - 1} cannot be read and are left out: {left[1]}" in remarks
-    assert "1 image that are not there" in remarks
-    assert "have no partner: skipped" in remarks
+    assert f"1 pair of {N - 1} cannot be read: {left[1]}; left out." in remarks
+    assert f"cam1/data.csv: 1 image of {N} not found: skipped." in remarks
+    assert "1 image without a partner: skipped (6 on the left, 5 on the right)." in remarks
     kept = [0, 2, 4, 5]
     np.testing.assert_allclose(found.recording.t, np.array(room.stamps)[kept] / 1e9, atol=1e-6)
     truth = found.sequence().truth
@@ -252,7 +252,7 @@ def test_up_is_that_of_the_first_frame_that_can_be_read(euroc: Path, room: Room)
         ("cam1", "the folder cam1 is missing"),
         ("cam0/sensor.yaml", r"cam0/sensor.yaml: the file is missing; add it, or Kalibr's camchain.yaml"),
         ("cam1/data", "cam1/data: it cannot be read"),
-        ("imu0", "images and no motion; add --imu"),
+        ("imu0", r"imu0/data.csv missing: it has images and no motion; add --imu"),
     ],
 )
 def test_what_is_almost_euroc_is_refused_with_what_is_missing(euroc: Path, missing: str, sentence: str) -> None:
@@ -268,6 +268,54 @@ def test_what_is_almost_kitti_is_refused_with_what_is_missing(euroc: Path, tmp_p
     shutil.rmtree(place) if place.is_dir() else place.unlink()
     with pytest.raises(InputError, match=f"{missing} is missing"):
         open_recording(tmp_path / "06")
+
+
+def test_the_color_images_of_kitti_are_refused_with_what_is_missing(euroc: Path, tmp_path: Path) -> None:
+    folder = kitti_odometry(euroc, tmp_path / "06")
+    for i in (0, 1):
+        (folder / f"image_{i}").rename(folder / f"image_{i + 2}")
+    with pytest.raises(InputError, match="image_0 is missing; a KITTI odometry folder has"):
+        open_recording(folder)
+
+
+@pytest.mark.parametrize(
+    ("missing", "sentence"),
+    [
+        ("2011_09_26_drive_0002_sync/oxts", r"oxts/data missing: it has images and no motion; add --imu"),
+        ("calib_imu_to_velo.txt", r"calib_imu_to_velo.txt missing: it has images and no motion; add --imu"),
+    ],
+)
+def test_the_motion_of_a_kitti_drive_is_refused_with_what_is_missing(
+    recordings: Callable[[str], Path], tmp_path: Path, missing: str, sentence: str
+) -> None:
+    day = recordings("kitti_images/raw_2011_09_26_drive_0002/2011_09_26/calib_cam_to_cam.txt").parent
+    folder = Path(shutil.copytree(day, tmp_path / day.name))
+    shutil.rmtree(folder / missing) if (folder / missing).is_dir() else (folder / missing).unlink()
+    with pytest.raises(InputError, match=sentence):
+        opened_images(folder, ImageOptions(), motion=True)
+
+
+@pytest.mark.parametrize(("text", "got"), [("1 2 3", "a line of 3"), ("", "0 lines"), ("1\n2\n", "2 lines")])
+def test_an_extrinsic_that_is_none_is_refused(euroc: Path, tmp_path: Path, text: str, got: str) -> None:
+    file = tmp_path / "imu_T_cam.txt"
+    file.write_text(text)
+    with pytest.raises(InputError, match=f"imu_T_cam.txt: expected imu_T_cam in one line of 12 numbers, got {got}"):
+        open_recording(euroc, ImageOptions(extrinsic=file))
+
+
+def test_exchanged_cameras_are_refused(euroc: Path, tmp_path: Path) -> None:
+    """The images do, the calibration does not: no point has a positive disparity."""
+    cameras = [euroc / "mav0" / f"cam{i}" / "data" for i in (0, 1)]
+    for source, target in ((cameras[0], tmp_path / "x"), (cameras[1], cameras[0]), (tmp_path / "x", cameras[1])):
+        source.rename(target)
+    with pytest.raises(InputError, match="no point is tracked from one pair to the next; check that left and right"):
+        track(euroc)
+
+
+def test_tracks_are_written_as_npz(euroc: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(group, ["track", str(euroc), "--out", str(tmp_path / "tracks.txt")])
+    assert isinstance(result.exception, InputError)
+    assert "tracks are written as .npz" in str(result.exception)
 
 
 def test_a_calibration_of_other_images_is_refused(euroc: Path) -> None:

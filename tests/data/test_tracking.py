@@ -1,7 +1,10 @@
 """The stereo front end on rendered images, whose true tracks are known, and on real ones."""
 
 import json
+import tempfile
+import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,9 +12,12 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Observations, Sequence
+from fgbaseline.data.formats.npz_writer import write_tracks
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
+from fgbaseline.data.tracking.rig import CameraModel, Distortion, rectify
+from fgbaseline.data.tracking.track_file import TrackFile
 from fgbaseline.diagnosis import diagnose, track_statistics
-from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, InputError, StereoCamera, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import measured_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
@@ -164,6 +170,112 @@ def test_pictures_are_thinned_evenly_to_their_size(images: list[tuple[FloatArray
     assert {k: pair.left for k, pair in some.by_frame(t[2:]).items()} == {k - 2: whole.pairs[k].left for k in (4, 8)}
 
 
+TUM_VI = (
+    CameraModel(
+        (190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504),
+        Distortion.EQUIDISTANT,
+        (0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182),
+        (512, 512),
+        np.eye(4),
+    ),
+    CameraModel(
+        (190.44236969414825, 190.4344384721956, 252.59949716835982, 254.91723064636983),
+        Distortion.EQUIDISTANT,
+        (0.0034003170790442797, 0.001766278153469831, -0.00266312569781606, 0.0003299517423931039),
+        (512, 512),
+        se3.exp([0.10106343, 0.00194620, 0.00101536, -0.04691, 0.000677, -0.000809]),
+    ),
+)
+"""the calibration that TUM-VI publishes for its images of 512 x 512 px; poses on the left camera"""
+
+
+def kannala_brandt(model: CameraModel, points: FloatArray) -> FloatArray:
+    """Pixels (n, 2) of points (n, 3) in the camera's frame: r = theta (1 + k1 theta^2 + ... + k4 theta^8)."""
+    radius = np.hypot(points[:, 0], points[:, 1])
+    theta = np.arctan2(radius, points[:, 2])
+    distorted = theta * (1.0 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(model.coefficients)))
+    fu, fv, cu, cv = model.intrinsics
+    return points[:, :2] / radius[:, None] * distorted[:, None] * [fu, fv] + [cu, cv]
+
+
+@pytest.mark.parametrize("coefficients", ["published", "zero"])
+def test_a_rectified_fisheye_pair_sees_the_same_points_in_one_row(coefficients: str) -> None:
+    """At each rectified pixel lies the pixel of the raw image that sees the same point; the middle stays as sharp."""
+    left, right = (
+        model if coefficients == "published" else replace(model, coefficients=(0.0, 0.0, 0.0, 0.0)) for model in TUM_VI
+    )
+    rectified = rectify(left, right)
+    camera, maps = rectified.camera, rectified.maps
+    assert maps is not None
+    assert abs(camera.fu - left.intrinsics[0]) < 1.0
+    random = np.random.default_rng(0)
+    uv, disparity = random.integers(60, 450, (200, 2)), random.integers(1, 40, 200)
+    points = camera.triangulate(np.column_stack([uv, uv - np.column_stack([disparity, 0 * disparity])]).astype(float))
+    on_imu = se3.transform(rectified.imu_T_cam, points)
+    for model, (whole, part), u in ((left, maps[0], uv[:, 0]), (right, maps[1], uv[:, 0] - disparity)):
+        raw = kannala_brandt(model, se3.transform(se3.inverse(model.imu_T_cam), on_imu))
+        inside = ((raw > 1.0) & (raw < 510.0)).all(axis=1)
+        assert inside.mean() > 0.9
+        v, u = uv[inside, 1], u[inside]
+        mapped = whole[v, u] + np.column_stack(np.divmod(part[v, u], 32)[::-1]) / 32.0  # OpenCV's fixed point
+        np.testing.assert_allclose(mapped, raw[inside], atol=0.05)
+
+
+def kept_tracks(n_frames: int, per_frame: int, seed: int = 0) -> tuple[TrackFile, list[Tracks]]:
+    """Tracks of random lengths, a tenth of them of one frame."""
+    random, file, frames = np.random.default_rng(seed), TrackFile(), []
+    number, following = np.arange(per_frame), per_frame
+    for _ in range(n_frames):
+        frames.append(Tracks(number, random.uniform(0.0, 700.0, (per_frame, 4)).astype(np.float32).astype(np.float64)))
+        file.append(frames[-1])
+        ends = random.random(per_frame) < 0.1
+        number = np.concatenate([number[~ends], np.arange(following, following + ends.sum())])
+        following += int(ends.sum())
+    return file, frames
+
+
+def test_tracks_on_disk_are_those_with_two_or_more_observations_in_order() -> None:
+    file, frames = kept_tracks(600, 5)
+    number, counts = np.unique(np.concatenate([tracks.number for tracks in frames]), return_counts=True)
+    lasting = number[counts > 1]
+    assert len(lasting) < len(number)
+    whole, pieces = file.observations(), list(file.pieces())
+    assert len(pieces) > 1
+    assert file.n_landmarks == len(lasting)
+    assert len(file) == len(whole) == counts[counts > 1].sum()
+    for name in ("frame", "landmark", "pixel"):
+        np.testing.assert_array_equal(np.concatenate([getattr(o, name) for o in pieces]), getattr(whole, name))
+    expected = [
+        (k, int(np.searchsorted(lasting, n)), *pixel)
+        for k, tracks in enumerate(frames)
+        for n, pixel in zip(tracks.number.tolist(), tracks.pixel.tolist(), strict=True)
+        if n in set(lasting.tolist())
+    ]
+    np.testing.assert_array_equal(np.column_stack([whole.frame, whole.landmark, whole.pixel]), expected)
+
+
+def test_memory_of_the_tracks_does_not_grow_with_the_observations(tmp_path: Path) -> None:
+    peaks = []
+    for n_frames in (500, 2000):
+        tracemalloc.start()
+        file, frames = TrackFile(), kept_tracks(2, 400)[1]
+        for _ in range(n_frames // 2):
+            for tracks in frames:
+                file.append(tracks)
+        camera = StereoCamera(450.0, 450.0, 320.0, 240.0, 0.12)
+        write_tracks(tmp_path / f"{n_frames}.npz", np.arange(float(n_frames)), camera, file, None)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert len(file) == n_frames * 400
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_a_full_disk_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda: open("/dev/full", "wb"))  # noqa: SIM115, PTH123
+    with pytest.raises(InputError, match=r"the tracks cannot be kept there .*No space left.*TMPDIR"):
+        kept_tracks(1, 5)
+
+
 def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     """150 observations a frame, 7 frames a track, residuals to the true poses below 0.8 px in the median.
 
@@ -193,7 +305,6 @@ def test_euroc_pairs_a_second_apart(recordings: Callable[[str], Path]) -> None:
     """|vL - vR| within 0.5 px in the median, and 100 matches in nine of ten pairs."""
     import cv2
 
-    from fgbaseline.data.tracking.rig import rectify
     from fgbaseline.data.tracking.sources.camera_yaml import read_sensor_yaml
 
     folder = recordings("euroc/V1_01_keyframes/calibration.json").parent

@@ -14,6 +14,7 @@ from ...formats.imu_samples import RawSamples, imu_samples
 from ...formats.imu_yaml import assumed_calibration, read_imu_calibration
 from ...formats.named_file import shown
 from ...observations import IntArray
+from ...plural import plural
 from .camera_yaml import read_rig
 from .image_files import EightBits, Raw, decoded
 from .image_recording import ImagePair, ImageRecording
@@ -94,10 +95,14 @@ def _chosen(bag: Bag, given: tuple[str, ...]) -> Topics:
     listed = ", ".join(f"{name} ({kind})" for name, kind in types.items() if kind in (*IMAGES, IMU)) or "none"
     if given:
         if len(given) not in (2, 3):
-            raise InputError(f"topics: expected LEFT,RIGHT or LEFT,RIGHT,IMU, got {len(given)} topics")
-        wrong = next((name for name in given if name not in (*images, *imus)), None)
-        if wrong is not None:
-            raise InputError(f"{bag.source}: {wrong} is no topic of images or inertial samples; it has {listed}")
+            raise InputError(f"topics: expected LEFT,RIGHT or LEFT,RIGHT,IMU, got {plural(len(given), 'topic')}")
+        for name, what, fitting in zip(
+            given, ("images", "images", "inertial samples"), (images, images, imus), strict=False
+        ):
+            if name not in fitting:
+                raise InputError(f"{bag.source}: {name} is no topic of {what}; it has {listed}")
+        if given[0] == given[1]:
+            raise InputError(f"topics: left and right are both {given[0]}; give the topics of two cameras")
         return Topics(given[0], given[1], given[2] if len(given) == 3 else None)
     pairs = [(a, b) for a, b in combinations(images, 2) if any(_same_but(a, b, *sides) for sides in SIDES)]
     if len(images) == 2:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fgbaseline.geometry import InputError, se3
 
-from ...formats.bag_file import is_bag
+from ...formats.bag_file import METADATA, STORAGE, is_bag
 from ...formats.imu_attachment import read_imu
 from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
 from ...formats.named_file import shown
@@ -62,12 +62,16 @@ def _open(path: Path, options: ImageOptions) -> ImageRecording:
         raise InputError(f"{shown(path)}: there is no such folder of images or bag; {FORMS}")
     if options.right is not None:
         return open_two_folders(path, options.right, options.calibration, options.times)
+    if not (path / METADATA).exists() and (stored := next((f for f in path.iterdir() if f.suffix in STORAGE), None)):
+        raise InputError(
+            f"{shown(path / METADATA)} is missing, the description of a ROS 2 bag; give {stored.name} itself"
+        )
     for name in ("calibration", "times"):
         if getattr(options, name) is not None:
             raise InputError(f"{name}: it belongs to two folders of images; add --right FOLDER")
     if any((path / name).is_dir() for name in ("mav0", "cam0", "cam1")):
         return open_euroc(path)
-    if any((path / name).is_dir() for name in ("image_0", "image_1")):
+    if any((path / name).is_dir() for name in ("image_0", "image_1")) or (path / "calib.txt").is_file():
         return open_kitti_odometry(path)
     inside = [folder.name for folder in path.iterdir() if folder.is_dir()]
     if {"image_00", "image_01"} & set(inside) or any("_drive_" in name for name in inside):

@@ -57,6 +57,7 @@ def open_euroc(folder: Path) -> ImageRecording:
         imu=None if calibration is None else read_imu(samples, calibration._replace(body_T_imu=None)),
         imu_source=shown(samples),
         truth=None if truth is None else TruthFile(truth, "imu"),
+        absent=(shown(samples),) if calibration is None else (),
         body_T_imu=body_T_imu,
         remarks=(*rig.remarks, *remarks[0], *remarks[1], *paired.remarks),
     )
@@ -95,7 +96,7 @@ def _images(folder: Path) -> tuple[IntArray, list[Path], tuple[str, ...]]:
     kept = [(int(row[0]), folder / "data" / row[1].strip()) for row in rows if row[1].strip() in there]
     stamps, files, _ = _rising(np.array([stamp for stamp, _ in kept], np.int64), [file for _, file in kept], folder)
     missing = len(rows) - len(kept)
-    text = f"{shown(table)} lists {plural(missing, 'image')} that are not there: skipped."
+    text = f"{shown(table)}: {plural(missing, 'image')} of {len(rows)} not found: skipped."
     return stamps, files, (text,) if missing else ()
 
 

@@ -41,7 +41,7 @@ def open_kitti_odometry(folder: Path) -> ImageRecording:
     size = size_of(files[0][0])
     P0, P1 = _projections(folder / "calib.txt")
     alone = len(left) + len(right) - 2 * len(common)
-    remarks = [f"{plural(alone, 'image')} have no partner: skipped."] if alone else []
+    remarks = [f"{plural(alone, 'image')} without a partner: skipped."] if alone else []
     cameras = rectified_cameras(P0, P1, size, np.eye(4))
     poses = _poses(folder) if len(common) == last + 1 else None  # line k is frame k
     return ImageRecording(

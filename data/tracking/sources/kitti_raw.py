@@ -55,7 +55,7 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
     if len(frames) < 2:
         raise InputError(f"{shown(drive)}: {plural(len(frames), 'pair')} of images; a recording needs at least 2")
     alone = len(left) + len(right) - 2 * len(frames)
-    remarks = [f"{plural(alone, 'image')} have no partner or stamp: skipped."] if alone else []
+    remarks = [f"{plural(alone, 'image')} without a partner or stamp: skipped."] if alone else []
     files = [(left[k], right[k]) for k in frames.tolist()]
     values = _values(calibration / CALIBRATIONS[0])
     P0, P1 = (_matrix(values, f"P_rect_0{i}", 4, calibration / CALIBRATIONS[0]) for i in (0, 1))
@@ -63,6 +63,7 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
     cameras = rectified_cameras(P0, P1, size_of(files[0][0]), np.eye(4) if imu_T_cam is None else imu_T_cam)
     oxts = _oxts(drive / "oxts" / "data", frames)
     motion = None if oxts is None or imu_T_cam is None else _motion(oxts)
+    files_of_motion = [drive / "oxts" / "data", *(calibration / name for name in CALIBRATIONS)]
     if motion is not None and (drive / "oxts" / "timestamps.txt").is_file():
         recorded = _stamps(drive / "oxts" / "timestamps.txt")
         if len(recorded) <= frames[-1]:
@@ -82,6 +83,7 @@ def open_kitti_raw(folder: Path) -> ImageRecording:
         velocities=None if motion is None else motion[:2],
         up_imu=None if motion is None else motion[2][0, 2, :3] / np.linalg.norm(motion[2][0, 2, :3]),
         truth=None if motion is None else Truth.from_any_world(motion[2], source="oxts"),
+        absent=tuple(shown(path) for path in files_of_motion if not path.exists()),
         remarks=tuple(remarks),
     )
 

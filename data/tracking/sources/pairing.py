@@ -50,9 +50,7 @@ def pair(left: IntArray, right: IntArray, source: str) -> Paired:
             "their stamps have to agree within a tenth of the interval between frames"
         )
     alone = len(left) + len(right) - 2 * len(a)
-    text = (
-        f"{plural(alone, 'image')} of {len(left)} on the left and {len(right)} on the right have no partner: skipped."
-    )
+    text = f"{plural(alone, 'image')} without a partner: skipped ({len(left)} on the left, {len(right)} on the right)."
     return Paired(left[a], a, b, (text,) if alone else ())
 
 

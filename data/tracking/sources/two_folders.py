@@ -6,6 +6,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ...formats.kitti import read_times
 from ...formats.named_file import shown
+from ...plural import plural
 from .camera_yaml import read_rig
 from .image_files import file_pairs, image_files, size_of
 from .image_recording import ImageRecording
@@ -34,7 +35,7 @@ def open_two_folders(left: Path, right: Path, calibration: Path | None, times: P
         alone = len(both[0]) + len(both[1]) - 2 * len(files)
         if len(files) < 2:
             raise InputError(f"{shown(right)}: {len(files)} of its images have the name of one in {shown(left)}")
-        remarks = (f"{alone} images have no partner of their name: skipped.",) if alone else ()
+        remarks = (f"{plural(alone, 'image')} without a partner of its name: skipped.",) if alone else ()
         t = t[kept]
     elif stamps[0] is not None and stamps[1] is not None:
         paired = pair(stamps[0], stamps[1], shown(left))
