@@ -171,7 +171,13 @@ def _pixel_noise(tracks: KeyframeTracks, solution: Solution) -> float:
 
 
 def _depths(tracks: KeyframeTracks, pose: FloatArray) -> InverseDepthPrior:
-    """Median inverse depth; the nearest points are within two sigma, and infinity within one."""
+    """Median inverse depth; the nearest points are within two sigma, and infinity within one.
+
+    Raises ValueError where no track has a point.
+    """
     inverse = first_inverse_depths(tracks, pose, window_points(tracks, pose))
-    median, near = np.percentile(np.maximum(inverse[np.isfinite(inverse)], 0.0), [50.0, NEAR])
+    known = inverse[np.isfinite(inverse)]
+    if len(known) == 0:
+        raise ValueError("its path leaves no track a point")
+    median, near = np.percentile(np.maximum(known, 0.0), [50.0, NEAR])
     return InverseDepthPrior(float(median), float(max(median, 0.5 * (near - median))))

@@ -97,6 +97,6 @@ def test_estimators_with_the_same_map_of_the_image_are_side_by_side() -> None:
     shown = figure.axes[1].images[0].get_array()
     assert shown is not None
     for row, vertical in enumerate(("top", "middle", "bottom")):
-        for column, horizontal in enumerate(("left", "middle", "right")):
+        for column, horizontal in enumerate(("left", "center", "right")):
             expected = regions.get(f"{vertical} {horizontal}")
             assert (shown[row, column] == pytest.approx(expected)) if expected is not None else shown.mask[row, column]
