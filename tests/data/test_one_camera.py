@@ -39,7 +39,7 @@ def test_one_camera_is_the_left_one_of_the_simulated_pair() -> None:
 @pytest.mark.parametrize("flat", [False, True])
 def test_it_is_written_without_a_baseline_and_read_back(tmp_path: Path, flat: bool) -> None:
     sequence = recording()
-    data.write_npz(sequence, tmp_path / "one.npz", flat=flat)
+    data.write_npz(sequence, tmp_path / "one.npz", tracks=sequence.observations if flat else None)
     with np.load(tmp_path / "one.npz") as stored:
         assert "b" not in stored.files
     back = data.read(tmp_path / "one.npz")
