@@ -44,17 +44,21 @@ def usual_rig(sequence: Sequence) -> Sequence:
     return replace(sequence, camera=replace(sequence.stereo_camera, baseline=b * factor), imu_T_cam=imu_T_cam)
 
 
+def camera_distance(sequence: Sequence) -> float:
+    """Distance of the left camera from the IMU by imu_T_cam, m."""
+    return float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
+
+
 def is_far(sequence: Sequence) -> bool:
     """Whether imu_T_cam places the camera further from the IMU than on any vehicle."""
-    return float(np.linalg.norm(sequence.imu_T_cam[:3, 3])) > FARTHEST_CAMERA
+    return camera_distance(sequence) > FARTHEST_CAMERA
 
 
 def doubt_of_position(sequence: Sequence) -> str:
     """Doubt about a camera that is far from the IMU, in words."""
-    distance = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
     return (
-        f"imu_T_cam places the camera {distance:.4g} m from the IMU, and nothing confirms that; write its "
-        "translation in m"
+        f"imu_T_cam places the camera {camera_distance(sequence):.4g} m from the IMU, and nothing confirms that; "
+        "write its translation in m"
     )
 
 
@@ -64,7 +68,7 @@ def extrinsic_unit(sequence: Sequence, usual: Sequence, seen: Odometry | None, o
     All else of `sequence` is in SI units, `usual` is its rig as recorded that `seen` was computed with. A recorded
     baseline that was in `of_baseline` m makes the same unit of the translation the first choice.
     """
-    length = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
+    length = camera_distance(sequence)
     if length < SHORT:
         return 1.0
     others = [f for f in dict.fromkeys((of_baseline, *UNITS_OF_LENGTH)) if f < 1.0 and length * f <= FARTHEST_CAMERA]

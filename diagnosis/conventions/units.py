@@ -26,7 +26,7 @@ from fgbaseline.geometry import FloatArray
 from ..odometry.stereo_odometry import Odometry
 from .jumps import FAR_BLIND, among_neighbors
 from .rate_units import CALIBRATED, DEGREE, doubt_of_rate_unit, measured, of_no_unit
-from .rig import BASELINES, usual_rig
+from .rig import BASELINES, camera_distance, usual_rig
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)
@@ -90,7 +90,7 @@ class Units:
     @property
     def wrong(self) -> int:
         """The number of factors other than 1."""
-        return sum(factor != 1.0 for factor in (self.time, self.angular, self.linear, self.baseline, self.extrinsic))
+        return sum(getattr(self, name) != 1.0 for name in LABELS)
 
 
 def units_of(sequence: Sequence, seen_by_cameras: Odometry | None, given: Mapping[str, float] | None = None) -> Units:
@@ -237,14 +237,13 @@ def rescaled(sequence: Sequence, units: Units) -> Sequence:
 def unit_findings(units: Units, sequence: Sequence, seen: str = "") -> tuple[Finding, ...]:
     """A finding for each wrong unit of `sequence`, as recorded; `seen` is evidence other than the scale ratios."""
     interval, b = float(np.median(sequence.dt)), sequence.stereo_camera.baseline
-    distance = float(np.linalg.norm(sequence.imu_T_cam[:3, 3]))
     texts = {
         "time": f"The time stamps are in {_named('time', units.time)}: their median interval of {interval:.6g} is "
         f"{interval * units.time:.3g} s",
         "angular": f"The angular velocity is in {_named('angular', units.angular)} and not in rad/s",
         "linear": f"The linear velocity is in {_named('linear', units.linear)} and not in m/s",
         "baseline": f"The stereo baseline, {b:.6g}, is in {_named('baseline', units.baseline)} and not in m",
-        "extrinsic": f"The translation of imu_T_cam, {distance:.6g} long, is in "
+        "extrinsic": f"The translation of imu_T_cam, {camera_distance(sequence):.6g} long, is in "
         f"{_named('extrinsic', units.extrinsic)} and not in m",
     }
     codes = {"time": "time_unit", "angular": "angular_velocity_unit", "linear": "linear_velocity_unit"}

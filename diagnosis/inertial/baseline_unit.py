@@ -11,7 +11,7 @@ import numpy as np
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.rig import FARTHEST_CAMERA, doubt_of_position, is_far, usual_rig
+from ..conventions.rig import FARTHEST_CAMERA, camera_distance, doubt_of_position, is_far, usual_rig
 from ..conventions.units import TOLERANCE, Units, unit_findings
 from ..odometry.stereo_odometry import Odometry
 from .accelerations import MIN_CORRELATION, acceleration_changes
@@ -37,7 +37,7 @@ def baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
     found = _by_accelerations(sequence, seen)
     if found.doubt or not is_far(sequence):
         return found
-    if float(np.linalg.norm(sequence.imu_T_cam[:3, 3])) * found.factor <= FARTHEST_CAMERA:
+    if camera_distance(sequence) * found.factor <= FARTHEST_CAMERA:
         return replace(found, extrinsic=found.factor)
     return replace(found, doubt=doubt_of_position(sequence))
 

@@ -13,7 +13,6 @@ from fgbaseline.geometry import FloatArray
 
 from ..conventions.jumps import FAR_BLIND, among_neighbors
 
-SENSORS = ("angular_velocity", "specific_force")
 NOUNS = {"angular_velocity": ("gyroscope", "rad/s"), "specific_force": ("accelerometer", "m/s^2")}
 
 
@@ -34,7 +33,7 @@ def without_spikes(sequence: Sequence) -> tuple[Sequence, tuple[Spikes, ...]]:
     """
     imu, found = sequence.imu, []
     assert imu is not None
-    for sensor in SENSORS:
+    for sensor in NOUNS:
         values: FloatArray = getattr(imu, sensor)
         usual, far = among_neighbors(values)
         spike = _alone(far > FAR_BLIND)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import data
+from fgbaseline.data.estimate import Estimate
 from fgbaseline.data.imu import ImuNoise, ImuSamples
 from fgbaseline.data.problem import InverseDepthPrior, Problem
 from fgbaseline.data.problem.inertial import InertialStart, imu_intervals
@@ -164,3 +165,12 @@ def at_truth(problem: Problem) -> Problem:
         covariance=1e-12 * np.eye(15),
     )
     return replace(problem, initial_pose=truth.world_T_imu[0], start=given)
+
+
+def state_errors(estimate: Estimate, problem: Problem) -> FloatArray:
+    """(T, 15) errors of the states."""
+    truth = problem.sequence.truth
+    assert truth is not None
+    names = ("velocity", "gyroscope_bias", "accelerometer_bias")
+    pose = se3.log(se3.inverse(estimate.world_T_imu) @ truth.world_T_imu)
+    return np.concatenate([pose, *(getattr(truth, name) - getattr(estimate, name) for name in names)], axis=1)

@@ -29,16 +29,6 @@ def room() -> Room:
     return Room(N)
 
 
-@pytest.fixture(scope="module")
-def written(room: Room, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return room.write_euroc(tmp_path_factory.mktemp("room") / "room_01")
-
-
-@pytest.fixture
-def euroc(written: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(written, tmp_path / "room_01"))
-
-
 def tum_vi(euroc: Path, shift: float = 0.0) -> Path:
     for i in (0, 1):
         (euroc / "mav0" / f"cam{i}" / "sensor.yaml").unlink()

@@ -30,16 +30,6 @@ def room() -> Room:
     return Room(N)
 
 
-@pytest.fixture(scope="module")
-def written(room: Room, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return room.write_euroc(tmp_path_factory.mktemp("room") / "room_01")
-
-
-@pytest.fixture
-def euroc(written: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(written, tmp_path / "room_01"))
-
-
 def tracked(room: Room, settings: TrackerSettings) -> list[Tracks]:
     tracker = MonocularTracker(LEFT, settings)
     return [tracker.step(room.image(k)) for k in range(room.n_frames)]

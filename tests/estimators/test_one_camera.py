@@ -9,21 +9,12 @@ from scipy.stats import chi2
 from fgbaseline import compare, ekf, smoother
 from fgbaseline.compare.residuals.noise_scale import pixel_scale
 from fgbaseline.data import Estimate, Problem, Status
-from fgbaseline.geometry import FgbaselineError, FloatArray, se3
+from fgbaseline.geometry import FgbaselineError, FloatArray
 
-from ..builders.inertial import simulated_problem
+from ..builders.inertial import simulated_problem, state_errors
 
 SEEDS = 8
 FRAMES = (20, 60, 99)
-
-
-def state_errors(estimate: Estimate, problem: Problem) -> FloatArray:
-    """(T, 15) errors of the states."""
-    truth = problem.sequence.truth
-    assert truth is not None
-    names = ("velocity", "gyroscope_bias", "accelerometer_bias")
-    pose = se3.log(se3.inverse(estimate.world_T_imu) @ truth.world_T_imu)
-    return np.concatenate([pose, *(getattr(truth, name) - getattr(estimate, name) for name in names)], axis=1)
 
 
 def nees(estimate: Estimate, problem: Problem) -> FloatArray:

@@ -24,7 +24,7 @@ from fgbaseline.smoother.graph.marginal_covariances import marginal_covariances
 from fgbaseline.smoother.initialization.inertial_windows import inertial_states
 from fgbaseline.smoother.isam2.checkpointed_isam2 import CheckpointedISAM2
 
-from ..builders.inertial import inertial_problem
+from ..builders.inertial import inertial_problem, state_errors
 
 FRAMES = 25
 
@@ -45,19 +45,10 @@ def factors_of(problem: Problem) -> InertialFactors:
     return factors
 
 
-def errors(estimate: Estimate, problem: Problem) -> FloatArray:
-    """(T, 15) errors of the states."""
-    truth = problem.sequence.truth
-    assert truth is not None
-    names = ("velocity", "gyroscope_bias", "accelerometer_bias")
-    pose = se3.log(se3.inverse(estimate.world_T_imu) @ truth.world_T_imu)
-    return np.concatenate([pose, *(getattr(truth, name) - getattr(estimate, name) for name in names)], axis=1)
-
-
 def nees(estimate: Estimate, problem: Problem) -> FloatArray:
     """(T-1,) normalized squared errors of the states after the first, whose position and heading are held."""
     assert estimate.state_covariance is not None
-    error, P = errors(estimate, problem)[1:], estimate.state_covariance[1:]
+    error, P = state_errors(estimate, problem)[1:], estimate.state_covariance[1:]
     return np.einsum("ni,ni->n", error, np.linalg.solve(P, error[:, :, None])[:, :, 0])
 
 
@@ -270,7 +261,7 @@ def test_a_marginalized_tree_ends_where_one_tree_ends() -> None:
     assert short.velocity is not None
     assert whole.velocity is not None
     np.testing.assert_allclose(short.velocity, whole.velocity, atol=1e-5)
-    now, then = (errors(e.by_products["isam2-online"], problem)[:, :3] for e in (short, whole))
+    now, then = (state_errors(e.by_products["isam2-online"], problem)[:, :3] for e in (short, whole))
     np.testing.assert_allclose(now, then, atol=1e-2)
 
 
