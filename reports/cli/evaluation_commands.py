@@ -138,7 +138,7 @@ def compare(
     elif force or opened:
         option, what = ("force", "folder to replace") if force else ("open", "page")
         raise InputError(f"{option}: there is no {what}; add --out DIR")
-    report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, **options)
+    report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, drawn=out is not None, **options)
     from ..open_page import announce, print_sentences
     from ..phrases.evidence import FIRST
     from ..tables import print_table

@@ -108,12 +108,14 @@ def compare(
     *estimates: "Given",
     landmarks: "GivenLandmarks | Iterable[FilePath]" = (),
     deltas: Iterable[str] = (),
+    drawn: bool = False,
     **options: Any,
 ) -> "ComparisonReport":
     """Comparison of estimates with a reference, as the command `compare` and `fgbaseline.compare_trajectories` have it.
 
-    Each is a `[NAME=]FILE` or a trajectory in memory; the reference may be a run or its folder. The options are the
-    fields of `Settings`; `compare_trajectories` describes them. Raises InputError, which names options of the command.
+    Each is a `[NAME=]FILE` or a trajectory in memory; the reference may be a run or its folder. With `drawn`, what
+    draws figures is imported meanwhile. The options are the fields of `Settings`; `compare_trajectories` describes
+    them. Raises InputError, which names options of the command.
     """
     times = options.pop("times", None)
     if times is None or isinstance(times, str | os.PathLike) or hasattr(times, "shape"):
@@ -129,4 +131,4 @@ def compare(
     of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
     from .report import report_of
 
-    return report_of(first, others, of_them, settings)
+    return report_of(first, others, of_them, settings, drawn=drawn)

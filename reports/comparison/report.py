@@ -1,16 +1,18 @@
 """Comparison as a result: its tables, sentences and figures, and the folder that it writes."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fgbaseline.compare.columns import to_frame
+from fgbaseline.compare.columns import Columns
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.entry import Entries
 from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
@@ -23,7 +25,8 @@ from ..phrases import comparison as phrases
 from ..results.comparison_summary import results_by_name, summarize
 from ..results.documents import COMPARISON
 from ..tables import Table, latex, markdown
-from ..tables.comparison import comparison_table, main_frame, main_table, metrics_table
+from ..tables.comparison import comparison_table, main_columns, main_frame, metrics_columns
+from ..tables.csv_file import write_csv
 from .inputs import Given, GivenLandmarks, read_entries
 
 if TYPE_CHECKING:
@@ -61,7 +64,9 @@ class ComparisonReport(NotebookResult, Comparison):
     @property
     def metrics(self) -> "pd.DataFrame":
         """Every metric: estimate, metric, value, and low and high of its 95 % interval."""
-        return metrics_table(self, self.by_name)
+        import pandas as pd
+
+        return pd.DataFrame(metrics_columns(self, self.by_name))
 
     @property
     def caption(self) -> str:
@@ -110,9 +115,10 @@ class ComparisonReport(NotebookResult, Comparison):
 
         from ..figures.comparison import drawn_in_background
         from ..figures.saving import save
-        from ..html.comparison_page import render
 
         with drawn_in_background(self, cores()) as drawn:
+            from ..html.comparison_page import render  # while the figures are drawn
+
             self._fill_tables(folder)
             figures = drawn()
         (folder / "figures").mkdir()
@@ -120,8 +126,6 @@ class ComparisonReport(NotebookResult, Comparison):
         (folder / "report.html").write_text(render(self, self.summary, figures), encoding="utf-8")
 
     def _fill_tables(self, folder: Path) -> None:
-        import pandas as pd
-
         maps = {name: result.map for name, result in self.results.items() if result.map is not None}
         relative = {name: result.relative for name, result in self.results.items() if result.relative}
         optional = {"maps": maps, "relative": relative}
@@ -131,16 +135,14 @@ class ComparisonReport(NotebookResult, Comparison):
             columns = ["landmark", "distance", "seen", "depth", "sigmas"]
             landmarks[columns].to_csv(folder / "maps" / f"{name}.csv", index=False)
         for name, motions in relative.items():
-            joined = pd.concat({delta: to_frame(of) for delta, of in motions.items()}, names=["delta"])
-            table = joined.reset_index(level="delta")
-            table.to_csv(folder / "relative" / f"{name}.csv", index=False, float_format="%.9g")
+            write_csv(folder / "relative" / f"{name}.csv", _by_delta(motions), "%.9g")
         for name, result in self.results.items():
             _write_series(result, folder / "series" / f"{name}.csv")
         paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
         for path in paths:
             write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
-        main_table(self, self.by_name).to_csv(folder / "table.csv")
-        self.metrics.to_csv(folder / "metrics.csv", index=False)
+        write_csv(folder / "table.csv", main_columns(self, self.by_name))
+        write_csv(folder / "metrics.csv", metrics_columns(self, self.by_name))
         as_dict = self.summary.model_dump(mode="json", by_alias=True)
         for file, text in {
             "table.md": markdown(self.text_table),
@@ -151,24 +153,46 @@ class ComparisonReport(NotebookResult, Comparison):
 
 
 def report_of(
-    reference: "Given | Run", estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings
+    reference: "Given | Run", estimates: Sequence[Given], landmarks: GivenLandmarks, settings: Settings, *, drawn: bool
 ) -> ComparisonReport:
-    """Compares inputs, whose files may be open. Raises InputError."""
+    """Compares inputs, whose files may be open. Raises InputError.
+
+    With `drawn`, figures are to follow: what draws them is imported while a fork compares. A recording's observations
+    are too many to send from there.
+    """
     with np.errstate(all="ignore"):
         entries = read_entries(reference, estimates, landmarks, settings)
-        comparison = compare_entries(entries, settings)
+        if drawn and entries.problem is None:
+            comparison = _compared_meanwhile(entries, settings)
+        else:
+            comparison = compare_entries(entries, settings)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
+
+
+def _compared_meanwhile(entries: Entries, settings: Settings) -> Comparison:
+    """Figures of all estimates, by a fork, while this process imports what draws them."""
+    from fgbaseline.data.parallel import background_map, cores
+
+    with background_map(lambda _: compare_entries(entries, settings), 1, cores()) as compared:
+        import_module("fgbaseline.reports.figures.comparison")
+        (comparison,) = compared()
+    return comparison
 
 
 def _write_series(result: Result, path: Path) -> None:
     """One row per pair of poses: stamps of both, and all errors."""
-    import pandas as pd
-
     reference, estimate = result.matched.reference, result.matched.estimate
+    stamps = {"t": reference.t, "t_estimate": estimate.t}
+    in_full = {name: [repr(stamp) for stamp in np.asarray(t).tolist()] for name, t in stamps.items()}
     columns = {name: column for name, column in result.departure.items() if name != "t"}
-    table = pd.DataFrame({**columns, "pose": result.absolute["pose"]})
+    columns["pose"] = result.absolute["pose"]
     if result.reported_covariance is not None:
-        table["nees"] = result.reported_covariance.nees
-    for column, t in (("t_estimate", estimate.t), ("t", reference.t)):
-        table.insert(0, column, [repr(stamp) for stamp in np.asarray(t).tolist()])  # in full
-    table.rename_axis("pair").to_csv(path, float_format="%.9g")
+        columns["nees"] = result.reported_covariance.nees
+    write_csv(path, {"pair": range(len(reference.t)), **in_full, **columns}, "%.9g")
+
+
+def _by_delta(motions: Mapping[str, Columns]) -> dict[str, list[Any]]:
+    """Columns of the motions over all deltas, one delta after the other."""
+    names = next(iter(motions.values()))
+    deltas = [delta for delta, of in motions.items() for _ in next(iter(of.values()))]
+    return {"delta": deltas} | {name: [v for of in motions.values() for v in of[name].tolist()] for name in names}

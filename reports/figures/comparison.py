@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.cbook import boxplot_stats
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.columns import Columns
@@ -43,10 +44,14 @@ from .style import (
 from .view_limits import common_window
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 
 ASPECT = (0.35, 1.1)
 """height over width of the plan, at least and at most"""
+BOX = 0.55
+"""height of a box, of 1 from one estimate to the next"""
 CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
 CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
 
@@ -166,22 +171,22 @@ def _boxes(
     panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, Columns], column: str
 ) -> None:
     for name, table in motions.items():
-        panel.boxplot(
-            [without_nan(table[column])],
-            positions=[names.index(name)],
-            orientation="horizontal",
-            widths=0.55,
-            whis=(5, 95),
-            showfliers=False,
-            patch_artist=True,
-            boxprops={"facecolor": color[name], "alpha": 0.45, "edgecolor": color[name]},
-            medianprops={"color": "#222222", "linewidth": 1.6},
-            whiskerprops={"color": color[name]},
-            capprops={"color": color[name]},
-        )
+        _box(panel, names.index(name), without_nan(table[column]), color[name])
     panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.grid(axis="y", visible=False)
+
+
+def _box(panel: Axes, y: float, values: FloatArray, color: str) -> None:
+    """Horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists."""
+    (at,) = boxplot_stats(values, whis=(5, 95))
+    low, q1, median, q3, high, apart = (*(at[key] for key in ("whislo", "q1", "med", "q3", "whishi")), np.nan)
+    box = Rectangle((q1, y - BOX / 2), q3 - q1, BOX, zorder=2.0, facecolor=color, alpha=0.45, edgecolor=color)
+    panel.add_artist(box)
+    whiskers = [low, low, apart, low, q1, apart, q3, high, apart, high, high]
+    caps = y + BOX / 4 * np.array([-1, 1, apart, 0, 0, apart, 0, 0, apart, -1, 1])
+    panel.plot(whiskers, caps, color=color, linewidth=1.0)
+    panel.plot([median, median], [y - BOX / 2, y + BOX / 2], color="#222222", linewidth=1.6, zorder=2.1)
 
 
 def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
@@ -245,7 +250,7 @@ def _three_sigma(data: ComparisonData, result: "Result") -> Figure | None:
 
 
 def draw_failed_check(
-    aligned: MatchedTrajectories, errors: Mapping[str, tuple[pd.DataFrame, float | None]], path: Path
+    aligned: MatchedTrajectories, errors: "Mapping[str, tuple[pd.DataFrame, float | None]]", path: Path
 ) -> None:
     """Draws into the PNG `path`, whose folder is made: both paths, and each table's `translation` with its bound.
 

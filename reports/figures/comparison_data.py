@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Align
@@ -22,6 +21,8 @@ from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 ALIGNED = {
@@ -142,6 +143,8 @@ def of_comparison_folder(folder: Path) -> ComparisonData:
 
 
 def _of_files(files: RunFolder, summary: Mapping[str, Any]) -> ComparisonData:
+    import pandas as pd
+
     reference, estimates = summary["reference"], dict(summary["estimates"])
     up = np.array(summary["up"]["direction"], dtype=np.float64)
     path = files.trajectory(reference["name"])

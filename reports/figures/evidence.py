@@ -1,10 +1,9 @@
 """Evidence beside the paths: consistency (NEES, NIS, sigmas), held-out tracks, and landmarks of the reference."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -18,6 +17,9 @@ from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, inter
 from .reprojection import medians_by_class
 from .run_data import RunData
 from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
 QUANTITIES = {
@@ -159,7 +161,7 @@ def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
 
 
 def maps_by_depth(
-    tables: Mapping[str, pd.DataFrame], line: Line, reference: str, style: Style = SCREEN
+    tables: "Mapping[str, pd.DataFrame]", line: Line, reference: str, style: Style = SCREEN
 ) -> Figure | None:
     """Tables of `compare.map_by_depth` by name: in meters and sigmas, on paper only in the camera frame."""
     columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}

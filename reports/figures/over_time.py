@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -26,6 +25,9 @@ from .panels import (
 from .run_data import RunData
 from .style import SCREEN, Style, safe_text, stacked_panels, title_and_legend
 from .view_limits import common_window, signed_range
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COMPONENTS = {
     "position": "distance, m",
@@ -219,7 +221,7 @@ def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals:
     return figure
 
 
-def _with_prefix(table: pd.DataFrame, prefix: str) -> Columns:
+def _with_prefix(table: "pd.DataFrame", prefix: str) -> Columns:
     chosen = [column for column in table.columns if column.startswith(prefix)]
     return {column.removeprefix(prefix): table[column].to_numpy(dtype=np.float64) for column in chosen}
 

@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
@@ -47,6 +46,8 @@ def median_window(n: int) -> int:
 
 def running_median(values: FloatArray) -> FloatArray:
     """(n,) medians over `median_window` frames around each value; NaN where all of these are."""
+    import pandas as pd
+
     rolling = pd.Series(values).rolling(median_window(len(values)), center=True, min_periods=1)
     return np.asarray(rolling.median().to_numpy(dtype=np.float64))
 

@@ -1,16 +1,14 @@
 """Reprojection errors: over time with the observations, as a distribution, by classes, and by track."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from fgbaseline import compare
-from fgbaseline.compare.residuals.patterns import COLUMNS, REGION, ROWS
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
@@ -19,6 +17,9 @@ from .over_time import Panel, time_axis, time_panels
 from .panels import Line, fit_log, log_where_positive, plot_series, running_median, short, smoothed
 from .run_data import RunData, RunDetails
 from .style import GRAY, GREEN, SCREEN, Style, label, stacked_panels, swatch, title_and_legend
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SMALL_ERROR = 3.0
 """px, a column of the tables"""
@@ -153,8 +154,10 @@ def image_regions(run: RunData) -> Figure | None:
     return figure
 
 
-def _ninths(classes: pd.DataFrame) -> FloatArray:
+def _ninths(classes: "pd.DataFrame") -> FloatArray:
     """(3, 3) median error of each ninth of the image; NaN for one without an observation."""
+    from fgbaseline.compare.residuals.patterns import COLUMNS, REGION, ROWS
+
     medians = classes.loc[classes["by"] == REGION].set_index("of")["median"]
     return medians.reindex([f"{row} {column}" for row in ROWS for column in COLUMNS]).to_numpy(np.float64).reshape(3, 3)
 

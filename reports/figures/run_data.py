@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.data import Problem
@@ -20,6 +19,8 @@ from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from fgbaseline.compare.estimate_comparison import Result, Run
 
 
@@ -28,9 +29,9 @@ class RunDetails:
     """Data that only a run in memory has."""
 
     problem: Problem
-    reprojection: Mapping[str, pd.DataFrame]
+    reprojection: "Mapping[str, pd.DataFrame]"
     """by estimator, one row per observation of its landmarks: see `compare.reprojection`"""
-    classes: Mapping[str, pd.DataFrame]
+    classes: "Mapping[str, pd.DataFrame]"
     """see `compare.residual_patterns`"""
     directions: Mapping[str, FloatArray]
     """(T, 2) where the camera looks, seen from above"""
@@ -61,11 +62,11 @@ class RunData:
     """(T, 3)"""
     landmarks: Mapping[str, FloatArray]
     """(m, 3) by estimator, where it has any"""
-    series: Mapping[str, pd.DataFrame]
+    series: "Mapping[str, pd.DataFrame]"
     """by estimator, one row per frame, columns as in `series/NAME.csv` and `nis_per_row`"""
-    held_out: pd.DataFrame | None
+    held_out: "pd.DataFrame | None"
     """see `compare.held_out_ranking`, best first; None without held-out tracks"""
-    by_depth: Mapping[str, pd.DataFrame]
+    by_depth: "Mapping[str, pd.DataFrame]"
     """by estimator: see `compare.map_by_depth`"""
     observed: RunDetails | None = None
     """None where the data come from a folder"""
@@ -130,7 +131,9 @@ def of_run(run: "Run") -> RunData:
     )
 
 
-def _series(result: "Result", n_frames: int) -> pd.DataFrame:
+def _series(result: "Result", n_frames: int) -> "pd.DataFrame":
+    import pandas as pd
+
     evidence, estimate = result.evidence, result.estimate
     parts: list[tuple[str, pd.DataFrame | None]] = [
         ("divergence", result.divergence),
@@ -205,7 +208,7 @@ def _axes(sequence: Mapping[str, Any]) -> FloatArray:
     return np.stack([ahead, np.cross(up, ahead), up])
 
 
-def _with_nis_per_row(table: pd.DataFrame) -> pd.DataFrame:
+def _with_nis_per_row(table: "pd.DataFrame") -> "pd.DataFrame":
     if "nis" not in table:
         return table
     return table.assign(nis_per_row=table["nis"] / table["nis_degrees"].where(table["nis_degrees"] > 0))

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from weakref import WeakKeyDictionary
 
-import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
@@ -41,7 +40,9 @@ class EncodedFigure:
 def encode_figure(figure: Figure, forms: Iterable[str]) -> EncodedFigure:
     """Remainder of a figure once it was written in these forms."""
     width, height = (float(side) for side in figure.get_size_inches())
-    return EncodedFigure(str(figure.get_label()), (width, height), {form: encoded(figure, form) for form in forms})
+    with in_style(), without_layout_engine():
+        files = {form: _encoded(figure, form, SCREEN) for form in forms}
+    return EncodedFigure(str(figure.get_label()), (width, height), files)
 
 
 def save(
@@ -70,25 +71,25 @@ def encoded(figure: Figure | EncodedFigure, form: str, style: Style = SCREEN) ->
     forms = _written.setdefault(figure, {})
     if form not in forms:
         with in_style(style), without_layout_engine():
-            if form == "png":
-                forms[form] = _png(figure, style.dpi)
-            else:
-                forms[form] = _saved(figure, form, dpi=style.dpi, metadata=UNDATED[form])
+            forms[form] = _encoded(figure, form, style)
     return forms[form]
+
+
+def _encoded(figure: Figure, form: str, style: Style) -> bytes:
+    if form == "png":
+        return _png(figure, style.dpi)
+    stream = BytesIO()
+    figure.savefig(stream, format=form, dpi=style.dpi, metadata=UNDATED[form])
+    return stream.getvalue()
 
 
 def _png(figure: Figure, dpi: int) -> bytes:
     """PNG without an alpha channel, since the ground is white: three quarters of the time."""
-    canvas = FigureCanvasAgg(figure)
     figure.dpi = dpi
+    canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
     canvas.draw()
-    colors = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])  # as many rows and columns as it has
+    drawn = canvas.buffer_rgba()
+    image = Image.frombuffer("RGBA", (drawn.shape[1], drawn.shape[0]), drawn, "raw", "RGBA", 0, 1).convert("RGB")
     stream = BytesIO()
-    Image.fromarray(colors).save(stream, "png", compress_level=COMPRESSION, dpi=(dpi, dpi))
-    return stream.getvalue()
-
-
-def _saved(figure: Figure, form: str, **options: Any) -> bytes:
-    stream = BytesIO()
-    figure.savefig(stream, format=form, **options)
+    image.save(stream, "png", compress_level=COMPRESSION, dpi=(dpi, dpi))
     return stream.getvalue()

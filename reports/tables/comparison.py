@@ -50,22 +50,20 @@ def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Val
     return found
 
 
-def main_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
-    """One row per estimate: the figures, and behind each that has an interval its `low` and `high`."""
-    import pandas as pd
-
-    table: dict[str, list[float]] = {}
+def main_columns(comparison: Comparison, results: Results) -> dict[str, list[Any]]:
+    """Columns of `table.csv`, one row per estimate: the figures, and behind each with an interval `low` and `high`."""
+    table: dict[str, list[Any]] = {"estimate": list(comparison.results)}
     for m in _metrics(comparison, results):
         values = [m.value(results[name]) for name in comparison.results]
         table[m.full_title] = [value.value for value in values]
         if any(np.isfinite(value.low) for value in values):
             table[f"{m.full_title}, low"] = [value.low for value in values]
             table[f"{m.full_title}, high"] = [value.high for value in values]
-    return pd.DataFrame(table, index=pd.Index(comparison.results, name="estimate"))
+    return table
 
 
 def main_frame(comparison: Comparison, results: Results) -> "pd.DataFrame":
-    """The figures of `main_table` without their intervals: one metric a row, one estimate a column."""
+    """The figures of `main_columns` without their intervals: one metric a row, one estimate a column."""
     import pandas as pd
 
     metrics = _metrics(comparison, results)
@@ -73,12 +71,11 @@ def main_frame(comparison: Comparison, results: Results) -> "pd.DataFrame":
     return pd.DataFrame(rows, pd.Index([m.full_title for m in metrics], name="metric"), list(comparison.results))
 
 
-def metrics_table(comparison: Comparison, results: Results) -> "pd.DataFrame":
-    """`metrics.csv`: estimate, metric (its path in comparison.json), value, low, high."""
-    import pandas as pd
-
+def metrics_columns(comparison: Comparison, results: Results) -> dict[str, list[Any]]:
+    """Columns of `metrics.csv`: estimate, metric (its path in comparison.json), value, low, high."""
     rows = [(name, metric, *value) for name in comparison.results for metric, value in _figures(results[name])]
-    return pd.DataFrame(rows, columns=["estimate", "metric", *Value._fields])
+    names = "estimate", "metric", *Value._fields
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
 def _metrics(comparison: Comparison, results: Mapping[str, Any]) -> list[Metric]:

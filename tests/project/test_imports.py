@@ -71,9 +71,9 @@ def test_a_comparison_on_the_terminal_loads_numpy_and_rich(folder: Path) -> None
     assert loaded(COMMAND, "compare", folder / "truth.tum", folder / "mine.tum") == {"numpy", "rich"}
 
 
-def test_its_page_loads_no_scipy_and_no_gtsam(folder: Path) -> None:
+def test_its_page_loads_no_pandas_no_scipy_and_no_gtsam(folder: Path) -> None:
     given = ["compare", folder / "truth.tum", folder / "mine.tum", "--out", folder / "out"]
-    assert not loaded(COMMAND, *given) & {"scipy", "gtsam", "joblib"}
+    assert not loaded(COMMAND, *given) & {"pandas", "scipy", "gtsam", "joblib"}
 
 
 @pytest.mark.parametrize("what", ["fgbaseline.compare", "fgbaseline.reports.comparison", *LAZY])
