@@ -40,7 +40,7 @@ class ComparisonReport(NotebookResult, Comparison):
 
     @cached_property
     def by_name(self) -> dict[str, dict[str, Any]]:
-        """Figures of the reference and of every estimate, as `comparison.json` has them."""
+        """Values of the reference and of every estimate, as `comparison.json` has them."""
         return results_by_name(self)
 
     @cached_property
@@ -165,7 +165,7 @@ def _write_series(result: Result, path: Path) -> None:
     import pandas as pd
 
     reference, estimate = result.matched.reference, result.matched.estimate
-    columns = {name: column for name, column in result.departure.items() if name != "t"}
+    columns = {name: column for name, column in result.divergence.items() if name != "t"}
     table = pd.DataFrame({**columns, "pose": result.absolute["pose"]})
     if result.reported_covariance is not None:
         table["nees"] = result.reported_covariance.nees
