@@ -221,7 +221,9 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     row, far = result.table["same"], result.table["far"]
     # Norm of four numbers of 0.5 px each: 0.5 sqrt(chi-square with 4 degrees of freedom), median 0.916.
     assert row["reprojection error: median, px"] == pytest.approx(0.916, abs=0.03)
-    assert row["reprojection error: median, triangulated along the trajectory, px"] < row["reprojection error: median, px"]
+    assert (
+        row["reprojection error: median, triangulated along the trajectory, px"] < row["reprojection error: median, px"]
+    )
     assert (
         far["reprojection error: median, triangulated along the trajectory, px"]
         > 2.0 * row["reprojection error: median, triangulated along the trajectory, px"]
