@@ -19,7 +19,7 @@ REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning
 """the reference of a run is the first of these that gave an answer"""
 SAME_GRAPH = ("isam2", "batch")
 """estimators that minimize one and the same graph"""
-NO_REFERENCE = "no estimator gave an answer to compare with"
+NO_REFERENCE = "no estimator succeeded, so there is nothing to compare with"
 
 
 @dataclass(frozen=True, slots=True)

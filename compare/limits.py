@@ -1,24 +1,24 @@
-"""Acceptance limits of a figure: bounds, absolute or around a baseline, and their outcome."""
+"""Acceptance limits of a metric: bounds, absolute or around a baseline, and their outcome."""
 
 import math
 from dataclasses import dataclass
 from enum import StrEnum
 
 EXACT = 12
-"""significant digits of a sum of two figures: 0.7 + 0.1 is 0.8, and not a little less"""
+"""significant digits of a sum of two values: 0.7 + 0.1 is 0.8, and not a little less"""
 
 
 class Outcome(StrEnum):
     """Outcome of a limit."""
 
     HOLDS = "holds"
-    CANNOT_TELL = "cannot tell"
-    """no figure (NaN), or no bounds to compare it with"""
-    FALLS_SHORT = "falls short"
+    UNDECIDED = "undecided"
+    """no value (NaN), or no bounds to compare it with"""
+    VIOLATED = "violated"
 
 
 class Better(StrEnum):
-    """Direction of improvement: a figure may leave its baseline without limit in it."""
+    """Direction of improvement: a value may leave its baseline without limit in it."""
 
     LOWER = "lower"
     HIGHER = "higher"
@@ -28,7 +28,7 @@ class Better(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Closed interval in the unit of the figure; infinite bounds leave it open."""
+    """Closed interval in the unit of the metric; infinite bounds leave it open."""
 
     at_least: float = -math.inf
     at_most: float = math.inf
@@ -38,15 +38,15 @@ class Bounds:
         return min(value - self.at_least, self.at_most - value)
 
     def judge(self, value: float | None) -> Outcome:
-        """HOLDS for a finite value inside or on the bounds, CANNOT_TELL for None and NaN, FALLS_SHORT otherwise."""
+        """HOLDS for a finite value inside or on the bounds, UNDECIDED for None and NaN, VIOLATED otherwise."""
         if value is None or math.isnan(value):
-            return Outcome.CANNOT_TELL
+            return Outcome.UNDECIDED
         held = math.isfinite(value) and self.at_least <= value <= self.at_most
-        return Outcome.HOLDS if held else Outcome.FALLS_SHORT
+        return Outcome.HOLDS if held else Outcome.VIOLATED
 
 
 def around(baseline: float, better: Better, *, relative: float = 0.0, absolute: float = 0.0) -> Bounds:
-    """Bounds around a baseline: a figure may be worse by the larger of `absolute` and `relative * |baseline|`."""
+    """Bounds around an accuracy baseline: a value may be worse by `absolute` or `relative * |baseline|`, the larger."""
     allowed = max(absolute, relative * abs(baseline))
     return Bounds(
         at_least=-math.inf if better is Better.LOWER else rounded(baseline - allowed, EXACT),

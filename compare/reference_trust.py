@@ -258,12 +258,12 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     baselines = rmse / problem.sequence.camera.unit_length
     criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
     verdict = max(criterion.verdict for criterion in criteria)
-    start = ", started at isam2's answer," if EventKind.STARTED_AT_ISAM2 in kinds else ""
+    start = ", started at isam2's solution," if EventKind.STARTED_AT_ISAM2 in kinds else ""
     agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
     side = "above" if excess > 0.0 else "below"
     cost_gap = f"{per_cent(abs(excess))} {side} the batch's" if abs(excess) >= RESOLUTION else "the same"
     path_gap = f"{distance(rmse)} (RMSE, {baselines:.2g} baselines) away" if rmse >= RESOLUTION else "the same"
-    text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the path {path_gap}"
+    text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the trajectory {path_gap}"
     return _BesideBatch(verdict, text, criteria)
 
 

@@ -1,4 +1,4 @@
-"""Sample sizes that the figures of a run rest on, which decide whether a limit can be judged."""
+"""Sample sizes that the values of a run rest on, which decide whether a limit can be judged."""
 
 from collections.abc import Mapping
 

@@ -51,7 +51,7 @@ class EventKind(StrEnum):
     NO_COVARIANCES = "no covariances"
     DESCENT_FAILED = "descent failed"
     """Levenberg-Marquardt ended with an exception from one of its starts"""
-    STARTED_AT_ISAM2 = "started at isam2's answer only"
+    STARTED_AT_ISAM2 = "started at isam2's solution only"
     """a batch solution without the descent from dead reckoning, as wanted: it shows whether isam2 has converged"""
     ONE_START = "one start only"
     """minimum not confirmed by a second start; lowers the trust in the reference"""

@@ -49,7 +49,7 @@ class Finding:
     code: str
     """identifier for programs, such as `gyro_bias`"""
     sentence: str
-    """description with figures"""
+    """description with values"""
     before: float
     """a measure of the fault before repair, in `unit`"""
     after: float

@@ -42,7 +42,7 @@ def interval(value: float, low: float, high: float) -> str:
 
 
 def resolution(of_files: Mapping[str, float], unit: str) -> float:
-    """Size below which a figure of a comparison is rounding: that of its files, at least `SMALLEST`, or 0."""
+    """Size below which a value of a comparison is rounding: that of its files, at least `SMALLEST`, or 0."""
     return max(of_files.get(unit, 0.0), SMALLEST.get(unit, 0.0))
 
 
@@ -70,7 +70,7 @@ def pixels(value: float) -> str:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A finding's figure: a share in percent, a physical unit beside the number, and none beside a count."""
+    """A finding's value: a share in percent, a physical unit beside the number, and none beside a count."""
     if unit.startswith("share"):
         return per_cent(value)
     if unit in ("m/s", "rad/s", "°", "px", "s"):

@@ -18,7 +18,7 @@ LONGEST_LINE = 100
 def print_sentences(sentences: Sequence[str], most: int | None = None, mark: str = "- ") -> None:
     """Prints the first `most` sentences, wrapped between words on a terminal, and how many more the report has.
 
-    No figure is parted from its unit, and no interval is broken.
+    Line breaks separate no value from its unit and break no interval.
     """
     for sentence in sentences[:most]:
         click.echo(_wrapped(sentence, mark) if sys.stdout.isatty() else f"{mark}{sentence}")

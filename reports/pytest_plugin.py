@@ -15,7 +15,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--accuracy-figures",
         metavar="DIR",
         type=Path,
-        help="Folder for the figures of trajectories that fall short of a limit.  [default: the test's tmp_path]",
+        help="Folder for the figures of trajectories that violate a limit.  [default: the test's tmp_path]",
     )
 
 

@@ -58,7 +58,7 @@ def held_out_errors(
     of the triangulation. Raises FgbaselineError without a path.
     """
     if not paths:
-        raise FgbaselineError("held-out tracks need at least one path to be judged")
+        raise FgbaselineError("held-out tracks need at least one trajectory to be judged")
     everywhere = np.isfinite(np.stack(list(paths.values()))).all(axis=(0, 2, 3))
     chosen = _by_piece(held, np.asarray(everywhere, dtype=np.bool_))
     error = np.stack(

@@ -1,4 +1,4 @@
-"""Paired block bootstrap: differences of RMSE between estimates over the same moments, and their ranking."""
+"""Paired block bootstrap: differences of RMSE between estimates over the same stamps, and their ranking."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from .block_draws import CONFIDENCE, draw_blocks, percentile_interval
 
 @dataclass(frozen=True, slots=True)
 class RmseDifference:
-    """Difference of two RMSEs over the same moments, with its interval."""
+    """Difference of two RMSEs over the same stamps, with its interval."""
 
     value: float
     low: float
     high: float
     block: int
-    """block length, in moments"""
+    """block length, in stamps"""
     blocks: float
     """number of blocks that fit into the series"""
     reliable: bool
@@ -42,14 +42,14 @@ def rmse_difference(
 ) -> RmseDifference:
     """RMSE of `errors` (n,) minus that of `others` (n,), with the interval of a paired moving-block bootstrap.
 
-    Both are of the same moments, in order; moments where either is NaN are left out. Infinite errors make the
+    Both are of the same stamps, in order; stamps where either is NaN are left out. Infinite errors make the
     difference infinite, or NaN and unsettled where both have some. Each repetition draws the same blocks for both,
     which cancels variation that they share: the order can be settled although the intervals of the two RMSEs overlap.
     The block length is Politis and White's for the differences of squared errors. InputError for unequal lengths.
     """
     pair = [np.asarray(e, dtype=np.float64) for e in (errors, others)]
     if pair[0].shape != pair[1].shape or pair[0].ndim != 1:
-        raise InputError(f"errors at the same moments are needed, got {pair[0].shape} and {pair[1].shape} of them")
+        raise InputError(f"errors at the same stamps are needed, got {pair[0].shape} and {pair[1].shape} of them")
     squares: FloatArray = np.stack(pair, axis=1) ** 2
     squares = squares[~np.isnan(squares).any(axis=1)]
     n = len(squares)
@@ -71,24 +71,24 @@ def rmse_difference(
 
 @dataclass(frozen=True, slots=True)
 class PairedRanking:
-    """Estimates ranked by RMSE over the same moments, smallest first."""
+    """Estimates ranked by RMSE over the same stamps, smallest first."""
 
     rmse: Mapping[str, float]
     """RMSE by name, in rising order"""
     behind: Mapping[str, RmseDifference]
     """RMSE of each but the first minus that of the first; value >= 0 where both are finite"""
     moments: int
-    """number of moments at which all of them have an error"""
+    """number of stamps at which all of them have an error"""
 
 
 def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedRanking:
-    """Rank errors (n,) at the same n moments by their RMSE over the moments at which none of them is NaN.
+    """Rank errors (n,) at the same n stamps by their RMSE over the stamps at which none of them is NaN.
 
     `behind` holds `rmse_difference` of each from the first. Raises InputError for unequal lengths.
     """
     columns = {name: np.asarray(e, dtype=np.float64) for name, e in errors.items()}
     if len({column.shape for column in columns.values()}) > 1:
-        raise InputError("errors at the same moments are needed, got some of different lengths")
+        raise InputError("errors at the same stamps are needed, got some of different lengths")
     everywhere = ~np.any([np.isnan(column) for column in columns.values()], axis=0)
     common = {name: column[everywhere] for name, column in columns.items()} if columns else {}
     if not any(len(column) for column in common.values()):

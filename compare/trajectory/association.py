@@ -225,7 +225,7 @@ def rankable(counts: Mapping[str, int]) -> list[str]:
 
 
 def common_stamps(stamps: Mapping[str, FloatArray], tolerance: float) -> dict[str, IntArray]:
-    """Indices (m,) by name into rising stamps (n,), s, that all estimates share, for rankings over the same moments.
+    """Indices (m,) by name into rising stamps (n,), s, that all estimates share, for rankings over the same stamps.
 
     Equal stamps; where fewer than two are equal, stamps within `tolerance` (s) of the shortest estimate's.
     """

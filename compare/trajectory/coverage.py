@@ -10,9 +10,9 @@ GAP = 3.0
 """median intervals between stamps: a longer interval is a gap"""
 
 MIN_SAMPLE_SIZE = 30
-"""poses or other items below which a figure is not judged"""
+"""poses or other items below which a value is not judged"""
 MIN_COVERAGE = 0.5
-"""share of the time span below which a figure is not judged"""
+"""share of the time span below which a value is not judged"""
 MIN_STRETCHES = 3
 """disjoint stretches of the path below which relative errors are not judged"""
 

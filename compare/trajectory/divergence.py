@@ -99,11 +99,11 @@ PARTS = 10
 
 
 def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> "pd.DataFrame":
-    """Table of `departure_columns`."""
-    return to_frame(departure_columns(matched, up), "frame")
+    """Table of `divergence_columns`."""
+    return to_frame(divergence_columns(matched, up), "frame")
 
 
-def departure_columns(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> Columns:
+def divergence_columns(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> Columns:
     """Columns of `pose_error_columns` of matched poses, with `t` (s) and `percent_of_path`
 
     = position error over distance traveled, %; NaN before the reference moves. The alignment is that of `matched`;

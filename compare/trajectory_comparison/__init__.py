@@ -1,1 +1,1 @@
-"""Figures of trajectories against a reference: data and computations, without files, text and drawing."""
+"""Metrics of trajectories against a reference: data and computations, without files, text and drawing."""

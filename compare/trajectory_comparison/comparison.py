@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Result(Displayed):
-    """Figures of one estimate."""
+    """Values of one estimate."""
 
     entry: Entry
     matched: MatchedTrajectories
@@ -38,7 +38,7 @@ class Result(Displayed):
     """the estimated time offset, where it was searched for"""
     absolute: Columns
     """see `compare.absolute_errors`"""
-    departure: Columns
+    divergence: Columns
     """see `compare.divergence_along_path`: along, across, up and heading over the distance traveled"""
     relative: dict[str, Columns]
     """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
@@ -63,7 +63,7 @@ class Result(Displayed):
     resolution: dict[str, float]
     """smallest difference that the files resolve, by its unit, `m` and `°`"""
     notes: dict[str, str]
-    """why figures are missing, by key"""
+    """why values are missing, by key"""
 
     @property
     def name(self) -> str:
@@ -78,7 +78,7 @@ class Result(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Comparison(Displayed):
-    """A reference, and the figures of every estimate against it."""
+    """A reference, and the values of every estimate against it."""
 
     reference: Entry
     reference_pixels: "Pixels | None"

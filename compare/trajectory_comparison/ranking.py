@@ -1,4 +1,4 @@
-"""Ranking of estimates by the RMSE over their common moments, with paired bootstrap intervals of the differences."""
+"""Ranking of estimates by the RMSE over their common stamps, with paired bootstrap intervals of the differences."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ REPETITIONS = 1000
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Ranking(Displayed):
-    """Position errors over the moments that all ranked estimates have: see `compare.rankable`."""
+    """Position errors over the stamps that all ranked estimates have: see `compare.rankable`."""
 
     at: dict[str, IntArray]
-    """by name, nearest first: indices of the pairs of poses at these moments"""
+    """by name, nearest first: indices of the pairs of poses at these stamps"""
     common: dict[str, ErrorStatistics]
     """statistics over them, in this order"""
     behind: dict[str, RmseDifference]
@@ -30,15 +30,15 @@ class Ranking(Displayed):
     rivals: tuple[str, ...]
     """nearest first: all but by-products of the reference"""
     same: bool
-    """whether they are all the moments of every estimate"""
+    """whether they are all the stamps of every estimate"""
 
     @property
     def moments(self) -> int:
-        """Number of common moments; 0 where no two estimates can be ranked."""
+        """Number of common stamps; 0 where no two estimates can be ranked."""
         return len(next(iter(self.at.values()), ()))
 
     def rmse(self, name: str) -> float:
-        """RMSE of the positions over the common moments, m."""
+        """RMSE of the positions over the common stamps, m."""
         return float(self.common[name]["rmse"].value)
 
     def rank(self, name: str) -> int | None:

@@ -1,4 +1,4 @@
-"""Sample sizes and coverage of the figures of an estimate, which a quality gate needs before it judges them."""
+"""Sample sizes and coverage of the values of an estimate, which a quality gate needs before it judges them."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Resu
 from fgbaseline.geometry import FloatArray
 
 OF_POSES = ("translation", "rotation_deg", "pose", "drift", "shares", "final_m", "passing", "alignment")
-"""figures over all paired poses"""
+"""values over all paired poses"""
 
 
 def coverage(comparison: Comparison, result: Result) -> float:
@@ -18,7 +18,7 @@ def coverage(comparison: Comparison, result: Result) -> float:
 def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float]]:
     """Sample size `n` and `coverage` of the estimate's time, by the beginning of a metric's path.
 
-    n counts pairs of poses; for the reprojection observations, for the map landmarks. Figures that are not spread over
+    n counts pairs of poses; for the reprojection observations, for the map landmarks. Values that are not spread over
     time have no coverage. Errors of relative motions also have the number of their `stretches`.
     """
     matched, whole = result.matched, result.entry.trajectory.t

@@ -70,7 +70,7 @@ def read_stamps(key: str, array: FloatArray) -> FrameStamps:
     _require_rising(key, t, np.flatnonzero(kept))
     t = t[kept]
     if len(t) < 2:
-        raise InputError(f"{key}: both frames have the stamp {float(t[0])!r}; a recording needs two moments")
+        raise InputError(f"{key}: both frames have the stamp {float(t[0])!r}; a recording needs two stamps")
     usual = float(np.median(np.diff(t)))
     if t[0] == 0.0 and t[1] > STRAY * usual:
         raise InputError(

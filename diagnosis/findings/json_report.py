@@ -155,7 +155,7 @@ def _without_nan(tree: Any, path: str, notes: dict[str, str], reason: str) -> An
 
 REASONS = {
     "wrong_matches": "frame 0 has no frame before it, and over some intervals the cameras do not determine the motion",
-    "time_offset_s": "a delay needs turns that cameras and velocities both show",
-    "time_offset_std_s": "a delay needs turns that cameras and velocities both show",
-    "time_offset_frames": "a delay needs turns that cameras and velocities both show",
+    "time_offset_s": "a time offset needs turns that cameras and velocities both show",
+    "time_offset_std_s": "a time offset needs turns that cameras and velocities both show",
+    "time_offset_frames": "a time offset needs turns that cameras and velocities both show",
 }

@@ -27,7 +27,7 @@ MIN_GYRO_SCALE = 0.25
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
 """intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
-"""rad/s, share and rad: standard errors beyond which a figure is not identifiable"""
+"""rad/s, share and rad: standard errors beyond which a value is not identifiable"""
 
 
 def findings_of(diagnosis: Diagnosis, tracks: TrackStatistics | None = None) -> tuple[Finding, ...]:
@@ -97,7 +97,7 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
         return (f"Nothing about the velocities: {diagnosis.cannot_tell}.",)
     sentences = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
     if not diagnosis.timing.identifiable:
-        sentences.append("A delay between velocities and images: that needs turns that both show.")
+        sentences.append("A time offset between velocities and images: that needs turns that both show.")
     deviation = diagnosis.gyro_bias_deviation
     if (deviation > KNOWN_BIAS).any():
         sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (standard errors).")

@@ -1,4 +1,4 @@
-"""A diagnosis of raw inertial data as JSON, and its figures in sentences."""
+"""A diagnosis of raw inertial data as JSON, and its values in sentences."""
 
 from dataclasses import asdict
 from typing import Any

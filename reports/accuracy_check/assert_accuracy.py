@@ -73,7 +73,7 @@ def assert_accuracy(
     `divergence_max`, without alignment; `rotation_deg`, RMSE of the rotation error (deg) after alignment. Lower limits:
     `coverage`, the share of the reference's time with paired poses, and `smallest_sample` pairs of poses. Poses are
     associated by time within `tolerance` (s; see `compare.associate`), those of an Estimate or a Truth by frame. The
-    figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit falls short.
+    figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit is violated.
 
     Units and quaternion orders that a file does not state are detected as in `fgbaseline compare`, or given by
     `time_unit` and `quaternion`. Trajectories without orientations are compared by position only.
@@ -184,7 +184,7 @@ def _drawn(
     asked: dict[str, float | None],
     place: FilePath | None,
 ) -> Path:
-    from ..figures.comparison import draw_failed_check  # matplotlib: only where something fell short
+    from ..figures.comparison import draw_failed_check  # matplotlib: only where a limit is violated
 
     path = Path(tempfile.mkdtemp(prefix="fgbaseline-")) / "accuracy.png" if place is None else Path(place)
     limited = {metric.partition(".")[0] for metric, limit in asked.items() if limit is not None}

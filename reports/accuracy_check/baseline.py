@@ -9,7 +9,7 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.geometry import InputError
 
-from ..phrases.check import falling_short
+from ..phrases.check import violated_limits
 from ..results.check import Checked
 from ..results.reader import BASELINE, DIGITS, Measured, MeasuredRun, failure, read_measured, value_of
 
@@ -81,9 +81,9 @@ def new_baseline(checked: Checked) -> str:
 
 
 def refusal(checked: Checked, path: Path, *, accepted: bool = False) -> str:
-    """Why the baseline is not written, in a sentence; `accepted` disregards limits that fall short."""
-    if checked.count[Outcome.FALLS_SHORT] and not accepted:
-        return f"{shown(path)}: not written, since {falling_short(checked)}; correct that, or use --accept-worse"
+    """Why the baseline is not written, in a sentence; `accepted` disregards violated limits."""
+    if checked.count[Outcome.VIOLATED] and not accepted:
+        return f"{shown(path)}: not written, since {violated_limits(checked)}; correct that, or use --accept-worse"
     if checked.shortages:
         return f"{shown(path)}: not written. {checked.shortages[0]}"
     return f"{shown(path)}: not written, since the reference is not trusted enough; the run's report has the reasons"
@@ -94,7 +94,7 @@ def write_baseline(checked: Checked, path: Path) -> str:
 
     Raises InputError where a sample is too small, a reference is not trusted enough, or a metric has no value.
     """
-    if checked.shortages or checked.undecided or checked.count[Outcome.CANNOT_TELL]:
+    if checked.shortages or checked.undecided or checked.count[Outcome.UNDECIDED]:
         raise InputError(refusal(checked, path, accepted=True))
     text = new_baseline(checked)
     same = path.is_file() and path.read_bytes() == text.encode()

@@ -124,11 +124,11 @@ def _outcome(
     value: float | None, missing: str, bounds: Bounds | None, unknown: str, doubt: str, updating: bool, short: bool
 ) -> tuple[Outcome, str]:
     if value is None:
-        return Outcome.FALLS_SHORT if short else Outcome.CANNOT_TELL, missing
+        return Outcome.VIOLATED if short else Outcome.UNDECIDED, missing
     if doubt:
-        return Outcome.CANNOT_TELL, doubt
+        return Outcome.UNDECIDED, doubt
     if bounds is None:
-        return Outcome.HOLDS if updating else Outcome.CANNOT_TELL, unknown
+        return Outcome.HOLDS if updating else Outcome.UNDECIDED, unknown
     return bounds.judge(value), ""
 
 
@@ -150,11 +150,11 @@ def _below(limit: Limit, run: MeasuredRun) -> str:
         return ""
     sigma = None if run.reference.sigma is None else run.reference.sigma.of(limit.metric)
     if sigma is None:
-        return "the 1-sigma of the reference is unknown (within_reference_sigma)"
+        return "the sigma of the reference is unknown (within_reference_sigma)"
     unit = "°" if "rotation" in limit.metric else " m"
     if limit.at_most >= sigma:
         return ""
-    return f"the limit is below the 1-sigma of the reference, {number(sigma)}{unit} (within_reference_sigma)"
+    return f"the limit is below the sigma of the reference, {number(sigma)}{unit} (within_reference_sigma)"
 
 
 def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shortage | None:
@@ -195,7 +195,7 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
 
 
 def _sigma(name: str, run: MeasuredRun, *, several: bool) -> str:
-    """The sentence on the 1-sigma of a run's reference; empty where it is unknown."""
+    """The sentence on the sigma of a run's reference; empty where it is unknown."""
     reference = run.reference
     if reference.sigma is None or reference.name is None:
         return ""

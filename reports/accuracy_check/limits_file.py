@@ -71,7 +71,7 @@ class Limit(_Part):
     """None for that of the file"""
     smallest_coverage: Share | None = None
     within_reference_sigma: bool = False
-    """whether a bound on the divergence below the reference's own 1-sigma leaves the limit undecided"""
+    """whether a bound on the divergence below the reference's own sigma leaves the limit undecided"""
 
     @property
     def patterns(self) -> tuple[str, ...]:

@@ -19,8 +19,8 @@ from ..tables import markdown as markdown_table
 from ..tables.check import cells, check_table, unit_of
 
 SCHEMA = "fgbaseline/check/1"
-STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.CANNOT_TELL: "yellow", Outcome.FALLS_SHORT: "bold red"}
-SIGNS: Mapping[Outcome, str] = {Outcome.HOLDS: "✅", Outcome.CANNOT_TELL: "❔", Outcome.FALLS_SHORT: "❌"}
+STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.UNDECIDED: "yellow", Outcome.VIOLATED: "bold red"}
+SIGNS: Mapping[Outcome, str] = {Outcome.HOLDS: "✅", Outcome.UNDECIDED: "❔", Outcome.VIOLATED: "❌"}
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """characters that XML does not allow"""
 
@@ -97,7 +97,7 @@ def _finite(bound: float) -> float | None:
 
 
 def junit(checked: Checked) -> bytes:
-    """The JUnit document, in UTF-8; a limit that falls short is a failure, an undecided one an error."""
+    """The JUnit document, in UTF-8; a violated limit is a failure, an undecided one an error."""
     suites = ElementTree.Element("testsuites", {"name": "fgbaseline check", **_counts(checked.lines)})
     for run in dict.fromkeys(line.run for line in checked.lines):
         lines = tuple(line for line in checked.lines if line.run == run)
@@ -119,7 +119,7 @@ def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
     case = ElementTree.SubElement(suite, "testcase", classname=_text(line.estimator), name=_text(name))
     if line.outcome is Outcome.HOLDS:
         return
-    tag = "failure" if line.outcome is Outcome.FALLS_SHORT else "error"
+    tag = "failure" if line.outcome is Outcome.VIOLATED else "error"
     texts = cells(line)
     reason = line.reason or f"{texts['value']} is not {texts['bound']}"
     problem = ElementTree.SubElement(case, tag, type=line.outcome.value, message=_text(f"{line.metric}: {reason}"))
@@ -132,7 +132,7 @@ def _reference_suite(suites: ElementTree.Element, checked: Checked) -> None:
     suite = ElementTree.SubElement(suites, "testsuite", name="reference", tests="1", failures="0", errors="1")
     case = ElementTree.SubElement(suite, "testcase", classname="reference", name="trust")
     message = " ".join(checked.references)
-    ElementTree.SubElement(case, "error", type=Outcome.CANNOT_TELL.value, message=_text(message)).text = _text(message)
+    ElementTree.SubElement(case, "error", type=Outcome.UNDECIDED.value, message=_text(message)).text = _text(message)
     for count in ("tests", "errors"):
         suites.set(count, str(int(suites.get(count, "0")) + 1))
 
@@ -141,8 +141,8 @@ def _counts(lines: tuple[Line, ...]) -> dict[str, str]:
     outcomes = [line.outcome for line in lines]
     return {
         "tests": str(len(lines)),
-        "failures": str(outcomes.count(Outcome.FALLS_SHORT)),
-        "errors": str(outcomes.count(Outcome.CANNOT_TELL)),
+        "failures": str(outcomes.count(Outcome.VIOLATED)),
+        "errors": str(outcomes.count(Outcome.UNDECIDED)),
     }
 
 

@@ -36,7 +36,8 @@ TIMINGS = ("seconds", "frames_per_second")
 COSTS_NOTE = "Time and memory are of this machine and in separate files."
 RANKINGS = (
     '"Above the first" is the mean of the paired differences of the runs, with its 95 % interval. Where the interval '
-    "contains zero, these runs do not separate the two. An estimator with fewer answers ranks below those with more."
+    "contains zero, these runs do not separate the two. An estimator with fewer successful runs ranks below those "
+    "with more."
 )
 MOST_OPEN = 24
 """rows up to which a table is open from the start"""

@@ -48,7 +48,9 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
     metavar="LENGTH",
     help="Delta of the relative errors: 1s, 10m, 30deg or 5frames; repeatable.  [default: 1s and 10m]",
 )
-@click.option("--all-pairs", is_flag=True, help="Relative errors from every pose, not end to end.")
+@click.option(
+    "--all-pairs", is_flag=True, help="Relative errors over all pairs, not consecutive ones (evo: --all_pairs)."
+)
 @click.option(
     "--format",
     "form",
@@ -74,7 +76,8 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
 @click.option(
     "--lever-arm",
     type=XYZ,
-    help="Position, m, of the reference's point in the body frame of the estimate, whose orientations rotate it.",
+    help="Lever arm, m: position of the reference's body in the estimate's body frame, rotated by the estimate's "
+    "orientation.",
 )
 @click.option("--align-body", is_flag=True, help="Remove a constant rotation between the body frames.")
 @click.option(
@@ -94,11 +97,15 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
     type=float,
     default=0.0,
     metavar="SHARE",
-    help="Rank all paths by this share of the recording's tracks; export with the same SHARE and --seed for a filter "
-    "that does not use them.  [default: as the run]",
+    help="Rank all trajectories by this share of the recording's tracks; export with the same SHARE and --seed for a "
+    "filter that does not use them.  [default: as the run]",
 )
-@click.option("--reference-body", type=BODY, default="imu", help="Body whose poses the reference has.")
-@click.option("--estimate-body", type=BODY, default="imu", help="Body whose poses the estimates have.")
+@click.option(
+    "--reference-body", type=BODY, default="imu", help="Frame of the reference's poses: world_T_imu or world_T_camera."
+)
+@click.option(
+    "--estimate-body", type=BODY, default="imu", help="Frame of the estimates' poses: world_T_imu or world_T_camera."
+)
 @click.option("--extrinsic", type=PATH, help="imu_T_cam, one line of 12 numbers.  [default: of --sequence]")
 @click.option(
     "--beside", default="all", show_default=True, help="Estimators of the run to compare too: names, all or none."
@@ -120,7 +127,7 @@ def compare(
     opened: bool,
     **options: Any,
 ) -> None:
-    """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC CSV or npz files.
+    """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC, OpenVINS or npz files, or ROS bags.
 
     REFERENCE may also be the folder of a run. Then its reference is used, the trust in it is printed first, and its
     other estimators are compared too.
@@ -169,8 +176,8 @@ def compare(
 @click.option("--junit", type=PATH, metavar="FILE", help="Write JUnit XML, which CI systems show as tests.")
 @click.option("--markdown", type=PATH, metavar="FILE", help="Write Markdown, for a comment on a pull request.")
 @click.option("--json", "as_json", type=PATH, metavar="FILE", help="Write JSON, with all digits.")
-@click.option("--update-baseline", is_flag=True, help="Write a new baseline, unless a limit falls short.")
-@click.option("--accept-worse", is_flag=True, help="Let --update-baseline write although a limit falls short.")
+@click.option("--update-baseline", is_flag=True, help="Write a new accuracy baseline, unless a limit is violated.")
+@click.option("--accept-worse", is_flag=True, help="Let --update-baseline write although a limit is violated.")
 def check(
     folder: Path,
     limits: Path,
@@ -181,14 +188,14 @@ def check(
     update_baseline: bool,
     accept_worse: bool,
 ) -> int:
-    """Check the metrics in DIR against limits and a baseline.
+    """Check the metrics in DIR against limits and an accuracy baseline, the metrics of an earlier run.
 
     DIR is the folder of `run`, `compare` or `bench`. On GitHub the table also goes to the page of the job
     (GITHUB_STEP_SUMMARY).
 
-    Exits 0 when all limits hold, 1 when one falls short, 2 when one is undecided, and on bad input. A limit is
+    Exits 0 when all limits hold, 1 when one is violated, 2 when one is undecided, and on bad input. A limit is
     undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
-    untrusted, or when there is no baseline to compare with.
+    untrusted, or when there is no accuracy baseline to compare with.
     """
     from fgbaseline.data.toml_text import toml_values
 
@@ -253,12 +260,12 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
 def bench(
     suite: Path, out: Path | None, data: Path | None, workers: int | None, scheduler: str | None, force: bool
 ) -> int:
-    """Run every sequence, setting and seed of SUITE (TOML), and write a benchmark report.
+    """Run every recording, setting and seed of SUITE (TOML), and write a benchmark report.
 
     Finished runs are kept. The same command resumes an interrupted bench, and runs again only what has changed: a
     recording, a setting, the source code. docs/bench.md describes suites and report.
 
-    Exits 0 when every estimator gave an answer in every run, 1 when one failed, 2 on bad input.
+    Exits 0 when every estimator succeeded in every run, 1 when one failed, 2 on bad input.
     """
     from fgbaseline.geometry import InputError
 
@@ -270,7 +277,7 @@ def bench(
 
 
 @click.command(epilog="Example: fgbaseline reproduce 03.npz 10.npz --out out/reproduction")
-@click.argument("sequence", nargs=-1, required=True, type=PATH)
+@click.argument("sequence", metavar="RECORDING...", nargs=-1, required=True, type=PATH)
 @click.option("--out", type=PATH, default=Path("out/reproduction"), show_default=True, help="Folder to write.")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier reproduction.")
 @click.option(
@@ -294,11 +301,11 @@ def reproduce(
     sweep_features: tuple[int, ...],
     sweep_noise: tuple[float, ...],
 ) -> int:
-    """Draw the figures of the source paper from SEQUENCE... and test its claims.
+    """Draw the figures of the source paper from RECORDING... and test its claims.
 
     The source paper's recordings are 03.npz and 10.npz, recognized by their numbers of frames; others get figures of
-    the same kind. A recording without features has its path drawn; the rest uses features that are simulated along it
-    and labeled as such. Each claim has the measured figure, its cause, and the result on the repaired recording.
+    the same kind. For a recording without features, the trajectory is drawn. The other figures use features simulated
+    along it, and say so. Each claim has the measured value, its cause, and the result on the repaired recording.
 
     Exits 0 when the reproduction is written, whatever the claims' results, and 2 on bad input.
     """

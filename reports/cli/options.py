@@ -99,7 +99,7 @@ imu = click.option(
     "--imu",
     type=PATH,
     metavar="CSV",
-    help="Raw inertial samples in EuRoC's form, in place of the velocities of SEQUENCE.",
+    help="Raw inertial samples in EuRoC's form, used instead of any motion data of the input.",
 )
 imu_calibration = click.option(
     "--imu-calibration",
@@ -110,17 +110,18 @@ imu_calibration = click.option(
 time_unit = click.option(
     "--time-unit",
     type=UNITS,
-    help="Unit of the time stamps of SEQUENCE.  [default: seconds, unless the recording shows another unit]",
+    help="Unit of the time stamps of RECORDING.  [default: seconds, unless the recording shows another unit]",
 )
 as_recorded = click.option(
     "--as-recorded",
     is_flag=True,
-    help="No diagnosis and no repairs: velocity k moves frame k to k + 1, the noise is assumed (calibrated).",
+    help="No diagnosis and no repairs, assumed noise; velocity k is applied from frame k to k + 1. Only with "
+    "--preset calibrated.",
 )
 repairs = click.option(
     "--repairs",
     type=PATH,
-    help="TOML file of user-specified repairs; the diagnosis finds the others (calibrated).",
+    help="TOML file of your own repairs, applied beside those of the diagnosis. Only with --preset calibrated.",
 )
 held_out = click.option(
     "--held-out",
@@ -128,7 +129,7 @@ held_out = click.option(
     default=0.0,
     show_default=True,
     metavar="SHARE",
-    help="Share of the tracks that diagnosis and estimators do not use; they rank the paths.",
+    help="Share of the tracks withheld from diagnosis and estimators, and used to rank the trajectories.",
 )
 _IMAGES = (
     click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
@@ -140,7 +141,8 @@ _IMAGES = (
     click.option(
         "--cameras",
         type=click.Choice(["stereo", "left"]),
-        help="Images: a pair, or the left camera alone, which needs raw inertial samples.  [default: what there is]",
+        help="Images: a pair, or the left camera alone; run and export then need raw inertial samples, diagnose "
+        "needs a pair.  [default: what there is]",
     ),
     click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )
@@ -149,7 +151,7 @@ _MOTION = (
         "--velocities",
         type=PATH,
         metavar="CSV",
-        help="Body velocities: stamp, vx, vy, vz, wx, wy, wz, in place of the motion of SEQUENCE.",
+        help="Body velocities: stamp, vx, vy, vz, wx, wy, wz, used instead of any motion data of the input.",
     ),
     click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
 )

@@ -17,7 +17,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 
 
 @click.command(epilog="Example: fgbaseline run drive.npz --truth poses.txt --truth-frame camera --out out/drive")
-@click.argument("sequence", required=False, type=PATH)
+@click.argument("sequence", metavar="[RECORDING]", required=False, type=PATH)
 @click.option("--out", type=PATH, help="Folder to write.  [default: out/NAME]")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier run.")
 @options.open_page
@@ -25,7 +25,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--estimators",
     help=f"Names, separated by commas.  [default: {','.join(DEFAULT_ESTIMATORS)}; up to {BATCH_OBSERVATIONS:,} "
-    "observations also batch, started at the answer of isam2 only]",
+    "observations also batch, started at the solution of isam2 only]",
 )
 @click.option(
     "--estimator",
@@ -42,7 +42,9 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
     help="Trajectory file beside the estimators, aligned to the reference by yaw, or by SE(3) where the worlds are not "
     "level; repeatable.",
 )
-@click.option("--add-body", type=options.BODY, help="Body whose poses --add has.  [default: imu]")
+@click.option(
+    "--add-body", type=options.BODY, help="Frame of the poses of --add: world_T_imu or world_T_camera.  [default: imu]"
+)
 @click.option("--add-time-unit", type=options.UNITS, help="Unit of ambiguous time stamps of --add.")
 @click.option("--add-offset", type=float, default=0.0, metavar="S", help="Added to the stamps of --add.")
 @options.features
@@ -51,10 +53,13 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
     type=click.Choice(["in-turn", "held"]),
     default="in-turn",
     show_default=True,
-    help="Landmarks of the documented SLAM: updated in turn with the pose, or fixed at those of landmark mapping.",
+    help="With --preset documented: landmarks updated alternately with the pose, or fixed at the result of "
+    "landmark-mapping.",
 )
 @click.option("--truth", type=PATH, help="Ground truth: a trajectory file.")
-@click.option("--truth-frame", type=options.BODY, help="Body whose poses the ground truth has.")
+@click.option(
+    "--truth-frame", type=options.BODY, help="Frame of the ground-truth poses: world_T_imu or world_T_camera."
+)
 @options.as_recorded
 @options.imu
 @options.imu_calibration
@@ -89,14 +94,14 @@ def run(
     settings: Path | None,
     **given: Any,
 ) -> int:
-    """Run all estimators on SEQUENCE, compare them and write a report.
+    """Run estimators on RECORDING, compare them and write a report.
 
-    SEQUENCE is a recording of tracks, or a folder or ROS bag of images: their tracks are written into the
-    folder of the run, tracks.npz.
+    RECORDING is a file with tracks, or a folder or ROS bag of images: their tracks are written into the folder of the
+    run, tracks.npz.
 
-    Without SEQUENCE, a simulated drive of 60 s through a town is used, with known ground truth.
+    Without RECORDING, a simulated drive of 60 s through a town is used, with known ground truth.
 
-    Exits 0 when every estimator gave an answer, 1 when one failed (the report is written nevertheless), 2 on bad
+    Exits 0 when every estimator succeeded, 1 when one failed (the report is written nevertheless), 2 on bad
     input.
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
@@ -130,7 +135,7 @@ def run(
 def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
     """Track the images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
 
-    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; what a check rejects ends its track. With
+    Rectified pairs, Lucas-Kanade from frame to frame and from left to right; a track that fails a check ends. With
     one camera (--cameras left, cam0 alone, one topic of images) the epipolar constraint is that check. The npz is a
     recording for run and diagnose. Without motion in INPUT, run needs --imu or --velocities, and --extrinsic.
     """
@@ -158,7 +163,7 @@ def estimators() -> None:
 
 
 @click.command(epilog="Example: fgbaseline diagnose drive.npz --out out/diagnosis")
-@click.argument("sequence", type=PATH)
+@click.argument("sequence", metavar="RECORDING", type=PATH)
 @click.option("--out", type=PATH, help="Folder for diagnosis.json, figures and page.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
@@ -180,12 +185,12 @@ def diagnose(
     settings: Path | None,
     **given: Any,
 ) -> int:
-    """Detect the faults of SEQUENCE and estimate its noise.
+    """Detect the faults of RECORDING and estimate its noise.
 
-    Faults are wrong units, axes, gyroscope bias, delay, velocity scale, extrinsic and tracks. Ground truth in the
-    file is not used. `fgbaseline run` repairs the faults that are detected here.
+    Faults: wrong units, axes, extrinsic or matches, gyroscope bias, time offset, velocity scale error, repeated images.
+    Ground truth in the file is not used. `fgbaseline run` repairs the faults that are detected here.
 
-    Exits 0 without findings, 1 with findings, 2 when the diagnosis is undecided, and on bad input.
+    Exits 0 without findings, 1 with findings, 2 when the data do not suffice for a diagnosis, and on bad input.
     """
     from fgbaseline.data import TimeUnit
 
@@ -199,7 +204,7 @@ def diagnose(
 
 
 @click.command(epilog="Example: fgbaseline export drive.npz --out out/problem")
-@click.argument("sequence", type=PATH)
+@click.argument("sequence", metavar="RECORDING", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Folder to write.")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
 @options.preset
@@ -214,7 +219,7 @@ def diagnose(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice of held-out tracks."
 )
 def export(out: Path, force: bool, topics: str | None, settings: Path | None, **given: Any) -> int:
-    """Write the problem that `fgbaseline run` would solve on SEQUENCE: npz, CSV and JSON.
+    """Write the problem that `fgbaseline run` would solve on RECORDING: npz, CSV and JSON.
 
     The files hold repaired velocities, increments with covariances, observations with the mask, noise, kernel,
     priors, calibration and time stamps. A filter in any language can solve the same problem; `fgbaseline compare`
@@ -299,7 +304,7 @@ def simulate(
 ) -> None:
     """Simulate a recording and write it to OUTPUT (.npz) with its ground truth.
 
-    The file is a course file with `ground_truth` and `landmarks` added; `fgbaseline run` reads it.
+    The file has the arrays of docs/formats.md, with `ground_truth` and `landmarks`; `fgbaseline run` reads it.
 
     Exits 0, or 2 on bad input.
     """

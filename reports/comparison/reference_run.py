@@ -73,7 +73,7 @@ def read_reference_run(folder: Path) -> ReferenceRun:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         if chosen not in names:
-            raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
+            raise InputError("the run has no reference: none of its estimators succeeded; run it again")
     return ReferenceRun(RunFolder(folder), chosen, trust, names, settings, up)
 
 
@@ -85,7 +85,7 @@ def _criterion(found: dict[str, Any]) -> Criterion:
 def reference_in_memory(run: Run) -> ReferenceRun:
     """Reference of a run in memory. Raises InputError where it has none."""
     if run.reference is None:
-        raise InputError("the run has no reference: none of its estimators gave an answer; run it again")
+        raise InputError("the run has no reference: none of its estimators succeeded; run it again")
     names = tuple(result.name for result in run.answered)
     up = tuple(map(float, run.problem.sequence.up))
     return ReferenceRun(RunInMemory(run), run.reference, run.trust, names, dict(run.settings), up)

@@ -43,7 +43,7 @@ class ComparisonReport(NotebookResult, Comparison):
 
     @cached_property
     def by_name(self) -> dict[str, dict[str, Any]]:
-        """Figures of the reference and of every estimate, as `comparison.json` has them."""
+        """Values of the reference and of every estimate, as `comparison.json` has them."""
         return results_by_name(self)
 
     @cached_property
@@ -170,7 +170,7 @@ def report_of(
 
 
 def _compared_meanwhile(entries: Entries, settings: Settings) -> Comparison:
-    """Figures of all estimates, by a fork, while this process imports what draws them."""
+    """Comparison of all estimates, in a fork, while this process imports what draws them."""
     from fgbaseline.data.parallel import background_map, cores
 
     with background_map(lambda _: compare_entries(entries, settings), 1, cores()) as compared:
@@ -184,7 +184,7 @@ def _write_series(result: Result, path: Path) -> None:
     reference, estimate = result.matched.reference, result.matched.estimate
     stamps = {"t": reference.t, "t_estimate": estimate.t}
     in_full = {name: [repr(stamp) for stamp in np.asarray(t).tolist()] for name, t in stamps.items()}
-    columns = {name: column for name, column in result.departure.items() if name != "t"}
+    columns = {name: column for name, column in result.divergence.items() if name != "t"}
     columns["pose"] = result.absolute["pose"]
     if result.reported_covariance is not None:
         columns["nees"] = result.reported_covariance.nees

@@ -113,7 +113,7 @@ def paths(data: ComparisonData, style: Style = SCREEN) -> Figure:
     handles += axes.plot(*start.T, "o", label="start of the reference", markersize=8 if style.titled else 4, **WHITE)
     handles += [swatch(GRAY, "end")] if style.titled else []
     frame_top_view(axes, box, *(f"{name} from the start, m" for name in data.axes[:2]))
-    title_and_legend(figure, f"Paths from above, {data.alignment}", handles, style)
+    title_and_legend(figure, f"Trajectories from above, {data.alignment}", handles, style)
     return figure
 
 
@@ -144,8 +144,8 @@ def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
     if has_heading:
         axes[1].set_ylabel("heading, °")
         axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
-    axes[-1].set_xlabel("length of the reference's path so far, m")
-    title_and_legend(figure, f"How the difference grows along the path, {data.alignment}", handles, style)
+    axes[-1].set_xlabel("path length of the reference so far, m")
+    title_and_legend(figure, f"How the difference grows along the trajectory, {data.alignment}", handles, style)
     return figure
 
 
@@ -219,9 +219,9 @@ def map_difference(data: ComparisonData, style: Style = SCREEN) -> Figure | None
 
 Drawing = Callable[..., Figure | None]
 EACH: Mapping[str, tuple[Drawing, str]] = {
-    "paths": (paths, "Paths from above, {alignment} to {reference}."),
+    "paths": (paths, "Trajectories from above, {alignment} to {reference}."),
     "errors": (errors, "Position and rotation difference from {reference} over time, {alignment}."),
-    "growth": (growth, "Difference from {reference} over the length of its path, {alignment}."),
+    "growth": (growth, "Difference from {reference} over its path length, {alignment}."),
     "relative": (relative, "Errors of the motion between {pairs} of poses; boxes hold the middle half, whiskers 90 %."),
     "segments": (segments, "Segment errors ({lengths})."),
     "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
@@ -236,7 +236,7 @@ def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | No
         return None
     along = {name: p.along["error"] for name, p in known.items() if p.along is not None}
     own = {name: p.own["error"] for name, p in known.items() if p.own is not None and len(p.own)}
-    labels = ["triangulated along the path", *(["its own landmarks"] if own else [])]
+    labels = ["triangulated along the trajectory", *(["its own landmarks"] if own else [])]
     return distribution(along, own, data.line(), labels)
 
 

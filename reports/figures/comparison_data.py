@@ -54,7 +54,7 @@ class ComparisonData:
     series: Mapping[str, Columns]
     """by estimate, one row per pair: see `compare.divergence_along_path`"""
     rmse: Mapping[str, float]
-    """position RMSE over the common moments, m, of the ranked estimates, nearest first"""
+    """position RMSE over the common stamps, m, of the ranked estimates, nearest first"""
     relative: Mapping[str, Mapping[str, Columns]]
     """by delta, then estimate: `translation`, m, and `rotation_deg` of each motion"""
     all_pairs: bool
@@ -119,7 +119,7 @@ def of_comparison(comparison: "Comparison") -> ComparisonData:
         stamped=path.stamped,
         t={name: np.asarray(r.matched.reference.t - path.t[0]) for name, r in results.items()},
         paths={name: view.scene(p - start) for name, p in positions.items()},
-        series={name: r.departure for name, r in results.items()},
+        series={name: r.divergence for name, r in results.items()},
         rmse={name: ranking.rmse(name) for name in ranking.rivals or ranking.at},
         relative=_by_delta({name: r.relative for name, r in results.items()}),
         all_pairs=comparison.settings.all_pairs,

@@ -33,7 +33,7 @@ def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, F
             figures["angular_rates"] = angular_rates(diagnosis)
             figures["conventions"] = conventions(diagnosis)
             if len(diagnosis.timing.shifts):
-                figures["delay"] = delay(diagnosis)
+                figures["time_offset"] = time_offset(diagnosis)
             figures["velocity_residuals"] = velocity_residuals(diagnosis)
         figures["tracks"] = tracks_over_time(diagnosis, tracks)
         for figure in figures.values():
@@ -108,7 +108,7 @@ def conventions(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def delay(diagnosis: Diagnosis) -> Figure:
+def time_offset(diagnosis: Diagnosis) -> Figure:
     """Agreement of the recorded rates with the cameras at each shift in time."""
     timing = diagnosis.timing
     dt = float(np.median(diagnosis.sequence.dt))

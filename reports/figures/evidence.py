@@ -92,18 +92,18 @@ def three_sigma(run: RunData, name: str) -> Figure | None:
 def three_sigma_of(
     name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, look: Mapping[str, Any]
 ) -> Figure:
-    """Errors (n, 6) in the body frame at t (n,), s, between three sigmas of their covariances (n, 6, 6)."""
+    """Errors (n, 6) in the body frame at t (n,), s, with ±3-sigma bounds of their covariances (n, 6, 6)."""
     scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
     with np.errstate(invalid="ignore"):
         sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
-    title = f"{safe_text(name)}: error in the body frame, and three sigmas (99.7 %)"
+    title = f"{safe_text(name)}: error in the body frame, with ±3-sigma bounds (99.7 %)"
     return _between_three_sigmas(
         title, t, dict(zip(AXES, zip((scale * error).T, sigma.T, strict=True), strict=True)), look
     )
 
 
 def velocity_and_biases(run: RunData, name: str) -> Figure | None:
-    """Unaligned errors of velocity and biases between three sigmas; None without covariance or truth of any."""
+    """Unaligned errors of velocity and biases with ±3-sigma bounds; None without covariance or truth of any."""
     series = run.series[name]
     shown = {
         f"{heading} {axis}, {unit}": tuple(
@@ -115,7 +115,7 @@ def velocity_and_biases(run: RunData, name: str) -> Figure | None:
     }
     if not shown:
         return None
-    title = f"{safe_text(name)}: unaligned errors of velocity and biases, % within three sigmas (99.7)"
+    title = f"{safe_text(name)}: unaligned errors of velocity and biases, % within the ±3-sigma bounds (99.7)"
     return _between_three_sigmas(title, run.t, shown, run.line()(name))
 
 
@@ -129,7 +129,7 @@ def _between_three_sigmas(
     handles: list[Any] = []
     for i, (axis, (e, s)) in enumerate(shown.items()):
         panel = panels[i % 3, i // 3]
-        band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="three sigmas")
+        band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="±3-sigma bounds")
         drawn = panel.plot(t, e, **{**look, "linewidth": 1.0, "label": "error"})
         panel.set_ylim(-(reach := _reach(e, s)), reach)
         both = np.isfinite(e) & np.isfinite(s) & (s > 0)

@@ -51,7 +51,7 @@ def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
     handles += axes.plot(0.0, 0.0, "o", markersize=8, label="start", **WHITE)
     handles.append(swatch(GRAY, "end"))
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
-    title_and_legend(figure, "All paths from above", handles)
+    title_and_legend(figure, "All trajectories from above", handles)
     remarks = [f"{safe_text(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
     if remarks:
         note(axes, "; ".join(remarks) + " outside the panel")
@@ -79,7 +79,7 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
         _draw_orientation(axes, path, run.observed.directions[name], run.colors[name])
     handles += _draw_ends(axes, path)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
-    title_and_legend(figure, f"{label(name, run.reference)}: path from above and landmarks", handles)
+    title_and_legend(figure, f"{label(name, run.reference)}: trajectory from above and landmarks", handles)
     remarks = _outside(box, landmarks, "landmark") + _outside(box, path, "pose")
     if remarks:
         note(axes, " and ".join(remarks) + " outside the panel")
@@ -115,7 +115,7 @@ def paths_side_by_side(run: RunData) -> Figure:
     for axes in panels[len(paths) :]:
         axes.set_visible(False)
     apart = f", and the greatest distance of each from {safe_text(run.reference)}" if run.reference is not None else ""
-    title_and_legend(figure, f"Paths from above, side by side{apart}", [*behind, *ends])
+    title_and_legend(figure, f"Trajectories from above, side by side{apart}", [*behind, *ends])
     return figure
 
 

@@ -37,10 +37,10 @@ OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
 )
 """each gives None where the run has no data for it"""
 PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
-    "paths": (partial(paths_overlaid, style=PAPER), "Paths on {sequence} from above."),
+    "paths": (partial(paths_overlaid, style=PAPER), "Trajectories on {sequence} from above."),
     "landmarks": (
         lambda run: path_with_landmarks(run, estimator_with_landmarks(run), PAPER),
-        "Path and landmarks of {mapped} on {sequence} from above.",
+        "Trajectory and landmarks of {mapped} on {sequence} from above.",
     ),
     "divergence": (
         partial(divergence, style=PAPER),

@@ -174,7 +174,7 @@ def of_folder(folder: Path) -> RunData:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         names = tuple(name for name, answered in every.items() if answered)
         if not names:
-            raise InputError("none of the run's estimators gave an answer, so there is nothing to draw; run it again")
+            raise InputError("none of the run's estimators succeeded, so there is nothing to draw; run it again")
     landmarks = {name: files.landmarks(name).position @ axes.T for name in names}
     series = {name: _with_nis_per_row(files.series(name)) for name in names}
     by_depth, t = files.table("map_by_depth"), series[names[0]]["t"].to_numpy(dtype=np.float64)

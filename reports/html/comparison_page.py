@@ -21,15 +21,16 @@ from .templates import picture
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
     "errors": "Differences of paired poses along the reference's direction of travel, to its left and up.",
-    "growth": "Difference over the length of the path; a heading to the left is positive.",
+    "growth": "Difference over the path length; a heading to the left is positive.",
     "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. Relative errors do not "
     "depend on alignment or earlier errors.",
     "segments": "Mean over all segments of a length, per meter.",
-    "map": "Landmarks are matched by number. Distances in the world include the drift of the paths; those in the "
+    "map": "Landmarks are matched by index. Distances in the world include the drift of the trajectories; those in the "
     "camera frames do not.",
-    "three_sigma": "Error of each pose in its own body frame between three sigmas of its covariance; both are "
+    "three_sigma": "Error of each pose in its own body frame with ±3-sigma bounds of its covariance; both are "
     "relative to the first pose where an alignment was requested and the covariances grow from there.",
-    "reprojection": "Solid with landmarks triangulated along each path, dotted with the landmarks of the estimate.",
+    "reprojection": "Solid with landmarks triangulated along each trajectory, dotted with the landmarks of the "
+    "estimate.",
 }
 """captions by the beginning of a figure's name"""
 STILLS = ("paths", "errors")
@@ -55,7 +56,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
         )
     )
     behind = None if reference.trust is None else trust(reference.name, reference.trust, reference.reasons)
-    folded = [Folded("Errors between three sigmas, for each estimate", bands)] if bands else []
+    folded = [Folded("Errors with ±3-sigma bounds, for each estimate", bands)] if bands else []
     return render_page(
         Page(
             kind="comparison",
@@ -71,11 +72,14 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                     [Live("charts"), *figure_blocks(pictures, ["growth"])],
                 ),
                 Section(
-                    "evidence", "Relative errors, segments, pixels and map", [*beyond, *folded], "Beyond the paths"
+                    "evidence",
+                    "Relative errors, segments, pixels and map",
+                    [*beyond, *folded],
+                    "Beyond the trajectories",
                 ),
                 Section("stills", "Still figures", [still_figures(stills)] if stills else []),
             ],
-            settings={"Missing figures": notes, "Files": sources, "Settings": summary.settings},
+            settings={"Missing values": notes, "Files": sources, "Settings": summary.settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=pictures.get("paths"),
@@ -89,7 +93,7 @@ def _about(summary: Summary) -> str:
     pixels = "" if summary.sequence is None else f" Reprojection is of the observations of {summary.sequence}."
     return (
         f"The reference has {counted(reference.poses, 'pose')}{lasting} along {number(reference.path_m)} m.{pixels} "
-        "Charts and paths are interpolated between the poses of an estimate."
+        "Charts and trajectories are interpolated between the poses of an estimate."
     )
 
 
@@ -98,5 +102,5 @@ def _caption(name: str) -> str:
 
 
 def _with_intervals_below(row: Row) -> Row:
-    """The row with each interval on a line below its figure."""
+    """The row with each interval on a line below its value."""
     return replace(row, cells=tuple(cell._replace(text=cell.text.replace(" [", "\n[")) for cell in row.cells))

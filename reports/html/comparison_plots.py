@@ -34,7 +34,7 @@ def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, 
     charts = [*_differences(data, t), *_heights(lines), *_consistency(comparison, data, t), *_pixels(comparison, t)]
     return {
         "frames": len(t),
-        "step": "moment" if data.stamped else "frame",
+        "step": "stamp" if data.stamped else "frame",
         "stamped": data.stamped,
         "axes": list(data.axes),
         "t": floats(t),
@@ -152,7 +152,7 @@ def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> l
     """Moments of the first poses beyond the threshold, and of the largest errors where there is none."""
     found = []
     for name, result in comparison.results.items():
-        position = result.departure["position"]
+        position = result.divergence["position"]
         first = result.passing is not None
         k = result.passing.frame if result.passing is not None else int(np.nanargmax(position))
         far = result.bound if first else position[k]

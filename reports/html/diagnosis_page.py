@@ -13,7 +13,7 @@ from .templates import picture
 CAPTIONS: Mapping[str, str] = {
     "angular_rates": "About each axis of imu_T_cam, moving averages. The repaired rates follow visual odometry.",
     "conventions": "Each candidate is a convention of axes and signs; the most likely one is chosen.",
-    "delay": "Agreement of the recorded rates with the cameras at each shift in time; the delay has the best.",
+    "time_offset": "Agreement of the recorded rates with the cameras at each time offset; the estimate has the best.",
     "velocity_residuals": "Residuals of the velocities over the estimated noise, beside a normal distribution.",
     "tracks": "Features of each frame, and the share of its matches that contradict the motion.",
 }

@@ -110,7 +110,7 @@ def _sections(
     plots: Mapping[str, Any] | None,
     images: Pictures,
 ) -> list[Section]:
-    """The sections below table and paths; those without blocks are left out."""
+    """The sections below table and trajectories; those without blocks are left out."""
     estimators = summary["estimators"]
     evidence, components = tables.evidence_table(run, estimators), details.components_table(estimators)
     excluded, events = details.exclusions_table(summary), details.events_tables(run)
@@ -119,7 +119,7 @@ def _sections(
     beyond: list[Block] = [
         Grid(evidence.transposed("figure")),
         *figure_blocks(pictures, ["held_out"]),
-        *([Folded("Errors between three sigmas, for each estimator", bands)] if bands else []),
+        *([Folded("Errors with ±3-sigma bounds, for each estimator", bands)] if bands else []),
         *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
         *(folded(table) for table in details.long_tables(run)),
     ]
@@ -135,9 +135,10 @@ def _sections(
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
             "evidence",
-            f"Beyond the paths: {'' if run.held_out is None else 'held-out tracks, '}consistency, residuals, map",
+            f"Beyond the trajectories: {'' if run.held_out is None else 'held-out tracks, '}consistency, residuals, "
+            f"map",
             beyond if evidence.columns else [],
-            "Beyond the paths",
+            "Beyond the trajectories",
         ),
         Section("components", "Reprojection errors by component", [Grid(components, "")] if components.rows else []),
         Section("left-out", "What was left out, and why", out, "Left out"),

@@ -38,16 +38,16 @@ CAPTIONS: Mapping[str, str] = {
     "those it used. Curves farther left are better.",
     "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "
     "below it conservative.",
-    "held_out": "Each half of a track is predicted from its other half along each path. Paths whose intervals overlap "
-    "can still be separated: the table has the paired difference from the best.",
+    "held_out": "Each half of a track is predicted from its other half along each trajectory. Trajectories whose "
+    "intervals overlap can still be separated: the table has the paired difference from the best.",
     "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
     "time-correlated. The sigma ratio of a filter is expected above 1.",
     "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
     "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, larger to its right.",
     "image_regions": "Errors that grow towards an edge indicate distortion or a wrong rectification. All panels share "
     "one logarithmic scale.",
-    "map_difference": "Landmarks are matched by number. Distances in the world include the drift of the paths; those "
-    "in the camera frames do not.",
+    "map_difference": "Landmarks are matched by index. Distances in the world include the drift of the "
+    "trajectories; those in the camera frames do not.",
     "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 

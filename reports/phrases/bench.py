@@ -48,7 +48,7 @@ def _failures(results: Results) -> list[str]:
     failed = results.runs[
         ~results.runs["status"].isin(ANSWERED) & ~results.runs["run"].isin(list(results.failures))
     ].groupby("estimator", sort=False)
-    text += [f"{name} gave no answer in {len(rows)} of {plural(n, 'run')}." for name, rows in failed]
+    text += [f"{name} failed in {len(rows)} of {plural(n, 'run')}." for name, rows in failed]
     return text
 
 
@@ -95,7 +95,7 @@ def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[
         row["estimator"]: f"{interval(row['mean'], row['low'], row['high'])} {metric.unit}".rstrip() for row in rows
     }
     fewer = [f"{row['estimator']} ({_answers(row, first, most, metric)})" for row in rows if row["runs"] < most]
-    left_out = f"; not ranked for missing answers: {listed(fewer)}" if fewer else ""
+    left_out = f"; not ranked for failed runs: {listed(fewer)}" if fewer else ""
     if not others:
         return f"{case}: {metric.short} {first['estimator']} {figures[first['estimator']]}{left_out}."
     if most == 1:

@@ -9,8 +9,8 @@ from ..results.check import NEW, Checked, Line
 def verdict(checked: Checked) -> str:
     """The outcome, in a sentence."""
     n, count = len(checked.lines), checked.count
-    parts = [falling_short(checked)] if count[Outcome.FALLS_SHORT] else []
-    if undecided := count[Outcome.CANNOT_TELL]:
+    parts = [violated_limits(checked)] if count[Outcome.VIOLATED] else []
+    if undecided := count[Outcome.UNDECIDED]:
         parts.append(f"{undecided} of {plural(n, 'limit')} {'is' if undecided == 1 else 'are'} undecided")
     if parts:
         return f"{' and '.join(parts)}."
@@ -18,10 +18,10 @@ def verdict(checked: Checked) -> str:
     return f"{hold}, but the reference is not trusted enough: undecided." if checked.undecided else f"{hold}."
 
 
-def falling_short(checked: Checked) -> str:
-    """Number of limits that fall short: `1 of 12 limits falls short`."""
-    short = checked.count[Outcome.FALLS_SHORT]
-    return f"{short} of {plural(len(checked.lines), 'limit')} {'falls' if short == 1 else 'fall'} short"
+def violated_limits(checked: Checked) -> str:
+    """Number of violated limits: `1 of 12 limits is violated`."""
+    n = checked.count[Outcome.VIOLATED]
+    return f"{n} of {plural(len(checked.lines), 'limit')} {'is' if n == 1 else 'are'} violated"
 
 
 def remarks(checked: Checked) -> list[str]:

@@ -98,7 +98,7 @@ def _time_offsets(comparison: Comparison) -> list[str]:
         if found is None:
             continue
         where = f"{1e3 * abs(found.seconds):.3g} ms {'later' if found.seconds > 0 else 'earlier'}"
-        determined = "" if found.determined else "; the path does not determine it"
+        determined = "" if found.determined else "; the motion does not determine it"
         each.append(
             f"{result.name} {'as they are' if found.seconds == 0 else where} (shifts of {1e3 * found.low:+.3g} to "
             f"{1e3 * found.high:+.3g} ms fit nearly as well{determined})"
@@ -132,7 +132,7 @@ def _rough_intervals(comparison: Comparison) -> list[str]:
     names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
     if not names:
         return []
-    return [f"The intervals of {listed(names)} are rough: fewer than 10 independent blocks fit the path."]
+    return [f"The intervals of {listed(names)} are rough: fewer than 10 independent blocks fit the trajectory."]
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
@@ -187,7 +187,7 @@ def _reprojection(comparison: Comparison) -> list[str]:
         return []
     each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
-        f"Median reprojection error, landmarks triangulated along each path: {each}.",
+        f"Median reprojection error, landmarks triangulated along each trajectory: {each}.",
         "This error measures the motion over the length of a track, not drift.",
     ]
 

@@ -81,12 +81,12 @@ def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], on
 
 
 def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> str:
-    """1-sigma of the reference by `PoseSigma` of the results: its possible distance from the truth."""
+    """Sigma of the reference by `PoseSigma` of the results: its possible distance from the truth."""
     along, final, turn, final_turn = (
         number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
     )
     return (
-        f"1-sigma of {name} itself, with the first pose fixed: position {along} m RMS, {final} m at the end; "
+        f"Sigma of {name} itself, with the first pose fixed: position (3D) {along} m RMS, {final} m at the end; "
         f"rotation {turn}° RMS, {final_turn}° at the end."
     )
 

@@ -1,4 +1,4 @@
-"""Sentences on overconfident estimators: the 1-sigma that they claim beside their error."""
+"""Sentences on overconfident estimators: the position sigma that they claim beside their error."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from ..formatting import listed, number
 from .evidence import overconfidence_bound
 
 IN_FULL = 3
-"""estimators with their figures; of the others only the names"""
+"""estimators with their values; of the others only the names"""
 
 
 def overconfidence_sentences(run: Run) -> list[str]:
@@ -53,7 +53,7 @@ def _claim(run: Run, result: Result) -> str:
     measured = f"; {known}" if known else ""
     claimed = number(_claimed(result))
     return (
-        f"{result.name} claims a 1-sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m "
+        f"{result.name} claims a position sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m "
         f"(RMSE{measured})"
     )
 

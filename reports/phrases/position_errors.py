@@ -27,7 +27,7 @@ def position_rmse(comparison: Comparison) -> list[str]:
     if not others:
         return by_products
     if comparison.ranking.same:
-        path = float(others[0].departure["traveled"][-1])
+        path = float(others[0].divergence["traveled"][-1])
         share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
@@ -41,7 +41,7 @@ def position_rmse(comparison: Comparison) -> list[str]:
 
 
 def _over_common(comparison: Comparison) -> list[str]:
-    """Ranking of estimates that do not have the same moments, and the estimates that are not ranked."""
+    """Ranking of estimates that do not have the same stamps, and the estimates that are not ranked."""
     ranking, name = comparison.ranking, comparison.reference.name
     apart = [r.name for r in comparison.ranked if not r.entry.by_product and ranking.rank(r.name) is None]
     if len(ranking.rivals) < 2:
@@ -91,7 +91,7 @@ def maximum_errors(comparison: Comparison) -> list[str]:
             t = result.passing.t - float(result.matched.reference.t[0])
             when = f"{number(t)} s" if result.matched.reference.stamped else f"frame {result.passing.frame}"
             onset[result.name] = f"first at {when}, {number(result.passing.traveled)} m along the path"
-    largest = {r.name: float(np.nanmax(r.departure["position"])) for r in comparison.ranked}
+    largest = {r.name: float(np.nanmax(r.divergence["position"])) for r in comparison.ranked}
     most = {
         r.name: (r.bound, f"{resolved(largest[r.name], resolution(r.resolution, 'm'))} m") for r in comparison.ranked
     }
@@ -145,4 +145,4 @@ def path_lengths(comparison: Comparison) -> list[str]:
         if path > 0.0 and number(own) != number(path):
             share = f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'}"
             each.append(f"{result.name} {number(own)} m, {share}")
-    return [f"Length of the path over the paired poses against the reference's: {'; '.join(each)}."] if each else []
+    return [f"Path length over the paired poses against the reference's: {'; '.join(each)}."] if each else []

@@ -1,7 +1,7 @@
 """Sentences on ATE and divergence; a difference is claimed only where it is significant.
 
 It is significant where the 95 % interval of the paired block bootstrap excludes zero, over the frames in which all
-estimators have a pose, and where the printed figures differ. The causal estimate of the reference and other solvers of
+estimators have a pose, and where the printed values differ. The causal estimate of the reference and other solvers of
 its graph do not compete with it: their divergence is reported, and they are not ranked.
 """
 
@@ -32,7 +32,7 @@ from .evidence import causal_estimate, no_difference
 FEW = 2
 """differences whose intervals stand in a sentence"""
 WITHIN_SIGMAS = 3.0
-"""1-sigmas of the reference up to which an order by divergence says nothing on accuracy"""
+"""sigmas of the reference up to which an order by divergence says nothing on accuracy"""
 
 
 def is_claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
@@ -113,13 +113,13 @@ def divergence_sentences(run: Run) -> list[str]:
 
 
 def _same_graph(run: Run, result: Result) -> str:
-    """Distance of another solver of the reference's graph, which may have started at the reference's answer."""
+    """Distance of another solver of the reference's graph, which may have started at the reference's solution."""
     away = distance(result.divergence_rmse)
     if EventKind.STARTED_AT_ISAM2 not in {event.kind for event in result.estimate.events}:
         return f"{result.name}, which minimizes the same cost as {run.reference}: divergence {away} (RMSE)."
     agrees = all(c.verdict is Verdict.TRUSTED for c in run.trust.criteria if c.code in BATCH_CRITERIA)
     ends = "stays at the same minimum" if agrees else "leaves it"
-    return f"{result.name}, started at the answer of {run.reference}, {ends}: {away} (RMSE) from {run.reference}."
+    return f"{result.name}, started at the solution of {run.reference}, {ends}: {away} (RMSE) from {run.reference}."
 
 
 def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[str]:
@@ -151,7 +151,8 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
     if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
         return []
     return [
-        f"All of them are within {WITHIN_SIGMAS:g} times the 1-sigma of {run.reference} itself, {number(sigma)} m RMS: "
+        f"All of them are within {WITHIN_SIGMAS:g} times the position sigma of {run.reference} itself, "
+        f"{number(sigma)} m RMS: "
         "this order shows closeness to it, not accuracy."
     ]
 

@@ -97,7 +97,7 @@ def missing_claims(studies: Several[Study]) -> list[Claim]:
             f"{r.frames} samples and {r.tracks} features",
             Verdict.CANNOT_TELL,
             f"{r.name} was not given",
-            f"give {r.name}, or its velocities alone, as a further SEQUENCE",
+            f"give {r.name}, or its velocities alone, as a further RECORDING",
             "",
             False,
         )

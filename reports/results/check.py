@@ -7,7 +7,7 @@ from fgbaseline.compare.limits import Bounds, Outcome, rounded
 
 from .reader import DIGITS, Measured
 
-HOLDS, FALLS_SHORT, CANNOT_TELL = 0, 1, 2
+HOLDS, VIOLATED, UNDECIDED = 0, 1, 2
 """exit codes"""
 NEW = "new in the baseline"
 """the reason of a line that had nothing to be held against, and is about to get it"""
@@ -80,7 +80,7 @@ class Checked:
     references: tuple[str, ...]
     """sentences on references that are not trusted, one for each run"""
     sigmas: tuple[str, ...]
-    """sentences on the 1-sigma of the references themselves"""
+    """sentences on the sigma of the references themselves"""
     shortages: tuple[str, ...]
     """sentences on samples that are smaller than the limits ask for, printed first"""
     undecided: bool
@@ -97,10 +97,10 @@ class Checked:
 
     @property
     def exit_code(self) -> int:
-        """0 all hold, 1 some fall short, 2 none does but some cannot be judged."""
-        if self.count[Outcome.FALLS_SHORT]:
-            return FALLS_SHORT
-        return CANNOT_TELL if self.undecided or self.count[Outcome.CANNOT_TELL] else HOLDS
+        """0 all hold, 1 some are violated, 2 none is but some are undecided."""
+        if self.count[Outcome.VIOLATED]:
+            return VIOLATED
+        return UNDECIDED if self.undecided or self.count[Outcome.UNDECIDED] else HOLDS
 
     @property
     def count(self) -> Mapping[Outcome, int]:

@@ -12,7 +12,7 @@ SCHEMA: Final = "fgbaseline/comparison/1"
 
 
 class Statistic(Part):
-    """A figure with its 95 % confidence interval by a block bootstrap, which respects correlation in time."""
+    """A value with its 95 % confidence interval by a block bootstrap, which respects correlation in time."""
 
     value: Number
     low: Number
@@ -31,9 +31,9 @@ class Statistics(Part):
     max: Number
     sse: Annotated[Number, Field(description="sum of squares")]
     n: int
-    missing: Annotated[int, Field(description="NaN errors, which the figures leave out")]
+    missing: Annotated[int, Field(description="NaN errors, which the values leave out")]
     block: Annotated[int, Field(description="block length of the bootstrap, errors")]
-    reliable: Annotated[bool, Field(description="whether at least ten blocks fit into the path")]
+    reliable: Annotated[bool, Field(description="whether at least ten blocks fit into the trajectory")]
 
 
 class Pairing(Part):
@@ -83,7 +83,7 @@ class Segments(Part):
 
     translation_percent: Number
     rotation_deg_per_m: Number
-    official: Annotated[bool, Field(description="KITTI's own lengths and step: comparable with published figures")]
+    official: Annotated[bool, Field(description="KITTI's own lengths and step: comparable with published values")]
     by_length: list[SegmentsOfLength]
     intervals: Annotated[dict[str, Statistic], Field(description="of both means, by name")]
 
@@ -103,7 +103,7 @@ class Consistency(Nees):
 
 
 class Common(Part):
-    """Position error over the moments that all ranked estimates have."""
+    """Position error over the stamps that all ranked estimates have."""
 
     moments: int
     rmse: Annotated[Statistic, Field(description="m; the ranks are by this")]
@@ -167,14 +167,14 @@ class Passing(Part):
 
 
 class EstimateSummary(Part):
-    """Figures of one estimate."""
+    """Values of one estimate."""
 
     source: str
     poses: int
     coverage: Annotated[Number, Field(description="share of the reference's time in which there are paired poses")]
     rank: Annotated[
         int | None,
-        Field(description="1 for the nearest over the common moments; null for by-products and for too few moments"),
+        Field(description="1 for the nearest over the common stamps; null for by-products and for too few stamps"),
     ]
     caption: Annotated[str, Field(description="association and alignment, in words")]
     remarks: Annotated[list[str], Field(description="what was recognized in its file; the subject is its name")]
@@ -191,7 +191,7 @@ class EstimateSummary(Part):
         Field(description="of its own covariances, against a reference that is taken for ground truth"),
     ]
     shares: Shares
-    common: Annotated[Common | None, Field(description="null where there is no such moment, or it has too few")]
+    common: Annotated[Common | None, Field(description="null where there is no such stamp, or it has too few")]
     behind: Annotated[Behind | None, Field(description="null for the nearest, and for by-products of the reference")]
     final_m: Number
     passing: Passing
@@ -199,12 +199,14 @@ class EstimateSummary(Part):
     reprojection_common: Annotated[
         Reprojection | None, Field(description="over those of the problem that all have landmarks for")
     ]
-    reprojection_along: Annotated[Reprojection | None, Field(description="with landmarks triangulated along its path")]
+    reprojection_along: Annotated[
+        Reprojection | None, Field(description="with landmarks triangulated along its trajectory")
+    ]
     map: MapDifference | None
     held_out: HeldOutFigures | None
     samples: Annotated[
         dict[str, dict[str, float]],
-        Field(description="by the beginning of a metric's path: sample size n, coverage of the estimate's time"),
+        Field(description="by the beginning of a metric's key path: sample size n, coverage of the estimate's time"),
     ]
     notes: Annotated[dict[str, str], Field(description="why a value is null or missing, by key")]
 
@@ -249,7 +251,7 @@ class Summary(Part):
 
     @property
     def by_name(self) -> dict[str, dict[str, Any]]:
-        """Figures of the reference and of every estimate, as JSON has them."""
+        """Values of the reference and of every estimate, as JSON has them."""
         parts = {self.reference.name: self.reference, **self.estimates}
         return {name: part.model_dump(mode="json") for name, part in parts.items()}
 

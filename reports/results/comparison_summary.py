@@ -1,4 +1,4 @@
-"""Figures of a comparison as `comparison.json` and `metrics.csv` hold them."""
+"""Values of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
 import math
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ WITH_INTERVAL = ("rmse", "mean", "median", "std", "p95")
 
 
 def results_by_name(comparison: Comparison) -> dict[str, dict[str, Any]]:
-    """Figures of the reference and of every estimate, as JSON has them: None for what is not finite."""
+    """Values of the reference and of every estimate, as JSON has them: None for what is not finite."""
     estimates = {name: _estimate(comparison, result) for name, result in comparison.results.items()}
     return {name: finite(of) for name, of in {comparison.reference.name: _reference(comparison), **estimates}.items()}
 
@@ -113,7 +113,7 @@ def _estimate(comparison: Comparison, result: Result) -> dict[str, Any]:
         },
         "common": None if common is None else {"moments": comparison.ranking.moments, "rmse": common["rmse"]._asdict()},
         "behind": None if behind is None else asdict(behind),
-        "final_m": float(result.departure["position"][-1]),
+        "final_m": float(result.divergence["position"][-1]),
         "passing": {
             "bound_m": result.bound,
             "t": None if result.passing is None else result.passing.t,

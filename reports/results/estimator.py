@@ -114,7 +114,7 @@ class EstimatorSummary(Part):
     observations: ObservationCount
     samples: Annotated[
         dict[str, dict[str, float]],
-        Field(description="by the beginning of a metric's path: sample size n, coverage of the time"),
+        Field(description="by the beginning of a metric's key path: sample size n, coverage of the time"),
     ]
     events: Annotated[dict[str, int], Field(description="kind of event -> count")]
     notes: Annotated[
@@ -139,7 +139,7 @@ TOO_FEW = "it has too few common frames with the other estimators to be ranked"
 
 
 def summarize_estimator(run: Run, result: Result) -> dict[str, Any]:
-    """Summary of an estimator, whose figures may be NaN or infinite."""
+    """Summary of an estimator, whose values may be NaN or infinite."""
     estimate, table = result.estimate, result.reprojection
     common = np.zeros(len(run.problem.excluded), dtype=np.bool_) if run.common is None else run.common
     offered, used = int(run.problem.mask.sum()), int(estimate.used.sum())

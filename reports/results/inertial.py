@@ -54,7 +54,7 @@ NO_COVARIANCE = "it gives no covariance of velocity and biases"
 
 
 def summarize_inertial(result: Result) -> dict[str, Any]:
-    """Values, which may be NaN, of the keys that `InertialEstimatorSummary` adds; None without any figure."""
+    """Values, which may be NaN, of the keys that `InertialEstimatorSummary` adds; None without any value."""
     inertial = result.inertial or InertialEvidence(pd.DataFrame(), None, None, None, None)
     return {
         **{name: _figures(inertial.aligned, name) for name in QUANTITIES},

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 ATE, DIVERGENCE, RPE, DELTA = "ATE", "divergence", "relative error (RPE)", "DELTA"
 REPROJECTION, HELD_OUT, MAP, SEGMENTS = "reprojection error", "held-out error", "map difference", "segment error"
-NEES, REFERENCE_NEES, RESIDUALS, RUNTIME = "NEES", "reference NEES", "residuals of tracks", "runtime"
+NEES, REFERENCE_NEES, RESIDUALS, RUNTIME = "NEES", "reference NEES", "track chi-square", "runtime"
 OBSERVATIONS = "observations"
-SIGMA, CONSISTENCY = "1-sigma", "consistency"
+SIGMA, CONSISTENCY = "position sigma (3D)", "consistency"
 VELOCITY, GYROSCOPE_BIAS, ACCELEROMETER_BIAS = "velocity", "gyroscope bias", "accelerometer bias"
 STATE_NEES = "NEES of the state"
 SCALE_ERROR = "scale error"
@@ -27,7 +27,7 @@ INERTIAL_TERMS: Mapping[str, str] = {
     "and position. Within 3 sigma: share of the components that are, unaligned; 99.7 % is expected.",
     GYROSCOPE_BIAS: "Norm of the error of the gyroscope's bias to ground truth, rad/s, in the axes of the IMU.",
     ACCELEROMETER_BIAS: "Norm of the error of the accelerometer's bias to ground truth, m/s^2, in the axes of the IMU.",
-    SCALE_ERROR: "Length of the path over its true length, less one, % (Sim(3) alignment), of a run with one camera.",
+    SCALE_ERROR: "1 / s - 1 with the scale s of the Sim(3) alignment to ground truth, %, of a run with one camera.",
     STATE_NEES: "NEES of the 15 degrees of freedom of translation, rotation, velocity, gyroscope bias and "
     "accelerometer bias, unaligned: 15 is expected, 14.34 in the median. Of each block alone 3 is expected, 2.37 in "
     "the median.",
@@ -39,39 +39,40 @@ TERMS: Mapping[str, str] = {
     "alignment in yaw and position. Unaligned: both start at one pose, as in the charts over time. In a comparison: "
     "from the reference, after the alignment that was asked for.",
     SIGMA: "Square root of the trace of an estimator's own position covariance, m, under the problem's noise model, "
-    "with the first pose fixed, unaligned; RMS over the frames. The RMSE of a consistent estimator is as large. "
-    "An estimator is called overconfident where its 1-sigma is below its RMSE, and either its median NEES is above "
-    "14.4 (97.5 % quantile of one pose) or P is smaller than P_ref in most frames.",
+    "with the first pose fixed, unaligned; RMS over the frames. It is the 3D RMS, not the sigma of one axis: the RMSE "
+    "of a consistent estimator is as large. An estimator is called overconfident where this is below its RMSE, and "
+    "either its median NEES is above 14.4 (97.5 % quantile of one pose) or P is smaller than P_ref in a direction, by "
+    "10 % of P, in most frames.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
     RPE: "Error of the motion between two poses a delta apart, m and °.",
     "drift": "Relative error per meter (or second) over a tenth of the path.",
     SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; shorter where the path is too short.",
-    REPROJECTION: "Norm of the four pixel differences (uL, vL, uR, vR) of an observation, px. Common observations are "
-    "those that every estimator with landmark updates used.",
+    REPROJECTION: "Norm of the pixel residual (uL, vL, uR, vR) of an observation, px; its RMS is twice the pixel "
+    "sigma. Common observations are those that every estimator with landmark updates used.",
     OBSERVATIONS: "Used: share of the observations that the mask leaves.",
     HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
-    "path, px. It judges motion over a second or two, not drift. A path is separated from the best where "
+    "trajectory, px. It judges motion over a second or two, not drift. A trajectory is separated from the best where "
     "'above the best by at least' is positive.",
     NEES: "Normalized estimation error squared of a pose, e^T P^-1 e with e = log(T^-1 T_true): 6 is expected of a "
-    "consistent estimator, 5.35 in the median. A larger figure means that it is overconfident.",
+    "consistent estimator, 5.35 in the median. A larger value means that it is overconfident.",
     REFERENCE_NEES: "Squared difference from the reference over P − P_ref, as both share their data: 5.35 is expected "
     "in the median. Frames where P − P_ref is not positive definite are left out. An estimator is overconfident where "
-    "its P is smaller than P_ref in a direction, in most frames.",
+    "its P is smaller than P_ref in a direction, by 10 % of P, in most frames.",
     "NIS per degree of freedom": "Squared innovations of a filter over their covariance: 1 is expected, less where the "
     "pixel noise is inflated for time-correlated errors. It judges one step against this noise, so that a filter with "
     "a small NIS can still be overconfident in its poses.",
     "sigma ratio": "Sigma of an estimator over that of the reference, median of the frames: a filter's is above 1.",
     RESIDUALS: "Chi-square of a track's residuals under the assumed noise, per degree of freedom: 1 is expected. A "
-    "point is dynamic where a constant velocity explains its residuals: it moved, or its track slid.",
-    MAP: "Distance of landmarks from the reference's of the same number, m; in the frame of each one's own camera it "
-    "is without drift. 1.54 sigmas of P − P_ref are expected.",
+    "point is dynamic where a constant velocity explains its residuals: it moved, or its track drifted.",
+    MAP: "Distance of landmarks from the reference's of the same index, m; in camera coordinates of each estimate's "
+    "own pose it is without drift. 1.54 sigmas of P − P_ref are expected.",
     **INERTIAL_TERMS,
 }
 """term -> definition, in the glossary of every page; docs/glossary.md has the formulas"""
 
 
 class Value(NamedTuple):
-    """A figure, and its 95 % interval where it has one; NaN for what is missing."""
+    """A value, and its 95 % interval where it has one; NaN for what is missing."""
 
     value: float
     low: float = nan
@@ -83,7 +84,7 @@ class Value(NamedTuple):
         return interval(self.value, self.low, self.high)
 
     def __bool__(self) -> bool:
-        """Whether there is a finite figure."""
+        """Whether there is a finite value."""
         return isfinite(self.value)
 
 
@@ -106,7 +107,7 @@ MAIN, EVIDENCE, TERMINAL, BENCH, COMPARISON = Tables
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A figure of an estimator, with one name, unit and direction everywhere."""
+    """A metric of an estimator, with one name, unit and direction everywhere."""
 
     path: tuple[str, ...]
     """keys below the estimator; `DELTA` stands for each delta of a relative error"""
@@ -118,7 +119,7 @@ class Metric:
     better: Better = Better.NEITHER
     tables: Tables = NONE
     scale: float = 1.0
-    """figure in a table over that in the results"""
+    """value in a table over that in the results"""
     term: str = ""
     """term of the glossary, where it is not the group"""
     brief: str = ""
@@ -138,7 +139,7 @@ class Metric:
     absent: str = ""
     """why it may be missing, where the results do not say"""
     measure: "Callable[[Run, Result], float] | None" = None
-    """its figure, where no model of the results has it"""
+    """its value, where no model of the results has it"""
 
     @property
     def key(self) -> str:
@@ -167,7 +168,7 @@ class Metric:
         return f"{self.short}, {self.unit}" if self.unit else self.short
 
     def text(self, value: float, resolution: float = RESOLUTION) -> str:
-        """A figure of it, without its unit; 0 with the resolution for rounding."""
+        """A value of it, without its unit; 0 with the resolution for rounding."""
         if self.is_rounding(value, resolution):
             return resolved(value, resolution)
         return number(int(value) if self.count and isfinite(value) else value)
@@ -180,7 +181,7 @@ class Metric:
         return self.unit in ("m", "°", "") and self.term != "sigma ratio" and 0.0 < abs(value) < resolution
 
     def value(self, results: Mapping[str, Any]) -> Value:
-        """Its figure in the results of one estimator."""
+        """Its value in the results of one estimator."""
         return Value(*(self.scale * part for part in value_at(results, *self.path)))
 
 

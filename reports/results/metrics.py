@@ -1,6 +1,6 @@
 """Definitions of the metrics: where each stands in the results, and how tables, files and glossary show it.
 
-One `Metric` in `METRICS` adds a figure to every table that its `tables` name. With `measure` it is a new key of an
+One `Metric` in `METRICS` adds a value to every table that its `tables` name. With `measure` it is a new key of an
 estimator in `summary.json` or `comparison.json` as well. The glossary's terms stand beside the record (`metric.TERMS`).
 """
 
@@ -101,7 +101,7 @@ METRICS = (
     Metric(("ate", "max"), ATE, "max, aligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
     Metric(("ate_unaligned", "final"), ATE, "final, unaligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
     Metric(("translation", "rmse"), ATE, "RMSE", "m", LOWER, COMPARISON),
-    Metric(("common", "rmse"), ATE, "RMSE over common moments", "m", LOWER, COMPARISON, same_data=True),
+    Metric(("common", "rmse"), ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
     Metric(("behind",), ATE, "RMSE above the smallest", "m", tables=COMPARISON),
     Metric(("translation", "mean"), ATE, "mean", "m", LOWER, COMPARISON),
     Metric(("translation", "median"), ATE, "median", "m", LOWER, COMPARISON),
@@ -126,7 +126,7 @@ METRICS = (
     Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
     *SCALE,
     *VELOCITY_AND_BIASES,
-    Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed 1-sigma"),
+    Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed sigma (3D)"),
     Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),
     Metric(("sigma_ratio", "position"), CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
     Metric(
@@ -188,7 +188,12 @@ METRICS = (
         absent="no observation was used by every estimator with landmark updates",
     ),
     Metric(
-        ("reprojection_along", "median"), REPROJECTION, "median, triangulated along the path", "px", LOWER, COMPARISON
+        ("reprojection_along", "median"),
+        REPROJECTION,
+        "median, triangulated along the trajectory",
+        "px",
+        LOWER,
+        COMPARISON,
     ),
     Metric(
         ("observations", "share"),
@@ -287,5 +292,5 @@ MEASURED = tuple(metric for metric in METRICS if metric.measure is not None)
 
 
 def measured(run: "Run", result: "Result") -> dict[str, float]:
-    """Figures of the metrics that have their own `measure`, by key."""
+    """Values of the metrics that have their own `measure`, by key."""
     return {metric.path[0]: metric.measure(run, result) for metric in MEASURED if metric.measure is not None}

@@ -42,7 +42,7 @@ class _Record(BaseModel):
 
 
 class SigmaRecord(_Record):
-    """1-sigma of the reference itself, m and degrees."""
+    """Sigma of the reference itself, m and degrees."""
 
     position_rmse: float | None = None
     position_final: float | None = None
@@ -212,7 +212,7 @@ def failure(estimator: Mapping[str, Any]) -> str | None:
 
 
 def missing_in(estimator: Mapping[str, Any], metric: str) -> int:
-    """Number of errors that the figure at a path leaves out because they are missing (NaN)."""
+    """Number of errors that the value at a path leaves out because they are missing (NaN)."""
     found = _at(estimator, f"{metric.rpartition('.')[0]}.missing") if "." in metric else 0
     return found if isinstance(found, int) else 0
 

@@ -44,8 +44,8 @@ class FindingSummary(Part):
 
     code: str
     sentence: str
-    before: Annotated[Number, Field(description="figure of the recording before repair, in `unit`")]
-    after: Annotated[Number, Field(description="figure after repair and mask")]
+    before: Annotated[Number, Field(description="value of the recording before repair, in `unit`")]
+    after: Annotated[Number, Field(description="value after repair and mask")]
     unit: str
     certainty: str
 
@@ -100,8 +100,8 @@ class HeldOutSummary(Part):
     tracks: int
     observations: int
     pieces: Annotated[int, Field(description="segments of tracks without outliers, where all estimators have poses")]
-    inliers: Annotated[int, Field(description="pieces that at least one path explains, the same for all")]
-    gate_px: Annotated[float, Field(description="error below which a path explains a piece")]
+    inliers: Annotated[int, Field(description="pieces that at least one trajectory explains, the same for all")]
+    gate_px: Annotated[float, Field(description="error below which a trajectory explains a piece")]
     judged: Annotated[int, Field(description="observations of the errors, the same for all")]
 
 
@@ -129,7 +129,7 @@ def as_dict(summary: Summary) -> dict[str, Any]:
 
 
 def summarize(run: Run) -> Summary:
-    """Summary of a run; a figure that is not finite is None, with its reason in `notes`."""
+    """Summary of a run; a value that is not finite is None, with its reason in `notes`."""
     sequence, problem = run.problem.sequence, run.problem
     return Summary.model_validate(
         finite(

@@ -22,7 +22,7 @@ class Spread(Part):
     median: Number
     p95: Number
     max: Number
-    missing: Annotated[int, Field(description="NaN errors, which the figures leave out")]
+    missing: Annotated[int, Field(description="NaN errors, which the values leave out")]
 
 
 class Divergence(Spread):
@@ -38,15 +38,15 @@ class Reprojection(Spread):
 
     under_3px: Annotated[Number, Field(description="share, 0 to 1")]
     behind_camera: Annotated[int, Field(description="observations whose landmark lies behind the camera")]
-    n: Annotated[int, Field(description="observations that the figures are over")]
+    n: Annotated[int, Field(description="observations that the values are over")]
 
 
 class PoseSigma(Part):
-    """1-sigma of the poses by the estimator's own covariances: the problem's noise, first pose fixed, unaligned."""
+    """Sigma (3D, root of the trace) of the poses by the estimator's covariances, unaligned, first pose fixed."""
 
-    position_rmse: Annotated[Number, Field(description="RMS along the path, m")]
+    position_rmse: Annotated[Number, Field(description="RMS along the trajectory, m")]
     position_final: Annotated[Number, Field(description="of the last pose that has a covariance, m")]
-    rotation_rmse_deg: Annotated[Number, Field(description="RMS along the path, degrees")]
+    rotation_rmse_deg: Annotated[Number, Field(description="RMS along the trajectory, degrees")]
     rotation_final_deg: Annotated[Number, Field(description="of the last pose that has a covariance, degrees")]
 
 

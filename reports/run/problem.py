@@ -190,12 +190,12 @@ def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Se
     """Reads or simulates the recording with its ground truth; `pictures` gets its images. Raises InputError."""
     if settings.sequence is None:
         if settings.time_unit is not None:
-            raise InputError("time-unit: the simulated drive has stamps in seconds; give a SEQUENCE with --time-unit")
+            raise InputError("time-unit: the simulated drive has stamps in seconds; give a RECORDING with --time-unit")
         if settings.truth is not None or settings.truth_frame is not None:
-            raise InputError("truth: the simulated drive has its own truth; give a SEQUENCE with --truth")
-        _require_none(settings, (*BESIDE, *IMAGES), "give a SEQUENCE with it")
+            raise InputError("truth: the simulated drive has its own truth; give a RECORDING with --truth")
+        _require_none(settings, (*BESIDE, *IMAGES), "give a RECORDING with it")
         if settings.imu is not None or settings.imu_calibration is not None:
-            raise InputError("imu: the simulated drive has its own motion; give a SEQUENCE with --imu")
+            raise InputError("imu: the simulated drive has its own motion; give a RECORDING with --imu")
         from fgbaseline.data.simulate import Simulation, simulate
 
         return simulate(Simulation(seed=settings.seed))

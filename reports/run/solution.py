@@ -71,7 +71,7 @@ def solve(
         assert added is not None
         try:
             if reference is None:
-                raise InputError("no estimator gave an answer to align it to")
+                raise InputError("no estimator succeeded, so there is nothing to align it to")
             estimates[name], captions[name] = _aligned(problem, estimates[reference], name, source, added.settings)
         except InputError as error:
             estimates[name] = Estimate.failed(name, str(error), problem.n_frames, len(problem.excluded))

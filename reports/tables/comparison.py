@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Results = Mapping[str, Mapping[str, Any]]
-"""figures of the reference and of every estimate, as JSON has them: see `comparison_summary.results_by_name`"""
+"""values of the reference and of every estimate, as JSON has them: see `comparison_summary.results_by_name`"""
 
 
 def comparison_table(comparison: Comparison, results: Results, caption: str, *, mark_reference: bool = False) -> Table:
-    """A row for each figure, a column for each trajectory: the reference is one of them where it has a figure."""
+    """A row for each metric, a column for each trajectory: the reference is one of them where it has a value."""
     reference = comparison.reference.name
     metrics = _metrics(comparison, results)
     rivals = [name for name, result in comparison.results.items() if not result.entry.by_product]
@@ -51,7 +51,7 @@ def _unresolved(comparison: Comparison, metric: Metric, values: Mapping[str, Val
 
 
 def main_columns(comparison: Comparison, results: Results) -> dict[str, list[Any]]:
-    """Columns of `table.csv`, one row per estimate: the figures, and behind each with an interval `low` and `high`."""
+    """Columns of `table.csv`, one row per estimate: the values, and after each with an interval `low` and `high`."""
     table: dict[str, list[Any]] = {"estimate": list(comparison.results)}
     for m in _metrics(comparison, results):
         values = [m.value(results[name]) for name in comparison.results]
@@ -63,7 +63,7 @@ def main_columns(comparison: Comparison, results: Results) -> dict[str, list[Any
 
 
 def main_frame(comparison: Comparison, results: Results) -> "pd.DataFrame":
-    """The figures of `main_columns` without their intervals: one metric a row, one estimate a column."""
+    """The values of `main_columns` without their intervals: one metric a row, one estimate a column."""
     import pandas as pd
 
     metrics = _metrics(comparison, results)
@@ -79,7 +79,7 @@ def metrics_columns(comparison: Comparison, results: Results) -> dict[str, list[
 
 
 def _metrics(comparison: Comparison, results: Mapping[str, Any]) -> list[Metric]:
-    """Metrics of which some trajectory has a figure."""
+    """Metrics of which some trajectory has a value."""
     found = [result.segments for result in comparison.results.values() if result.segments is not None]
     fitted = "" if all(s.official for s in found) else f"{SEGMENTS} (lengths fitted to the path)"
     return [
@@ -90,7 +90,7 @@ def _metrics(comparison: Comparison, results: Mapping[str, Any]) -> list[Metric]
 
 
 def _figures(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Value]]:
-    """Paths of the numbers, and of the figures with an interval."""
+    """Paths of the numbers, and of the values with an interval."""
     for key, inner in tree.items():
         path = f"{above}.{key}" if above else key
         if isinstance(inner, Mapping) and not {*Value._fields} <= inner.keys():

@@ -1,4 +1,4 @@
-"""Tables of a run: main figures and evidence of each estimator, the terminal's, and metrics.csv."""
+"""Tables of a run: main values and evidence of each estimator, the terminal's, and metrics.csv."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -28,7 +28,7 @@ Estimators = Mapping[str, Mapping[str, Any]]
 
 
 def main_table(run: Run, estimators: Estimators) -> Table:
-    """Every estimator's main figures from `estimators` of `summary.json`; figures that no estimator has are left out.
+    """Every estimator's main values from `estimators` of `summary.json`; values that no estimator has are left out.
 
     Estimates from the reference's own run or graph are close to it by construction and are not called best.
     """
@@ -57,7 +57,7 @@ def _unranked(run: Run) -> str:
 
 
 def main_values(estimators: Estimators) -> pd.DataFrame:
-    """`table.csv`: one row per estimator, its status and the main figures that any of them has."""
+    """`table.csv`: one row per estimator, its status and the main values that any of them has."""
     results = {name: e for name, e in estimators.items() if e["status"] != "failed"}
     values = {m.full_title: {name: m.value(e).value for name, e in results.items()} for m in shown_in(MAIN)}
     table = pd.DataFrame(values, index=pd.Index(estimators, name="estimator")).dropna(axis="columns", how="all")
@@ -72,7 +72,7 @@ def evidence_table(run: Run, estimators: Estimators) -> Table:
 
 
 def terminal_table(run: Run, estimators: Estimators) -> Table:
-    """The few figures of every estimator that a terminal has room for; those that no estimator has are left out."""
+    """The few values of every estimator that a terminal has room for; those that no estimator has are left out."""
     metrics = [m for m in shown_in(TERMINAL) if any(not isnan(m.value(e).value) for e in estimators.values())]
     if len({e["coverage"] for e in estimators.values()}) == 1:
         metrics = [metric for metric in metrics if not metric.uneven_only]
@@ -87,7 +87,7 @@ def terminal_table(run: Run, estimators: Estimators) -> Table:
 
 
 def _resolutions(run: Run, metrics: Iterable[Metric]) -> dict[Metric, float]:
-    """Sizes below which figures are rounding."""
+    """Sizes below which values are rounding."""
     return {m: ate_resolution(run) if m.group == ATE else RESOLUTION for m in metrics}
 
 
@@ -151,7 +151,7 @@ def _shown(
 
 
 def main_frame(run: Run, estimators: Estimators) -> pd.DataFrame:
-    """The figures of `main_table`, one metric a row and one estimator a column; NaN where there is none."""
+    """The values of `main_table`, one metric a row and one estimator a column; NaN where there is none."""
     values, _, _ = _shown(run, estimators, shown_in(MAIN))
     rows = [[of_each.get(name, nan) for name in estimators] for of_each in values.values()]
     return pd.DataFrame(rows, pd.Index([m.full_title for m in values], name="metric"), list(estimators))
@@ -173,11 +173,11 @@ def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
 def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:
     """Reason of a missing value in the summary's notes, by its own key or its parent's."""
     notes: Mapping[str, str] = estimator.get("notes") or {}
-    return notes.get(metric.key) or notes.get(metric.path[0]) or metric.absent or "no such figure"
+    return notes.get(metric.key) or notes.get(metric.path[0]) or metric.absent or "no such value"
 
 
 def _left_out(estimator: Mapping[str, Any], metric: Metric) -> str:
-    """Errors or frames that a figure leaves out, and why; empty where it leaves out none."""
+    """Errors or frames that a value leaves out, and why; empty where it leaves out none."""
     if metric.path[0] == "nees_reference":
         frames, left_out = (int(at(estimator, "nees_reference", key) or 0) for key in ("frames", "left_out"))
         if not left_out or metric.path[1] == "left_out":

@@ -165,7 +165,7 @@ def _where(events: list[Event]) -> tuple[Cell, ...]:
 def _frames(
     title: str, tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], figures: Mapping[str, str]
 ) -> Table:
-    """A row for each row of each estimator's table; headings -> its columns of words and of figures."""
+    """A row for each row of each estimator's table; headings -> its columns of words and of values."""
     rows = tuple(
         Row(
             name,
@@ -182,7 +182,7 @@ def _frames(
 
 
 def _numbers(*values: object) -> tuple[Cell, ...]:
-    """Cells of figures; 0 with the resolution for rounding."""
+    """Cells of values; 0 with the resolution for rounding."""
     return tuple(
         Cell(resolved(v, RESOLUTION) if isinstance(v, float) and 0.0 < abs(v) < RESOLUTION else number(v))
         for v in values

@@ -45,7 +45,7 @@ class Column:
 
 
 class Cell(NamedTuple):
-    """A figure as text, whether it is the best of its column, and the mark of the note on it."""
+    """A value as text, whether it is the best of its column, and the mark of the note on it."""
 
     text: str
     best: bool = False
@@ -142,7 +142,7 @@ def print_table(
 ) -> None:
     """Prints the table; `styles` has rich's style for the rows of a status, `spaced` leaves a line between rows.
 
-    Columns that do not fit side by side stand in several tables below one another: figures, intervals and words are
+    Columns that do not fit side by side stand in several tables below one another: values, intervals and words are
     never broken.
     """
     from rich.console import Console

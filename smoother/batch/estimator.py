@@ -25,7 +25,7 @@ from ..isam2.estimator import isam2
 from .full_graph import full_graph
 from .levenberg_marquardt import LocalMinimum, optimize_from_estimate, optimize_from_path
 
-DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's answer"
+DEAD_RECKONING, ISAM2 = "dead reckoning", "isam2's solution"
 SAME_COST = 1e-4
 """relative difference of two costs up to which both starts found the same minimum"""
 
@@ -37,7 +37,7 @@ def batch(
     *,
     from_dead_reckoning: bool = True,
 ) -> Estimate:
-    """Minimum of the graph of iSAM2, by Levenberg-Marquardt from dead reckoning and from the answer of iSAM2.
+    """Minimum of the graph of iSAM2, by Levenberg-Marquardt from dead reckoning and from the solution of iSAM2.
 
     The observations are those that iSAM2 used, so that costs are comparable. If iSAM2 failed, they are those of the
     landmarks determined along dead reckoning, which is then the only start. An event reports both costs.
@@ -98,7 +98,7 @@ def _solve(problem: Problem, answer: Estimate, *, both: bool) -> Estimate:
 def _status(answer: Estimate, events: list[Event]) -> tuple[Status, str]:
     trouble = [f"{kind} ({n})" for kind, n in sorted(Counter(event.kind for event in events).items())]
     if answer.status is Status.FAILED:
-        trouble.insert(0, f"isam2 gave no answer to start from ({answer.reason})")
+        trouble.insert(0, f"isam2 failed, so there is no start ({answer.reason})")
     return (Status.RECOVERED, ", ".join(trouble)) if trouble else (Status.OK, "")
 
 
@@ -143,7 +143,7 @@ def _costs(minima: list[LocalMinimum], last: int, *, both: bool) -> Event:
     share = high / low - 1.0 if low > 0 else float("inf")
     one, other = (poses_from_values(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)
     rmse = float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=1))))
-    apart = f"they differ by {share:.1e} of it, the paths by {rmse:.2g} m (RMSE)"
+    apart = f"they differ by {share:.1e} of it, the trajectories by {rmse:.2g} m (RMSE)"
     if share <= SAME_COST:
         return Event(last, EventKind.SAME_COST, f"the cost is {costs}: {apart}")
     return Event(last, EventKind.DIFFERENT_COSTS, f"the cost is {costs}: {apart}; the lower one counts")

@@ -165,7 +165,7 @@ def test_one_run_ranks_no_estimator_and_missing_estimates_are_named() -> None:
     assert "one run does not rank them" in winner("drive", ranked(a=[1.0], b=[2.0]), ATE, frozenset())
     said = winner("drive", ranked(a=[1.0, 1.1, 1.0], b=[2.0, 2.1, 2.0], c=[0.1, np.nan, np.nan]), ATE, frozenset())
     assert "smallest ATE a " in said
-    assert "not ranked for missing answers: c (1 of 3 runs, 0.900 m below a in these)" in said
+    assert "not ranked for failed runs: c (1 of 3 runs, 0.900 m below a in these)" in said
     same = winner("drive", ranked(isam2=[1.0, 1.1, 1.0], batch=[0.9, 0.8, 0.9]), ATE, frozenset({"batch"}))
     assert "batch" not in same
 

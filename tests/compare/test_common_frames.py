@@ -122,10 +122,10 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
         assert "of the time, %" in text.replace("\\%", "%")
         assert "49.7" in text
-        assert "RMSE over common moments, m" in text
+        assert "RMSE over common stamps, m" in text
     bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
     assert len(bold) == 1  # frames that one estimate alone has do not decide the ranking
-    assert "common moments" in bold[0]
+    assert "common stamps" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
         rows = {row["estimate"]: row for row in csv.DictReader(file)}
     assert float(rows["lost"]["coverage: of the time, %"]) == pytest.approx(100 * 99 / 199)
@@ -193,7 +193,7 @@ def test_a_bench_reports_estimators_with_fewer_answers_and_a_lower_error_than_th
         frozenset(),
     )
     assert said.startswith("town: ATE sound ")
-    assert "not ranked for missing answers: bold (2 of 3 runs, 0.100 m below sound in these)" in said
+    assert "not ranked for failed runs: bold (2 of 3 runs, 0.100 m below sound in these)" in said
 
 
 def test_case_25_one_estimate_lost_track_half_way() -> None:

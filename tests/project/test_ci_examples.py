@@ -39,7 +39,7 @@ def test_the_github_workflow_is_complete() -> None:
     ]
     assert all(re.fullmatch(r"actions/[\w-]+@v\d+", name) for name in uses)
     after = STEPS[[step.get("name") for step in STEPS].index("Check") + 1 :]
-    assert all("!cancelled()" in step["if"] for step in after)  # reported also where a limit falls short
+    assert all("!cancelled()" in step["if"] for step in after)  # reported also where a limit is violated
     assert after[-1]["with"]["path"] == "out"
 
 
@@ -101,4 +101,4 @@ def test_the_commands_run_in_their_order_and_separate_good_from_bad(repository: 
     limits.write_text(limits.read_text().replace("at_most = 0.5", "at_most = 0.000001"))
     assert bash(OURS[-1], repository).returncode == 1
     assert JUnitXml.fromfile(str(repository / "out" / "check.xml")).failures == 2
-    assert "fall short" in (repository / "out" / "check.md").read_text()
+    assert "violated" in (repository / "out" / "check.md").read_text()

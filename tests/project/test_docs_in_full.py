@@ -53,7 +53,7 @@ EXTRINSIC = "utias/2011_09_30_drive_0027_sync_KLT.mat"
 HOST = "tcp://host:8786"
 """the machine of a Dask scheduler, in whose place this one stands"""
 ALLOWED = {"diagnose": (0, 1), "check": (0, 1)}
-"""exit codes other than 0 alone: it found something; the limits of the example fall short on that recording"""
+"""exit codes other than 0 alone: it found something; the limits of the example are violated on that recording"""
 
 
 class FullPlace:

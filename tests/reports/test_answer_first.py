@@ -40,7 +40,7 @@ def test_overconfidence_comes_second_and_many_estimators_make_one_sentence() -> 
     sentences = verdict(run_with_claims(*names))
     assert sentences[0].startswith("The reference")
     assert sentences[1].startswith(
-        "Overconfident: filter-0 claims a 1-sigma of 0.00173 m (RMS) but differs from ground truth by 1.7"
+        "Overconfident: filter-0 claims a position sigma of 0.00173 m (RMS) but differs from ground truth by 1.7"
     )
     assert all(name in sentences[1] for name in names)
     assert len([s for s in sentences if "filter-7" in s and "claims" in s]) == 1
@@ -52,7 +52,7 @@ def test_the_sigma_of_the_reference_is_in_summary_and_sentence() -> None:
     assert reference.sigma is not None
     assert reference.sigma.position_rmse == pytest.approx(0.1 * np.sqrt(3.0))
     assert reference.sigma.rotation_final_deg == pytest.approx(np.rad2deg(0.1 * np.sqrt(3.0)))
-    said = "1-sigma of isam2 itself, with the first pose fixed: position 0.173 m RMS, 0.173 m at the end; rotation "
+    said = "Sigma of isam2 itself, with the first pose fixed: position (3D) 0.173 m RMS, 0.173 m at the end; rotation "
     assert any(s.startswith(said) for s in verdict(run))
 
 
@@ -126,7 +126,7 @@ def test_a_limit_below_the_sigma_of_the_reference_is_undecided(at_most: float, c
     limits.write_text(text + "within_reference_sigma = true\n")
     checked = evaluate(read_limits(limits), read_folder(tmp_path), None)
     assert checked.exit_code == code
-    assert checked.sigmas[0].startswith("1-sigma of isam2 itself, with the first pose fixed: position 0.173 m RMS")
+    assert checked.sigmas[0].startswith("Sigma of isam2 itself, with the first pose fixed: position (3D) 0.173 m RMS")
     limits.write_text(text)
     assert evaluate(read_limits(limits), read_folder(tmp_path), None).exit_code == (1 if code else 0)
 

@@ -88,7 +88,7 @@ def test_a_process_that_dies_and_an_estimator_that_fails_are_rows_and_stop_nothi
     assert "its process died" in runs.loc[("drive duration=1.2", "dying"), "reason"]
     assert "nothing <to> go_by" in runs.loc[("drive duration=1.4", "dying"), "reason"]
     assert "1 of 3 runs failed; the reasons are below" in result.stdout
-    assert "dying gave no answer in 1 of 3 runs" in result.stdout
+    assert "dying failed in 1 of 3 runs" in result.stdout
     page = (tmp_path / "out" / "report.html").read_text()
     assert "nothing &lt;to&gt; go_by" in page
     assert "nothing <to>" not in page

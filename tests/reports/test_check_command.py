@@ -48,7 +48,7 @@ def test_the_command_exits_with_what_it_found(document: Any, code: int, tmp_path
     titles, *rows = result.stdout.splitlines()[1 if code == 2 else 0 :]
     assert titles.split() == ["limit", "estimator", "metric", "value", "bound", "margin", "baseline", "change"]
     assert len(rows) == 4 + {0: 1, 1: 2, 2: 3}[code]
-    said = {0: "All 4 limits hold.", 1: "3 of 4 limits fall short.", 2: "2 of 4 limits are undecided."}[code]
+    said = {0: "All 4 limits hold.", 1: "3 of 4 limits are violated.", 2: "2 of 4 limits are undecided."}[code]
     assert rows[-1] == said
     if code == 2:
         assert result.stdout.startswith("The reference, isam2, is untrusted: it | lost <it>.")
@@ -58,10 +58,10 @@ def test_a_row_has_value_bound_margin_and_change(tmp_path: Path, capsys: pytest.
     write(tmp_path, BAD, LIMITS, GOOD)
     assert held(tmp_path) == 1
     rows = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert "falls short ekf ate.rmse (m) 0.6 <= 0.5 -0.1 0.4 +0.2 (+50 %)" in rows
+    assert "violated ekf ate.rmse (m) 0.6 <= 0.5 -0.1 0.4 +0.2 (+50 %)" in rows
     assert "holds isam2 divergence.rmse (m) 0.3 <= 1 +0.7 0.2 +0.1 (+50 %)" in rows
-    assert "falls short isam2 divergence.rmse (m) 0.3 <= 0.22 (10 % allowed) -0.08 0.2 +0.1 (+50 %)" in rows
-    assert "falls short joint-ekf ate.rmse (m) - <= 0.5 - 0.3 -" in rows
+    assert "violated isam2 divergence.rmse (m) 0.3 <= 0.22 (10 % allowed) -0.08 0.2 +0.1 (+50 %)" in rows
+    assert "violated joint-ekf ate.rmse (m) - <= 0.5 - 0.3 -" in rows
     assert any("joint-ekf, ate.rmse: the estimator failed: it lost its way" in row for row in rows)
 
 
@@ -74,7 +74,7 @@ def test_the_junit_file_reads_the_same_in_another_parser(document: Any, tmp_path
     suites = {suite.name: suite for suite in report}
     cases = list(suites["town"])
     results = [[type(each) for each in case.result] for case in cases]
-    kinds = {"holds": [], "falls short": [Failure], "cannot tell": [Error]}
+    kinds = {"holds": [], "violated": [Failure], "undecided": [Error]}
     assert results == [kinds[line["outcome"]] for line in lines]
     assert [case.classname for case in cases] == [line["estimator"] for line in lines]
     assert len({(case.classname, case.name) for case in cases}) == len(cases)
@@ -87,7 +87,7 @@ def test_the_junit_file_reads_the_same_in_another_parser(document: Any, tmp_path
     )
     assert bool(everything) == (code != 0)  # a red check is never a green report
     for case, line in zip(cases, lines, strict=True):
-        if line["outcome"] == "falls short":
+        if line["outcome"] == "violated":
             assert line["limit"] in case.result[0].text
 
 
@@ -122,8 +122,8 @@ def test_markdown_goes_to_the_page_of_a_github_job_after_what_is_there(
     held(tmp_path)
     text = (tmp_path / "check.md").read_text()
     assert page.read_text() == f"what an earlier step said\n{text}\n"
-    assert text.startswith("### Accuracy: 3 of 4 limits fall short.\n")
-    assert "| ❌ falls short | ekf | ate.rmse (m) | 0.6 | \\<= 0.5 | -0.1 | 0.4 | +0.2 (+50 %) |" in text
+    assert text.startswith("### Accuracy: 3 of 4 limits are violated.\n")
+    assert "| ❌ violated | ekf | ate.rmse (m) | 0.6 | \\<= 0.5 | -0.1 | 0.4 | +0.2 (+50 %) |" in text
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "missing" / "summary.md"))
     with pytest.raises(InputError, match=r"summary\.md: it cannot be written"):
         held(tmp_path)
@@ -135,7 +135,7 @@ def test_the_json_file_has_every_number_in_full(tmp_path: Path) -> None:
     held(tmp_path)
     document = json.loads((tmp_path / "check.json").read_text())
     assert (document["schema"], document["exit_code"]) == ("fgbaseline/check/1", 0)
-    assert document["count"] == {"holds": 3, "cannot tell": 0, "falls short": 0}
+    assert document["count"] == {"holds": 3, "undecided": 0, "violated": 0}
     ekf, bound, before = document["lines"]
     assert (ekf["value"], ekf["at_most"], ekf["at_least"], ekf["margin"]) == (0.25, 0.5, None, 0.25)
     assert (bound["value"], bound["unit"], bound["baseline"]) == (value, "m", 0.2)
@@ -216,7 +216,7 @@ def test_a_new_baseline_holds_the_guarded_figures_sorted_and_rounded(tmp_path: P
     assert (tmp_path / "baseline.json").read_text() == TEXT
 
 
-def test_a_baseline_is_updated_where_a_limit_falls_short_only_on_request(
+def test_a_baseline_is_updated_where_a_limit_is_violated_only_on_request(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path, THIRD, LIMITS)
@@ -225,7 +225,7 @@ def test_a_baseline_is_updated_where_a_limit_falls_short_only_on_request(
     write(tmp_path, worse, LIMITS)
     assert held(tmp_path, update=True) == 1
     assert (tmp_path / "baseline.json").read_text() == TEXT
-    assert "1 of 4 limits falls short; correct that, or use --accept-worse" in capsys.readouterr().err
+    assert "1 of 4 limits is violated; correct that, or use --accept-worse" in capsys.readouterr().err
     assert held(tmp_path, update=True, accept_worse=True) == 0
     assert (tmp_path / "baseline.json").read_text() == TEXT.replace("0.33333", "0.9")
     write(tmp_path, summary(isam2=estimator(), ekf=estimator(0.7), joint_ekf=estimator(0.3)), LIMITS)

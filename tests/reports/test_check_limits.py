@@ -53,7 +53,7 @@ def test_the_larger_tolerance_counts_and_sums_are_exact() -> None:
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
 def test_a_value_that_is_not_finite_never_holds(value: float | None) -> None:
     infinite = value is not None and math.isinf(value)
-    assert Bounds().judge(value) is (Outcome.FALLS_SHORT if infinite else Outcome.CANNOT_TELL)
+    assert Bounds().judge(value) is (Outcome.VIOLATED if infinite else Outcome.UNDECIDED)
 
 
 def checked(folder: Path, document: Any, limits: str, baseline: Any = None, *, updating: bool = False) -> Checked:
@@ -74,7 +74,7 @@ BOTH = summary(isam2=estimator(0.1), ekf=estimator(0.6), joint_ekf=estimator(0.5
 def test_every_estimator_that_a_glob_matches_is_judged(tmp_path: Path) -> None:
     result = checked(tmp_path, BOTH, ATE.replace("at_most", 'estimators = "*ekf"\nat_most'))
     assert [(line.estimator, line.outcome.value, line.margin) for line in result.lines] == [
-        ("ekf", "falls short", pytest.approx(-0.1)),
+        ("ekf", "violated", pytest.approx(-0.1)),
         ("joint-ekf", "holds", 0.0),
     ]
     assert result.exit_code == 1
@@ -89,14 +89,14 @@ def test_every_estimator_that_a_glob_matches_is_judged(tmp_path: Path) -> None:
         (
             estimator(None, notes={"ate": "the recording has no truth"}),
             "the recording has no truth",
-            Outcome.CANNOT_TELL,
+            Outcome.UNDECIDED,
         ),
-        (estimator(ate=math.nan), "not a finite number", Outcome.CANNOT_TELL),
-        (estimator(ate=math.inf), "infinite", Outcome.FALLS_SHORT),
-        (estimator(None, notes={"ate.rmse": "infinite"}), "infinite", Outcome.FALLS_SHORT),
-        ({**estimator(), "ate": None, "notes": {"ate": "no truth"}}, "no truth", Outcome.CANNOT_TELL),
-        ({k: v for k, v in estimator().items() if k != "ate"}, "no such metric", Outcome.FALLS_SHORT),
-        (estimator(0.1, status="failed"), "the estimator failed: it lost its way", Outcome.FALLS_SHORT),
+        (estimator(ate=math.nan), "not a finite number", Outcome.UNDECIDED),
+        (estimator(ate=math.inf), "infinite", Outcome.VIOLATED),
+        (estimator(None, notes={"ate.rmse": "infinite"}), "infinite", Outcome.VIOLATED),
+        ({**estimator(), "ate": None, "notes": {"ate": "no truth"}}, "no truth", Outcome.UNDECIDED),
+        ({k: v for k, v in estimator().items() if k != "ate"}, "no such metric", Outcome.VIOLATED),
+        (estimator(0.1, status="failed"), "the estimator failed: it lost its way", Outcome.VIOLATED),
     ],
 )
 @pytest.mark.parametrize("asked", ["at_most = 1e9", 'baseline = { better = "lower", relative = 9 }', "at_least = -1e9"])
@@ -109,7 +109,7 @@ def test_a_missing_or_failed_metric_never_passes(
     assert result.lines[0].outcome is Outcome.HOLDS
     assert result.lines[1].outcome is outcome
     assert reason in result.lines[1].reason
-    assert result.exit_code == (1 if outcome is Outcome.FALLS_SHORT else 2)
+    assert result.exit_code == (1 if outcome is Outcome.VIOLATED else 2)
 
 
 def test_errors_that_a_figure_leaves_out_are_counted_beside_it(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_a_bound_and_a_baseline_are_two_lines_with_the_change_on_both(tmp_path: 
     bound, before = checked(tmp_path, summary(isam2=estimator(0.36)), limits, old).lines
     assert (bound.outcome, bound.before, bound.change) == (Outcome.HOLDS, 0.3, 0.06)
     assert (before.outcome, before.bounds, before.margin) == (
-        Outcome.FALLS_SHORT,
+        Outcome.VIOLATED,
         Bounds(at_most=0.33),
         pytest.approx(-0.03),
     )
@@ -137,12 +137,12 @@ def test_a_bound_and_a_baseline_are_two_lines_with_the_change_on_both(tmp_path: 
     [
         ("lower", 0.2, "holds"),
         ("lower", 0.44, "holds"),
-        ("lower", 0.45, "falls short"),
+        ("lower", 0.45, "violated"),
         ("higher", 0.9, "holds"),
-        ("higher", 0.35, "falls short"),
+        ("higher", 0.35, "violated"),
         ("neither", 0.41, "holds"),
-        ("neither", 0.3, "falls short"),
-        ("neither", 0.5, "falls short"),
+        ("neither", 0.3, "violated"),
+        ("neither", 0.5, "violated"),
     ],
 )
 def test_only_a_change_for_the_worse_counts(better: str, ate: float, outcome: str, tmp_path: Path) -> None:
@@ -166,14 +166,14 @@ DIVERGENCE = '[[limit]]\nmetric = "divergence.rmse"\nat_most = 1\n'
     [
         ("trusted", DIVERGENCE, "holds", 0),
         ("doubtful", DIVERGENCE, "holds", 0),
-        ("untrusted", DIVERGENCE, "cannot tell", 2),
+        ("untrusted", DIVERGENCE, "undecided", 2),
         ("untrusted", ATE, "holds", 2),
-        ("untrusted", ATE.replace("0.5", "0.1"), "falls short", 1),
-        ("doubtful", 'reference = "trusted"\n' + DIVERGENCE, "cannot tell", 2),
+        ("untrusted", ATE.replace("0.5", "0.1"), "violated", 1),
+        ("doubtful", 'reference = "trusted"\n' + DIVERGENCE, "undecided", 2),
         ("trusted", 'reference = "trusted"\n' + DIVERGENCE, "holds", 0),
         ("untrusted", 'reference = "none"\n' + ATE, "holds", 0),
-        ("untrusted", 'reference = "none"\n' + DIVERGENCE, "cannot tell", 2),
-        ("untrusted", 'reference = "none"\n' + DIVERGENCE.replace("divergence.rmse", "map.median"), "cannot tell", 2),
+        ("untrusted", 'reference = "none"\n' + DIVERGENCE, "undecided", 2),
+        ("untrusted", 'reference = "none"\n' + DIVERGENCE.replace("divergence.rmse", "map.median"), "undecided", 2),
     ],
 )
 def test_a_reference_that_is_not_trusted_leaves_the_check_undecided(
@@ -193,7 +193,7 @@ def test_a_baseline_that_is_not_comparable_is_undecided(tmp_path: Path) -> None:
 
     def undecided_reason(baseline: Any) -> str:
         result = checked(tmp_path, new, limits, baseline)
-        assert (only(result).outcome, result.exit_code) == (Outcome.CANNOT_TELL, 2)
+        assert (only(result).outcome, result.exit_code) == (Outcome.UNDECIDED, 2)
         return only(result).reason
 
     assert "no isam2" in undecided_reason(summary(ekf=estimator()))
@@ -210,7 +210,7 @@ def test_several_runs_are_held_each_by_its_name(tmp_path: Path) -> None:
     runs = {"town": summary(isam2=estimator(0.1)), "loop": summary("doubtful", isam2=estimator(0.6))}
     bench = {"schema": "fgbaseline/bench/1", "runs": runs}
     result = checked(tmp_path, bench, ATE)
-    assert [(line.run, line.outcome.value) for line in result.lines] == [("town", "holds"), ("loop", "falls short")]
+    assert [(line.run, line.outcome.value) for line in result.lines] == [("town", "holds"), ("loop", "violated")]
     assert "The reference of loop, isam2, is doubtful" in result.references[0]
     one = checked(tmp_path, bench, ATE.replace("at_most", 'runs = "to*"\nat_most'))
     assert only(one).run == "town"

@@ -73,9 +73,9 @@ def test_the_message_shows_the_table_and_where_the_figure_is(tmp_path: Path) -> 
     lines = str(error.value).splitlines()
     assert lines[0] == "estimate does not meet its limits, against reference:"
     assert lines[1].split() == ["limit", "metric", "value", "bound", "margin"]
-    assert re.match(r"falls short  ate\.rmse \(m\) +0\.\d+ +<= 0\.1 +-0\.\d+$", lines[2])
-    assert re.match(r"holds        divergence\.rmse \(m\) +\d", lines[3])
-    assert re.match(r"holds        coverage +1 +>= 0\.95 +\+0\.05$", lines[4])
+    assert re.match(r"violated  ate\.rmse \(m\) +0\.\d+ +<= 0\.1 +-0\.\d+$", lines[2])
+    assert re.match(r"holds     divergence\.rmse \(m\) +\d", lines[3])
+    assert re.match(r"holds     coverage +1 +>= 0\.95 +\+0\.05$", lines[4])
     assert "SE(3)-aligned over all 200 poses" in lines[5]
     assert lines[6] == f"The figure is in {figure}"
     assert figure.read_bytes().startswith(b"\x89PNG")
@@ -93,7 +93,7 @@ def test_without_a_place_the_figure_has_one_of_its_own() -> None:
 def test_an_estimate_that_stops_half_way_does_not_pass(tmp_path: Path) -> None:
     half = estimated(0.0)
     half[T // 2 :] = np.nan
-    with pytest.raises(AssertionError, match=r"falls short  coverage +0\.49"):
+    with pytest.raises(AssertionError, match=r"violated  coverage +0\.49"):
         assert_accuracy((STAMPS, half), (STAMPS, true_path()), ate=1.0, figure=tmp_path / "x.png")
     values = assert_accuracy((STAMPS, half), (STAMPS, true_path()), ate=1.0, coverage=0.4)
     assert values["coverage"] == pytest.approx(99 / 199)
@@ -162,7 +162,7 @@ def test_the_fixture_is_there_once_fgbaseline_is_installed(tmp_path: Path) -> No
     result = users_pytest(tmp_path, "--accuracy-figures", "figures", "--basetemp", str(tmp_path / "base"))
     assert result.returncode == 1
     assert "1 failed, 2 passed" in result.stdout
-    assert re.search(r"E +falls short  ate\.rmse \(m\)", result.stdout)
+    assert re.search(r"E +violated  ate\.rmse \(m\)", result.stdout)
     assert "The figure is in figures/test_filter_0.1_.png" in result.stdout
     assert "in asserted" not in result.stdout
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["test_filter_0.1_.png"]

@@ -133,7 +133,7 @@ def test_no_baseline_is_written_from_too_little(tmp_path: Path) -> None:
 
 def test_the_pytest_fixture_asks_for_the_same_sample() -> None:
     t, poses = 0.1 * np.arange(200), path()
-    with pytest.raises(AssertionError, match=r"falls short +pairs +29 +>= 30"):
+    with pytest.raises(AssertionError, match=r"violated +pairs +29 +>= 30"):
         assert_accuracy((t[:29], poses[:29]), (t[:29], poses[:29]), ate=1.0)
     assert assert_accuracy((t[:29], poses[:29]), (t[:29], poses[:29]), ate=1.0, smallest_sample=20)["pairs"] == 29
 

@@ -65,7 +65,7 @@ RUN = [
     Bad("run drive.npz --out out --truth missing.txt --truth-frame imu", ("missing.txt", "no such file")),
     Bad("run drive.npz --out out --truth text.npz --truth-frame imu", ("text.npz", "line 1")),
     Bad("run drive.npz --out out --truth kitti_long.txt --truth-frame imu", ("kitti_long.txt", "1000 lines")),
-    Bad("run --out out --truth truth.tum --truth-frame imu", ("truth", "SEQUENCE")),
+    Bad("run --out out --truth truth.tum --truth-frame imu", ("truth", "RECORDING")),
     Bad("run drive.npz --out ours", ("ours", "--force")),
     Bad("run drive.npz --out theirs --force", ("theirs", "summary.json")),
     Bad("run drive.npz --out text.npz --force", ("text.npz", "no folder")),

@@ -198,8 +198,8 @@ def test_the_divergence_onset_is_reported_only_for_paths_with_a_common_start(fil
     assert "do not start together" in aligned.results["far"].notes["passing"]
     together = compare(files / "truth.tum", files / "far.npz", align="first-pose").results["far"]
     assert together.passing is not None
-    assert together.departure["position"][together.passing.frame] > together.bound
-    assert (together.departure["position"][: together.passing.frame] <= together.bound).all()
+    assert together.divergence["position"][together.passing.frame] > together.bound
+    assert (together.divergence["position"][: together.passing.frame] <= together.bound).all()
 
 
 def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> None:
@@ -221,10 +221,12 @@ def test_own_landmarks_and_triangulated_ones_explain_the_pixels(files: Path) -> 
     row, far = result.table["same"], result.table["far"]
     # Norm of four numbers of 0.5 px each: 0.5 sqrt(chi-square with 4 degrees of freedom), median 0.916.
     assert row["reprojection error: median, px"] == pytest.approx(0.916, abs=0.03)
-    assert row["reprojection error: median, triangulated along the path, px"] < row["reprojection error: median, px"]
     assert (
-        far["reprojection error: median, triangulated along the path, px"]
-        > 2.0 * row["reprojection error: median, triangulated along the path, px"]
+        row["reprojection error: median, triangulated along the trajectory, px"] < row["reprojection error: median, px"]
+    )
+    assert (
+        far["reprojection error: median, triangulated along the trajectory, px"]
+        > 2.0 * row["reprojection error: median, triangulated along the trajectory, px"]
     )
     assert result.summary.estimates["far"].notes["reprojection"] == "no landmarks came with it"
     assert "reprojection" in result.figures()

@@ -38,7 +38,7 @@ def test_the_length_of_a_path_is_that_of_the_path_and_not_of_a_fit(scale: float)
     estimate = data.Trajectory(reference.t, bent, "mine")
     result = compared(reference, estimate)
     own, its = (np.linalg.norm(np.diff(p.world_T_body[:, :3, 3], axis=0), axis=1).sum() for p in (estimate, reference))
-    sentence = next((s for s in result.verdict if "of the path over the paired poses" in s), "")
+    sentence = next((s for s in result.verdict if "Path length over the paired poses" in s), "")
     assert bool(sentence) == (number(own) != number(its))
     if sentence:
         than = "longer" if own > its else "shorter"

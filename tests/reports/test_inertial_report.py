@@ -189,7 +189,7 @@ def test_limits_judge_velocity_and_biases(tmp_path: Path) -> None:
         checked(run, tmp_path / "a", f"{metric}\nat_most = {1.01 * rmse}")["velocity.rmse", "joint-ekf"][0] == "holds"
     )
     short = checked(run, tmp_path / "b", f"{metric}\nat_most = {0.99 * rmse}")
-    assert short["velocity.rmse", "joint-ekf"][0] == "falls short"
+    assert short["velocity.rmse", "joint-ekf"][0] == "violated"
     every = checked(
         run,
         tmp_path / "c",
@@ -203,16 +203,16 @@ def test_limits_judge_velocity_and_biases(tmp_path: Path) -> None:
         run, tmp_path / "e", 'metric = "velocity_divergence.rmse"\nestimators = "dead-reckoning"\nat_least = 0.0'
     )
     trust = run.trust.verdict.name.lower()
-    assert away["velocity_divergence.rmse", "dead-reckoning"] == ("cannot tell", f"the reference is {trust}")
+    assert away["velocity_divergence.rmse", "dead-reckoning"] == ("undecided", f"the reference is {trust}")
     with pytest.raises(InputError, match=r"velocity\.rsme.*is not a number"):
         checked(run, tmp_path / "d", 'metric = "velocity.rsme"\nat_most = 1.0')
 
 
 def test_limits_on_a_run_without_inertial_data_are_undecided_with_the_reason(tmp_path: Path) -> None:
     outcomes = checked(standard_run(), tmp_path / "a", 'metric = "velocity.rmse"\nat_most = 1.0')
-    assert set(outcomes.values()) == {("cannot tell", NOT_INERTIAL)}
+    assert set(outcomes.values()) == {("undecided", NOT_INERTIAL)}
     poses = checked(inertial_run("poses"), tmp_path / "b", 'metric = "velocity.rmse"\nat_most = 1.0')
-    assert set(poses.values()) == {("cannot tell", "the ground truth has no velocity")}
+    assert set(poses.values()) == {("undecided", "the ground truth has no velocity")}
 
 
 def test_a_run_without_inertial_data_has_none_of_it(tmp_path: Path) -> None:

@@ -255,14 +255,14 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     assert opened.count("#path-view .line") == 7
     assert opened.count(".chart .plot > svg") == 7
     clock = opened.text("#clock")
-    assert clock.startswith("moment ")
+    assert clock.startswith("stamp ")
     assert clock.endswith("\u00a0s")
     opened.page.click('button[data-frame]:has-text("wandering")')
     assert opened.text("#clock") != clock
     cursor = opened.attribute(".chart .cursor", "x1")
     opened.set_frame(10)
     assert opened.attribute(".chart .cursor", "x1") != cursor
-    assert opened.text("#clock") == "moment 10 · 1.0\u00a0s"
+    assert opened.text("#clock") == "stamp 10 · 1.0\u00a0s"
     assert opened.count("#path-view .here.estimator-4") == 0  # late, which has no pose yet
     flat = opened.attribute("#path-view .line.estimator-1", "d")
     opened.page.click('[data-do="solid"]')
@@ -276,7 +276,7 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     assert opened.count("#path-view svg .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
     opened.unfold_values()
     row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
-    at_ten = six().results["steady"].departure["position"][10]
+    at_ten = six().results["steady"].divergence["position"][10]
     assert row[2] == f"{at_ten:#.3g}"
     assert (opened.said, opened.asked) == ([], [compared])
     opened.page.context.close()

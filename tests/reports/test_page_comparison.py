@@ -110,7 +110,7 @@ def test_a_line_goes_through_every_pair_of_poses_and_breaks_where_an_estimate_ha
         stamps = result.matched.reference.t - truth().t[0]
         shown = unpacked(lines[str(number)])
         at = np.argmin(np.abs(t[:, None] - stamps), axis=0)
-        np.testing.assert_allclose(shown[at], result.departure["position"], rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(shown[at], result.divergence["position"], rtol=1e-5, atol=1e-6)
         inside = (t >= stamps[0] - 1e-6) & (t <= stamps[-1] + 1e-6)
         assert np.isfinite(shown[inside]).all()
         assert np.isnan(shown[~inside]).all()

@@ -69,7 +69,7 @@ def test_a_path_below_the_threshold_is_reported_without_onset() -> None:
     assert "Above the threshold" not in sentence
 
 
-def test_the_excluded_share_is_that_of_the_matches_around_the_departure() -> None:
+def test_the_excluded_share_is_that_of_the_matches_around_the_onset() -> None:
     problem = plain_problem(scene())
     frame = problem.sequence.observations.frame
     run = run_of(problem, answer(problem, "ekf", (0.0, 3.0, 0.0)), answer(problem, "isam2"))
@@ -166,8 +166,8 @@ def test_an_order_within_the_sigma_of_the_reference_is_not_one_by_accuracy() -> 
         return [s for s in verdict(run) if "closeness to it, not accuracy" in s]
 
     assert said(5.0) == [
-        "All of them are within 3 times the 1-sigma of isam2 itself, 8.66 m RMS: this order shows closeness to it, "
-        "not accuracy."
+        "All of them are within 3 times the position sigma of isam2 itself, 8.66 m RMS: this order shows closeness to "
+        "it, not accuracy."
     ]
     assert not said(0.1)
 
@@ -181,9 +181,10 @@ def test_a_batch_solution_from_the_answer_of_isam2_is_another_minimum_only_where
         return sentence_of(run_of(problem, answer(problem, "isam2"), batch), "batch")
 
     assert re.fullmatch(
-        r"batch, started at the answer of isam2, stays at the same minimum: 1\.\d+ mm \(RMSE\) from isam2\.", said(2e-3)
+        r"batch, started at the solution of isam2, stays at the same minimum: 1\.\d+ mm \(RMSE\) from isam2\.",
+        said(2e-3),
     )
-    assert said(30.0).startswith("batch, started at the answer of isam2, leaves it: 17")
+    assert said(30.0).startswith("batch, started at the solution of isam2, leaves it: 17")
 
 
 def test_failures_and_recoveries_are_reported_with_their_reason() -> None:

@@ -124,7 +124,7 @@ def test_a_second_run_needs_force(reproduced: Path, folder: Path) -> None:
     [
         (("nowhere.npz",), "nowhere.npz"),
         (("velocities.npz", "velocities.npz"), "give each once"),
-        ((), "SEQUENCE"),
+        ((), "RECORDING"),
         (("velocities.npz", "--sweep-features", "0"), "whole numbers from 1 on"),
         (("velocities.npz", "--sweep-features", "2.5"), "whole numbers from 1 on"),
         (("velocities.npz", "--sweep-noise", "1,nan"), "numbers above 0"),

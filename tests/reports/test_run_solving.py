@@ -226,4 +226,4 @@ def test_batch_is_added_up_to_a_number_of_observations_where_it_has_the_answer_o
     assert list(run.results) == expected
     assert run.settings["estimators"] == ",".join(expected)
     events = {str(event.kind) for event in run.results["batch"].estimate.events} if "batch" in run.results else set()
-    assert ("started at isam2's answer only" in events) == (estimators == ("isam2",))
+    assert ("started at isam2's solution only" in events) == (estimators == ("isam2",))

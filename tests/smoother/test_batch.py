@@ -97,7 +97,7 @@ def test_starts_that_end_at_different_minima_are_an_event_and_the_lower_cost_cou
     (event,) = estimate.events
     assert event.kind == "starts end at different costs"
     assert "dead reckoning" in event.reason
-    assert "isam2's answer" in event.reason
+    assert "isam2's solution" in event.reason
     np.testing.assert_allclose(estimate.world_T_imu, good.world_T_imu, rtol=0, atol=1e-5)
 
 
@@ -117,12 +117,12 @@ def test_started_at_isam2_alone_it_reaches_the_minimum_of_both_starts_unless_isa
     given = {"isam2": smoother.isam2(problem)}
     both, one = smoother.batch(problem, given=given), smoother.batch(problem, given=given, from_dead_reckoning=False)
     (event,) = one.events
-    assert event.kind == "started at isam2's answer only"
+    assert event.kind == "started at isam2's solution only"
     assert "dead reckoning" not in event.reason
     assert one.status is Status.OK
     np.testing.assert_allclose(one.world_T_imu, both.world_T_imu, rtol=0, atol=1e-5)
     verdict = compare.trust(problem, given["isam2"], one)
-    assert any("started at isam2's answer, agrees" in reason for reason in verdict.reasons)
+    assert any("started at isam2's solution, agrees" in reason for reason in verdict.reasons)
 
     failed = Estimate.failed("isam2", "indeterminate", problem.n_frames, len(problem.excluded))
     alone = smoother.batch(problem, given={"isam2": failed}, from_dead_reckoning=False)
