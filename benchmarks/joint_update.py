@@ -25,6 +25,7 @@ from fgbaseline.data.simulate import Simulation
 from fgbaseline.ekf.joint.filter import JointFilter
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import CholeskyFactor, Innovation
+from fgbaseline.geometry import FloatArray
 
 from .growth import posed
 
@@ -38,9 +39,9 @@ class SizedFilter(JointFilter):
     sizes: tuple[int, int] | None = None
     """3n and size"""
 
-    def _record_nis(self, k: int, innovation: Innovation) -> CholeskyFactor | None:
+    def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         self.sizes = (innovation.HP.shape[0], innovation.HP.shape[1])
-        return super()._record_nis(k, innovation)
+        return super()._record_nis(k, innovation, variance)
 
 
 def algebra(rows: int, size: int, random: np.random.Generator) -> float:

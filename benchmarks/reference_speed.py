@@ -22,10 +22,10 @@ from fgbaseline.diagnosis import Calibration, NoiseSettings
 from .claim_table import Row, row, table
 from .gtsam_time import INCREMENTAL, OTHER, gtsam_timed
 
-MOST_OUTSIDE = 15.0
+MOST_OUTSIDE = 25.0
 """%"""
 LEAST_REAL_TIME = 4.0
-MOST_GROWTH = 1.5
+MOST_GROWTH = 1.2
 DRIVE_FRAMES, EARLY = 3000, 300
 LAPS_AT_END = 3
 """long enough for an exchange of the tree to be among them"""

@@ -179,6 +179,36 @@ def _beside(place: Place) -> tuple[Side, Side]:
     return side(place.today), side(place.before)
 
 
+SOLVED = """
+import json, sys, time
+from fgbaseline import data, smoother
+try:
+    from fgbaseline.diagnosis import calibrated
+except ImportError:  # where it was before
+    from fgbaseline.data import calibrated
+problem = calibrated(data.read(sys.argv[1]))
+start = time.perf_counter(), time.process_time()
+smoother.isam2(problem)
+print(json.dumps([time.perf_counter() - start[0], time.process_time() - start[1]]))
+"""
+"""seconds of `isam2` alone, on the problem that each revision makes of a recording"""
+
+
+def _isam2(place: Place) -> tuple[Side, Side]:
+    def side(commands: Path) -> Side:
+        words = [str(commands / "python"), "-c", SOLVED, str(place.recording)]
+
+        def run() -> Taken:
+            text = subprocess.run(
+                words, cwd=place.folder, env=os.environ | ONE_THREAD, stdout=subprocess.PIPE, check=True, text=True
+            ).stdout
+            return Taken(*json.loads(text))
+
+        return run
+
+    return side(place.today), side(place.before)
+
+
 def _within(module: str, ours: str, peer: str, *options: str) -> Callable[[Place], tuple[Side, Side]]:
     """Sides that one process of today's measures, and prints as JSON under these keys."""
 
@@ -252,7 +282,9 @@ ALL = (
         _within("benchmarks.bench_overhead", "workers", "own", "--runs", str(JOBS)),
     ),
     Waiting("run", f"`run 03.npz` beside its estimators, to {BEFORE}", 0.5, _beside),
+    Waiting("isam2", f"`isam2` on 03.npz, to {BEFORE}", 0.65, _isam2),
 )
+NEED_RECORDING = ("run", "isam2")
 
 
 def measured(waiting: Waiting, place: Place, runs: int) -> Row:
@@ -275,7 +307,7 @@ def measured(waiting: Waiting, place: Place, runs: int) -> Row:
 def rows(place: Place, runs: int, only: str = "") -> Iterator[Row]:
     """Every comparison whose name has `only` in it."""
     for waiting in ALL:
-        if only in waiting.name and (waiting.name != "run" or place.recording is not None):
+        if only in waiting.name and (waiting.name not in NEED_RECORDING or place.recording is not None):
             yield measured(waiting, place, runs)
 
 
@@ -285,7 +317,7 @@ def rows(place: Place, runs: int, only: str = "") -> Iterator[Row]:
 @click.option(
     "--recording",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="03.npz, for what a run takes beside its estimators; left out without it.",
+    help="03.npz, for what a run takes beside its estimators, and isam2; both left out without it.",
 )
 @click.option("--write", is_flag=True, help="Write docs/performance.md between its marks.")
 def main(only: str, runs: int, recording: Path | None, write: bool) -> None:

@@ -7,7 +7,7 @@ Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where t
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 
 import matplotlib as mpl
@@ -49,14 +49,14 @@ def lay_out(figure: Figure) -> None:
             label_with_numbers(axis)
         axes.set_title(axes.get_title(loc="left"), loc="left", y=1.0)
     draw_minor_ticks_at_once(figure.axes)
-    fill_grid(figure)
+    measured = fill_grid(figure)
     # "none" would leave a layout engine that does nothing, but for which every figure is drawn twice
     with without_layout_engine():
         figure.set_layout_engine(None)
     for axes in figure.axes:
         axes.set_position(Bbox(np.round(axes.get_position(original=True).get_points(), 4)))
         axes.apply_aspect()
-    _fix_labels(figure)
+    _fix_labels(figure, measured)
 
 
 def without_layout_engine() -> AbstractContextManager[None]:
@@ -64,40 +64,50 @@ def without_layout_engine() -> AbstractContextManager[None]:
     return mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False})
 
 
-def _fix_labels(figure: Figure) -> None:
-    """Labels stay where they are, those of the ordinates of a column of panels in one line."""
+def _fix_labels(figure: Figure, measured: Mapping[Axes, Bbox]) -> None:
+    """Labels stay where they are, those of the ordinates of a column of panels in one line.
+
+    Labels of panels that were `measured` have moved with them since, those of others are measured here.
+    """
     inches = figure.dpi_scale_trans
     columns: dict[int, list[tuple[Axes, float]]] = defaultdict(list)
     for axes in figure.axes:
+        moved = axes.get_window_extent().min - measured[axes].min if axes in measured else np.zeros(2)
         if axes.xaxis.label.get_text():
-            axes.xaxis.get_tightbbox()
-            down = round(axes.xaxis.label.get_position()[1] / figure.dpi, 3)
+            if axes not in measured:
+                axes.xaxis.get_tightbbox()
+            down = round((axes.xaxis.label.get_position()[1] + moved[1]) / figure.dpi, 3)
             axes.xaxis.set_label_coords(0.5, down, blended_transform_factory(axes.transAxes, inches))
         if axes.yaxis.label.get_text():
-            axes.yaxis.get_tightbbox()
+            if axes not in measured:
+                axes.yaxis.get_tightbbox()
             place = axes.get_subplotspec()
             column = -1 - len(columns) if place is None else place.colspan.start
-            columns[column].append((axes, axes.yaxis.label.get_position()[0] / figure.dpi))
+            columns[column].append((axes, (axes.yaxis.label.get_position()[0] + moved[0]) / figure.dpi))
     for panels in columns.values():
         left = round(min(x for _, x in panels), 3)
         for axes, _ in panels:
             axes.yaxis.set_label_coords(left, 0.5, blended_transform_factory(inches, axes.transAxes))
 
 
-def fill_grid(figure: Figure) -> None:
-    """Places the panels of a figure that are in a grid (the same for all of them), below its legends."""
+def fill_grid(figure: Figure) -> dict[Axes, Bbox]:
+    """Places the panels of a figure that are in a grid (the same for all of them), below its legends.
+
+    Returns where each panel was, px, when it was measured with the ticks that it has now.
+    """
     panels = [(axes, spec) for axes in figure.axes if (spec := axes.get_subplotspec()) is not None]
     if not panels:
-        return
+        return {}
     FigureCanvasAgg(figure)  # measures without drawing
     size = figure.get_size_inches()
     head = max((legend.get_window_extent().height / figure.dpi + 2.0 * PAD for legend in figure.legends), default=0.0)
     _place(panels, np.array([_default_margins(spec) for _, spec in panels]), size, head)
     for _ in range(PASSES):
-        ticks = _ticks(panels)
+        ticks, own = _ticks(panels), {axes: axes.get_window_extent().frozen() for axes, _ in panels}
         _place(panels, np.array([_outer_margins(axes) for axes, _ in panels]) / figure.dpi, size, head)
         if _ticks(panels) == ticks:
-            break
+            return own
+    return {}
 
 
 def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Final
 from weakref import WeakKeyDictionary
@@ -78,6 +78,10 @@ def encoded(figure: Figure | EncodedFigure, form: str, style: Style = SCREEN) ->
 def _encoded(figure: Figure, form: str, style: Style) -> bytes:
     if form == "png":
         return _png(figure, style.dpi)
+    if form == "svg":
+        text = StringIO()  # into bytes, every one of thousands of strings would be encoded by itself
+        figure.savefig(text, format=form, dpi=style.dpi, metadata=UNDATED[form])
+        return text.getvalue().encode("utf-8")
     stream = BytesIO()
     figure.savefig(stream, format=form, dpi=style.dpi, metadata=UNDATED[form])
     return stream.getvalue()

@@ -25,7 +25,8 @@ def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.Non
     for k in range(problem.n_frames - 1):
         graph.add(factors.motion(k, states))
     o = problem.observations()
-    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), problem.measurement.measured(o.pixel), strict=True):
+    measured = problem.measurement.measured(o.pixel).tolist()
+    for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured, strict=True):
         graph.add(factors.observation(k, landmark_key(j), rows))
     if problem.landmark_prior is not None:
         for j in np.unique(o.landmark).tolist():

@@ -3,6 +3,8 @@
 `StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances; one camera has (uL, v).
 """
 
+from collections.abc import Iterable
+
 import gtsam
 import numpy as np
 
@@ -71,12 +73,13 @@ class FactorBuilder:
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
-    def observation(self, frame: int, key: int, rows: FloatArray) -> gtsam.NonlinearFactor:
+    def observation(self, frame: int, key: int, rows: Iterable[float]) -> gtsam.NonlinearFactor:
         """Factor of the rows uL, uR, v, or uL, v (r,), px, of the landmark `key`; does not throw on cheirality."""
         noise, pose, no_throw = self.pixel_noise, pose_key(frame), (False, False)
         if self._stereo is None:
-            return gtsam.GenericProjectionFactorCal3_S2(rows, noise, pose, key, self._left, *no_throw, self.imu_P_cam)
-        point = gtsam.StereoPoint2(*rows.tolist())
+            pixel = np.array([*rows])
+            return gtsam.GenericProjectionFactorCal3_S2(pixel, noise, pose, key, self._left, *no_throw, self.imu_P_cam)
+        point = gtsam.StereoPoint2(*rows)
         return gtsam.GenericStereoFactor3D(point, noise, pose, key, self._stereo, *no_throw, self.imu_P_cam)
 
     def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:

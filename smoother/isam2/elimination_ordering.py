@@ -58,11 +58,11 @@ class EliminationOrdering:
         oldest = max(first, GROUP_FRAMES * (age - last + 2))
         of_frame = [last - 1 - age + k // GROUP_FRAMES for k in range(oldest, frame)]
         groups = dict[int, int]()
-        for key in reversed(seen):
-            if seen[key] < oldest:
+        for key, last_seen in reversed(seen.items()):
+            if last_seen < oldest:
                 break
-            if seen[key] < frame:
-                groups[key] = of_frame[seen[key] - oldest]
+            if last_seen < frame:
+                groups[key] = of_frame[last_seen - oldest]
         groups |= dict.fromkeys(landmarks, last)
         return self._with_states(groups, [*range(oldest, frame), frame], [*of_frame, last])
 
