@@ -55,9 +55,9 @@ def resolved(value: float, resolution: float) -> str:
 
 
 def meters(value: float) -> str:
-    """`0.35 m`, `79.6 m`, `1,342 m`, `28.9 km`; `no path` for what is not finite."""
+    """`0.35 m`, `79.6 m`, `1,342 m`, `28.9 km`; `no trajectory` for what is not finite."""
     if not isfinite(value):
-        return "no path"
+        return "no trajectory"
     size = abs(value)
     if size >= 9_999.5:
         return f"{value / 1000:.3g} km"
@@ -65,8 +65,8 @@ def meters(value: float) -> str:
 
 
 def pixels(value: float) -> str:
-    """`30.6 px`, or `no path` for what is not finite."""
-    return f"{value:.3g} px" if isfinite(value) else "no path"
+    """`30.6 px`, or `no trajectory` for what is not finite."""
+    return f"{value:.3g} px" if isfinite(value) else "no trajectory"
 
 
 def quantity(value: float, unit: str) -> str:

@@ -200,7 +200,7 @@ def interpolated(path: Trajectory, t: FloatArray) -> Trajectory:
     At a stamp of the path the pose is reproduced exactly. Raises ValueError for stamps outside of the path.
     """
     if len(t) and (t[0] < path.t[0] or t[-1] > path.t[-1]):
-        raise ValueError("a path cannot be interpolated beyond its ends")
+        raise ValueError("a trajectory cannot be interpolated beyond its ends")
     after = np.clip(np.searchsorted(path.t, t, side="left"), 1, len(path) - 1)
     before = after - 1
     share = (t - path.t[before]) / (path.t[after] - path.t[before])

@@ -123,7 +123,7 @@ def divergence_growth(table: "pd.DataFrame", parts: int = PARTS) -> "pd.DataFram
     """
     traveled = table["traveled"].to_numpy()
     if parts < 1 or not traveled[-1] > 0:
-        raise InputError("growth: a path that stands still cannot be split by length, nor one into fewer than 1 part")
+        raise InputError("growth: a trajectory at rest cannot be split by length, nor one into fewer than 1 part")
     edges = np.linspace(0.0, traveled[-1], parts + 1)
     first = np.searchsorted(traveled, edges[:-1], side="left")
     last = np.append(first[1:], len(traveled) - 1)

@@ -84,7 +84,7 @@ class SegmentErrors(Displayed):
     @property
     def caption(self) -> str:
         """Number and lengths of the segments, for a table's caption."""
-        whose = "KITTI's lengths" if self.official else "lengths fitted to the path, not KITTI's"
+        whose = "KITTI's lengths" if self.official else "lengths fitted to the trajectory, not KITTI's"
         shortest, longest = min(self.lengths), max(self.lengths)
         every = "pose" if self.step == 1 else f"{self.step} poses"
         return f"{plural(len(self), 'segment')} of {shortest:g} to {longest:g} m ({whose}), one begun every {every}"

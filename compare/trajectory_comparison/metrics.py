@@ -212,7 +212,7 @@ def _passing(
     """First pose beyond the bound; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
         return compare.first_exceedance(divergence, bound)
-    notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
+    notes["passing"] = f"it was {matched.alignment.caption}, so the trajectories do not start together"
     return None
 
 

@@ -68,14 +68,14 @@ def _accelerometer(checks: SensorChecks) -> list[Finding]:
     size = float(np.linalg.norm(bias))
     if size > MIN_ACCELEROMETER_BIAS:
         text = f"Accelerometer bias {vector(bias, 3)} m/s^2: it is in the state of the estimators."
-        found.append(Finding("accelerometer_bias", text, size, size, "m/s^2", "by the path of the whole recording"))
+        found.append(Finding("accelerometer_bias", text, size, size, "m/s^2", "by the whole trajectory"))
     gravity, given = checks.gravity
     if abs(gravity - given) > MIN_GRAVITY:
         text = (
             f"The accelerometer measures a gravity of {gravity:.3f} m/s^2 in place of {given:g}: a bias along the "
             "vertical, a scale, or another magnitude of gravity."
         )
-        found.append(Finding("gravity", text, gravity, gravity, "m/s^2", "by the path of the whole recording"))
+        found.append(Finding("gravity", text, gravity, gravity, "m/s^2", "by the whole trajectory"))
     for name, value, count in checks.saturated:
         text = f"The {name} stays at {value:.6g} for several samples at once: its range ends there."
         found.append(Finding("saturated", text, count, count, "samples", "counted"))

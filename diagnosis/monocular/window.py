@@ -178,6 +178,6 @@ def _depths(tracks: KeyframeTracks, pose: FloatArray) -> InverseDepthPrior:
     inverse = first_inverse_depths(tracks, pose, window_points(tracks, pose))
     known = inverse[np.isfinite(inverse)]
     if len(known) == 0:
-        raise ValueError("its path leaves no track a point")
+        raise ValueError("no track has a point along its trajectory")
     median, near = np.percentile(np.maximum(known, 0.0), [50.0, NEAR])
     return InverseDepthPrior(float(median), float(max(median, 0.5 * (near - median))))

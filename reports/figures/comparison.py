@@ -83,7 +83,7 @@ def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
         "reference": data.reference,
         "alignment": data.alignment,
         "pairs": "all pairs" if data.all_pairs else "consecutive pairs",
-        "lengths": "KITTI's lengths" if data.official else "lengths fitted to the path, not KITTI's",
+        "lengths": "KITTI's lengths" if data.official else "lengths fitted to the trajectory, not KITTI's",
     }
     with in_style(PAPER):
         figures = _laid_out({name: draw_one(data, PAPER) for name, (draw_one, _) in EACH.items()})
@@ -205,7 +205,7 @@ def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
         panel.set_ylabel(title)
         panel.set_xlabel("length of the segments, m")
         panel.set_ylim(bottom=0.0)
-    which = "KITTI's lengths" if data.official else "lengths fitted to the path, not KITTI's"
+    which = "KITTI's lengths" if data.official else "lengths fitted to the trajectory, not KITTI's"
     title_and_legend(figure, f"Segment errors ({which})", handles, style)
     return figure
 

@@ -77,8 +77,8 @@ def numbered(study: "Study") -> dict[str, Figure]:
         key = f"figure_{number:02d}" if number is not None else f"{study.subject.name}_{kind}"
         figures[key] = plot(title, path, number, **shown)
 
-    add("path", of_path, f"path of the IMU after prediction, {name}", study.predicted)
-    add("arrows", of_arrows, f"path of the IMU with orientations, {name}", study.predicted, arrows=True)
+    add("path", of_path, f"trajectory of the IMU after prediction, {name}", study.predicted)
+    add("arrows", of_arrows, f"trajectory of the IMU with orientations, {name}", study.predicted, arrows=True)
     for n, mapped in study.mapped.items():
         number, estimate = paper.mapped.get(n) if paper else None, mapped.estimate
         title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position

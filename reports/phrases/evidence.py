@@ -58,8 +58,8 @@ def sample_requirement() -> str:
 
 
 def threshold(bound: float) -> str:
-    """Threshold on a distance: 5 m, or 1 % of the path where that is less."""
-    return f"{bound:g} m" if bound >= FAR else f"{per_cent(FAR_SHARE)} of the path, {number(bound)} m"
+    """Threshold on a distance: 5 m, or 1 % of the path length where that is less."""
+    return f"{bound:g} m" if bound >= FAR else f"{per_cent(FAR_SHARE)} of the path length, {number(bound)} m"
 
 
 def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:

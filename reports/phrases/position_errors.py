@@ -28,7 +28,7 @@ def position_rmse(comparison: Comparison) -> list[str]:
         return by_products
     if comparison.ranking.same:
         path = float(others[0].divergence["traveled"][-1])
-        share = f" ({per_cent(others[0].rmse / path)} of the path of {number(path)} m)" if path > 0 else ""
+        share = f" ({per_cent(others[0].rmse / path)} of the path length, {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
         return [f"Position RMSE against {name}: {each}.", *_order(comparison), *by_products]

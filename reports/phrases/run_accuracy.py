@@ -128,7 +128,7 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     def each(names: Iterable[str]) -> str:
         return listed(f"{name} {distance(found.rmse[name])}{_share(found.rmse[name], rivals[name])}" for name in names)
 
-    over = f"RMSE over a path of {number(path_length(rivals[first]))} m{_over(run, found)}"
+    over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
     level = [name for name in others if name not in larger]
     equal = [name for name in level if number(found.rmse[name]) == number(found.rmse[first])]
@@ -159,7 +159,7 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
 
 def _share(rmse: float, result: Result) -> str:
     length = path_length(result)
-    return f" ({per_cent(rmse / length)} of the path)" if length > 0 else ""
+    return f" ({per_cent(rmse / length)} of the path length)" if length > 0 else ""
 
 
 def _rough(differences: Mapping[str, RmseDifference]) -> str:

@@ -171,7 +171,7 @@ def _mapped(study: Study) -> Claim:
         Verdict.IN_PART if apart == 0.0 else Verdict.FALSE,
         f"{_apart(apart)}, while the median reprojection error of {mapped.after.features} landmarks goes from "
         f"{before:.3g} to {after:.3g} px",
-        "equal by construction: mapping does not change the poses. The landmarks have the errors of the path",
+        "equal by construction: mapping does not change the poses. The landmarks have the errors of the trajectory",
     )
 
 
@@ -209,7 +209,7 @@ def _like_dead_reckoning(study: Study) -> Claim:
         "like dead reckoning",
         "SLAM looks like dead reckoning, but noisy",
         verdict,
-        f"{meters(now.apart_rmse)} (RMS) and up to {meters(now.apart_max)} from dead reckoning, on a path of "
+        f"{meters(now.apart_rmse)} (RMS) and up to {meters(now.apart_max)} from dead reckoning, over a path length of "
         f"{meters(road)}; correction per update {_correction(now)}",
         causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"{meters(study.repaired.apart_rmse)}, up to {meters(study.repaired.apart_max)}; {_correction(study.repaired)}",
@@ -246,7 +246,7 @@ def _every_noise(study: Study) -> Claim:
         "every noise",
         "singularity error for different numbers of features and every noise level",
         verdict,
-        f"the printed equations fail in {failing} of {len(runs)} settings; in {off} more the path is over "
+        f"the printed equations fail in {failing} of {len(runs)} settings; in {off} more the trajectory is over "
         f"{per_cent(MAX_DISTANCE)} of its length from dead reckoning",
         "landmarks cross the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"they fail in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
@@ -254,7 +254,11 @@ def _every_noise(study: Study) -> Claim:
 
 
 def _apart(difference: float) -> str:
-    return "the paths are equal to the last bit" if difference == 0.0 else f"the paths differ by up to {difference:.2g}"
+    return (
+        "the trajectories are bitwise equal"
+        if difference == 0.0
+        else f"the trajectories differ by up to {difference:.2g}"
+    )
 
 
 def _correction(outcome: Outcome) -> str:

@@ -52,7 +52,7 @@ SCALE = (
     Metric(
         ("scale_error",),
         SCALE_ERROR,
-        "of the path",
+        "by Sim(3)",
         "%",
         tables=MAIN | TERMINAL,
         scale=100.0,

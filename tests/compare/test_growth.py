@@ -86,7 +86,7 @@ def test_the_parts_of_the_path_add_up() -> None:
     assert np.isnan(table["percent_of_path"].iloc[0])
     assert parts["from_m"].iloc[0] == 0.0
     assert parts["to_m"].iloc[-1] == table["traveled"].iloc[-1]
-    with pytest.raises(InputError, match="a path that stands still cannot be split"):
+    with pytest.raises(InputError, match="a trajectory at rest cannot be split"):
         compare.divergence_growth(compare.divergence_along_path(matched(winding(), np.tile(np.eye(4), (N, 1, 1)))))
 
 

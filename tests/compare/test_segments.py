@@ -118,7 +118,7 @@ def test_a_short_path_has_fitted_segment_lengths_and_reports_them() -> None:
     found = compare.segment_errors(matched(t, truth, result))
     assert not found.official
     assert found.lengths == (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0)
-    assert "5 to 40 m (lengths fitted to the path, not KITTI's), one begun every pose" in found.caption
+    assert "5 to 40 m (lengths fitted to the trajectory, not KITTI's), one begun every pose" in found.caption
     assert_as_devkit(truth, result, found)
 
 
@@ -154,7 +154,10 @@ def test_a_segment_ends_with_the_first_pose_that_is_further_than_its_length() ->
     ]  # fmt: skip
     np.testing.assert_allclose(found.table["translation_percent"], 10.0 * np.array([4 / 3, 7 / 6, 4 / 3, 7 / 6, 4 / 3]))
     np.testing.assert_allclose(found.table["speed"], [3 / 2.0, 6 / 3.5, 3 / 2.0, 6 / 3.5, 3 / 2.0])
-    assert found.caption == "5 segments of 3 to 6 m (lengths fitted to the path, not KITTI's), one begun every 2 poses"
+    assert (
+        found.caption
+        == "5 segments of 3 to 6 m (lengths fitted to the trajectory, not KITTI's), one begun every 2 poses"
+    )
     assert found.by_length.index.name == "length"
     assert found.by_length.columns.tolist() == ["translation_percent", "rotation_deg_per_m", "n"]
     assert found.by_length["n"].tolist() == [3, 2]

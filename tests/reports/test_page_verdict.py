@@ -40,7 +40,7 @@ def test_the_nearest_estimator_comes_first_with_meters_and_share_of_the_path() -
     table = run.results["ekf"].divergence
     assert table is not None
     rmse, length = float(np.sqrt(np.mean(table["position"] ** 2))), float(table["traveled"].max())
-    assert f"{rmse:.3g} m ({100 * rmse / length:.3g} % of the path)" in sentence
+    assert f"{rmse:.3g} m ({100 * rmse / length:.3g} % of the path length)" in sentence
     assert ": ekf " in sentence
     assert "dead-reckoning" in larger
     assert sentences.index(sentence) < sentences.index(larger)
@@ -57,7 +57,7 @@ def test_the_divergence_onset_is_the_first_frame_beyond_the_threshold() -> None:
     assert table["position"][left.frame] > limit
     assert (table["position"][: left.frame] <= limit).all()
     sentence = sentence_of(run, "Maximum divergence: ")
-    assert f"; threshold 1 % of the path, {limit:.3g} m. Above the threshold: " in sentence
+    assert f"; threshold 1 % of the path length, {limit:.3g} m. Above the threshold: " in sentence
     assert f"ekf from {left.seconds:.1f} s (frame {left.frame}) on" in sentence
     assert "% of the frames" not in sentence
 
@@ -65,7 +65,7 @@ def test_the_divergence_onset_is_the_first_frame_beyond_the_threshold() -> None:
 def test_a_path_below_the_threshold_is_reported_without_onset() -> None:
     problem = plain_problem(scene())
     run = run_of(problem, answer(problem, "ekf", (0.0, 0.1, 0.0)), answer(problem, "isam2"))
-    sentence = sentence_of(run, "Maximum divergence: ekf 0.100 m; threshold 1 % of the path, ")
+    sentence = sentence_of(run, "Maximum divergence: ekf 0.100 m; threshold 1 % of the path length, ")
     assert "Above the threshold" not in sentence
 
 

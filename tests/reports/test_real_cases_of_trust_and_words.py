@@ -23,7 +23,7 @@ def test_zero_for_unseen_is_not_trusted(recordings: Recordings) -> None:
 def test_the_length_of_a_path_that_bends_is_its_length(recordings: Recordings) -> None:
     folder = recordings("cases/22-vcu-rvi/vcu_lab_motion6_gt.csv").parent
     result = compared(folder / "vcu_lab_motion6_gt.csv", folder / "vcu_lab_motion6_tum.csv")
-    (length,) = [sentence for sentence in result.verdict if sentence.startswith("Length of the path over")]
+    (length,) = [sentence for sentence in result.verdict if sentence.startswith("Path length over")]
     assert "2.69 % shorter" in length
     assert not any("too short" in sentence for sentence in result.verdict)
 
