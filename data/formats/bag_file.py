@@ -68,7 +68,7 @@ class Bag:
 
 @contextmanager
 def open_bag_file(path: Path) -> Iterator[Bag]:
-    """The bag at `path`. Raises InputError where it cannot be read, or the library is not installed."""
+    """The bag at `path`. Raises InputError where it is empty or cannot be read, or the library is not installed."""
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.typesys import Stores, get_typestore
@@ -77,6 +77,8 @@ def open_bag_file(path: Path) -> Iterator[Bag]:
     store = get_typestore(Stores.ROS2_HUMBLE)
     try:
         with AnyReader([path], default_typestore=store) as reader:
+            if reader.message_count == 0:
+                raise InputError(f"{shown(path)}: the bag has no messages; record it again")
             yield Bag(reader, shown(path))
     except (AnyReaderError, OSError) as error:
         raise InputError(f"{shown(path)}: the bag cannot be read ({' '.join(str(error).split())[:120]})") from error

@@ -32,7 +32,7 @@ def read_imu_csv(path: FilePath, noise: ImuNoise, gravity: float) -> RawSamples:
     """
     with reading(path), np.errstate(all="ignore"):
         lines = read_lines(regular_file(path))
-        lines.require_some()
+        lines.require_some("samples")
         names = _names(lines)
         places = EUROC if names is None else _places(names)
         if lines.width < len(EUROC):

@@ -18,7 +18,7 @@ def shown(path: FilePath) -> str:
 
 @contextmanager
 def reading(path: FilePath) -> Iterator[None]:
-    """Converts an InputError or OSError in the block into one InputError that begins with the file name."""
+    """Converts an InputError or OSError in the block into one InputError that begins with the file name, once."""
     with _naming(path, "it cannot be read", "check the path and its permissions"):
         yield
 
@@ -35,6 +35,8 @@ def _naming(path: FilePath, failure: str, advice: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
+        if str(error).startswith(f"{shown(path)}: "):
+            raise
         raise InputError(f"{shown(path)}: {error}") from error
     except OSError as error:
         raise InputError(f"{shown(path)}: {failure} ({error.strerror or error}); {advice}") from error

@@ -74,12 +74,12 @@ class Lines:
     """the comments above the first line of data, without their marks"""
     title_line: int = 1
 
-    def require_some(self) -> None:
-        """Raises InputError where there is no line of data."""
+    def require_some(self, what: str = "numbers") -> None:
+        """Raises InputError where there is no line of data; `what` the file should have."""
         if not self.text and self.title is not None:
-            raise InputError(f"line {self.title_line}: {_short(self.title)} has no number, and no poses follow")
+            raise InputError(f"line {self.title_line}: {_short(self.title)} has no number, and no {what} follow")
         if not self.text:
-            raise InputError("the file has no poses in it; check that it is the right one")
+            raise InputError(f"the file has no {what} in it; check that it is the right one")
 
     @property
     def width(self) -> int:

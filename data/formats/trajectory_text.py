@@ -74,7 +74,7 @@ def open_trajectory(path: FilePath, form: TrajectoryFormat | None = None, name: 
         if form == "npz" or (form is None and _is_zip(file)):
             return TrajectoryArchive(name, shown(path), file)
         lines = read_lines(file)
-        lines.require_some()
+        lines.require_some("poses")
         columns = named_columns(lines) if form != "kitti" else None
         named = columns is not None
         if columns is None:

@@ -127,14 +127,20 @@ def track(
     return track_images(opened_images(path, options, motion=motion), settings, progress, pictures)
 
 
-def opened_images(path: Path, options: ImageOptions, *, motion: bool = False) -> ImageRecording:
+def opened_images(
+    path: Path, options: ImageOptions, *, motion: bool = False, truth: TruthFile | None = None
+) -> ImageRecording:
     """Recording of images at `path`, none of them read.
 
-    Raises InputError for what is missing; with `motion` also where `TrackedRecording.sequence` would raise.
+    Raises InputError for what is missing, and for motion and truth that `TrackedRecording.sequence` would refuse. With
+    `motion` there has to be one.
     """
     recording = open_recording(path, options)
     if motion:
         _require_motion(recording)
+    if _no_motion(recording) is None:
+        rectified = rectify(recording.left, recording.right)
+        TrackedRecording(recording, rectified.camera, rectified.imu_T_cam, TrackFile()).sequence(truth)
     return recording
 
 

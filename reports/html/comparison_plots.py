@@ -12,6 +12,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData
 from ..figures.panels import nees_bounds, nees_median
+from ..formatting import distance
 from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
 
 MOMENTS = 4000
@@ -156,6 +157,6 @@ def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> l
         first = result.passing is not None
         k = result.passing.frame if result.passing is not None else int(np.nanargmax(position))
         far = result.bound if first else position[k]
-        text = f"{name} {'first' if first else 'farthest,'} {far:.3g} m from {data.reference}"
+        text = f"{name} {'first' if first else 'farthest,'} {distance(far)} from {data.reference}"
         found.append({"frame": int(np.argmin(np.abs(t - data.t[name][k]))), "text": text})
     return sorted(found, key=lambda bookmark: int(bookmark["frame"]))

@@ -15,6 +15,7 @@ from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import STATE
 from fgbaseline.reports.figures.panels import nees_bounds, nees_median
+from fgbaseline.reports.formatting import distance
 from fgbaseline.reports.tables.run_details import REASONS
 
 from .plot_encoding import (
@@ -246,7 +247,7 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
     for result in run.compared:
         left = divergence_onset(run, result)
         if left is not None:
-            text = f"{result.name} first {divergence_threshold(result):.3g} m from {run.reference}"
+            text = f"{result.name} first {distance(divergence_threshold(result))} from {run.reference}"
             bookmarks.append({"frame": left.frame, "text": text})
     worst = worst_second(run.problem)
     if worst is not None:

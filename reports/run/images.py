@@ -30,11 +30,16 @@ def tracked(
     settings: Path | None,
     *,
     motion: bool = False,
+    truth: TruthFile | None = None,
     pictures: Pictures | None = None,
 ) -> TrackedRecording:
-    """Tracks of a recording of images, with progress on standard error. Raises InputError."""
+    """Tracks of a recording of images, with progress on standard error. Raises InputError.
+
+    `truth` is that of the sequence to be made of it, which is checked before the images are read.
+    """
     chosen = TrackerSettings() if settings is None else read_toml(settings, TrackerSettings).content
-    recording = opened_images(source, options, motion=motion)  # bad input is refused before progress is printed
+    # Bad input is refused before progress is printed.
+    recording = opened_images(source, options, motion=motion, truth=truth)
     with reporter().estimator("tracking") as progress:
         return track_images(recording, chosen, progress, pictures)
 
@@ -52,7 +57,7 @@ def image_sequence(
     Raises InputError.
     """
     given = None if truth is None or body is None else TruthFile(truth, body)
-    return tracked(source, options, settings, motion=True, pictures=pictures).sequence(given)
+    return tracked(source, options, settings, motion=True, truth=given, pictures=pictures).sequence(given)
 
 
 def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path | None, *, force: bool) -> int:

@@ -10,6 +10,8 @@ RELATIVE_DECREASE = 1e-7
 """relative decrease of the cost at convergence"""
 MAX_STEP_SCALE, MIN_STEP_SCALE = 64.0, 1.0 / 64.0
 """largest and smallest scale of a step"""
+LEAST_DAMPING = 1e-9
+"""initial damping where the undamped system is indeterminate"""
 
 
 def compact_graph(graph: gtsam.NonlinearFactorGraph) -> gtsam.NonlinearFactorGraph:
@@ -43,21 +45,36 @@ def gauss_newton(
     the steps are too short along weakly determined directions, so each is doubled as long as the cost falls. A step
     that is too long, such as one through a camera plane, is halved.
 
-    If the system is indeterminate, the result has the last values and GTSAM's message. Too few steps for convergence
-    are a failure too.
+    Where the system is indeterminate or nearly so, damped steps (Levenberg-Marquardt) take it to its minimum. Too few
+    steps for convergence are a failure, as are damped steps that fail; the result then has the last values.
     """
     cost = graph.error(values)
     ordering = gtsam.Ordering.ColamdNonlinearFactorGraph(graph)
     for _ in range(max_steps):
+        before = cost
         try:
             step = graph.linearize(values).optimize(ordering)
-        except RuntimeError as error:
-            return GaussNewtonResult(values, str(error).strip().partition("\n")[0])
-        before = cost
+        except RuntimeError:
+            return _damped(graph, values, max_steps, relative_decrease)
         values, cost = _line_search(graph, values, step, cost)
         if before - cost < relative_decrease * before or cost == before:
             return GaussNewtonResult(values)
     return GaussNewtonResult(values, f"the cost still falls after {max_steps} Gauss-Newton steps")
+
+
+def _damped(
+    graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, max_steps: int, relative_decrease: float
+) -> GaussNewtonResult:
+    """Levenberg-Marquardt, nearly undamped at first."""
+    params = gtsam.LevenbergMarquardtParams()
+    params.setMaxIterations(max_steps)
+    params.setRelativeErrorTol(relative_decrease)
+    params.setAbsoluteErrorTol(0.0)
+    params.setlambdaInitial(LEAST_DAMPING)
+    try:
+        return GaussNewtonResult(gtsam.LevenbergMarquardtOptimizer(graph, values, params).optimize())
+    except RuntimeError as error:
+        return GaussNewtonResult(values, str(error).strip().partition("\n")[0])
 
 
 def _line_search(

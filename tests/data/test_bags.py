@@ -297,3 +297,16 @@ def test_a_topic_without_poses_is_refused_with_those_that_have_them(room: Room, 
         read_trajectory(f"{bag.path}:/imu0")
     with pytest.raises(InputError, match="/none is not in the bag"):
         read_trajectory(f"{bag.path}:/none")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("with_topic", [False, True])
+def test_an_empty_bag_is_refused_as_one(kind: str, with_topic: bool, tmp_path: Path) -> None:
+    bag = BagWriter(kind, tmp_path)
+    with bag.writer:
+        if with_topic:
+            bag.writer.add_connection("/odom", "nav_msgs/msg/Odometry", typestore=bag.store)  # type: ignore[attr-defined]
+    with pytest.raises(InputError, match=f"{bag.path.name}: the bag has no messages"):
+        open_recording(bag.path, ImageOptions(calibration=calibration(tmp_path)))
+    with pytest.raises(InputError, match=f"{bag.path.name}: the bag has no messages"):
+        read_trajectory(f"{bag.path}:/odom")

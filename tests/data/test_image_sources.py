@@ -120,6 +120,17 @@ def test_tum_vi(euroc: Path, room: Room) -> None:
     assert track(euroc).sequence().truth is not None
 
 
+def test_images_of_16_bits_that_get_brighter_are_not_clipped(euroc: Path, room: Room) -> None:
+    """A first image of 10 bits before images of 14: the 8 bits are the uppermost of the brightest so far."""
+    images = sorted((euroc / "mav0" / "cam0" / "data").iterdir())
+    for k, file in enumerate(images):
+        bits = (10, 14, 12)[k % 3]
+        cv2.imwrite(str(file), cv2.imread(str(file), 0).astype(np.uint16) << (bits - 8))
+    for k, pair in enumerate(open_recording(euroc).pairs()):
+        assert pair.left is not None
+        assert (pair.left == room.image(k) >> (2 if k and k % 3 == 2 else 4 if k and k % 3 == 0 else 0)).all()
+
+
 def test_a_time_shift_is_added_to_the_cameras_stamps(euroc: Path) -> None:
     """Kalibr: t_imu = t_cam + timeshift_cam_imu."""
     before = open_recording(euroc).t
@@ -273,6 +284,7 @@ def test_the_color_images_of_kitti_are_refused_with_what_is_missing(euroc: Path,
 @pytest.mark.parametrize(
     ("missing", "sentence"),
     [
+        ("2011_09_26_drive_0002_sync/image_00", r"image_00/data is missing; a KITTI raw drive has image_00"),
         ("2011_09_26_drive_0002_sync/oxts", r"oxts/data missing: it has images and no motion; add --imu"),
         ("calib_imu_to_velo.txt", r"calib_imu_to_velo.txt missing: it has images and no motion; add --imu"),
     ],
@@ -315,6 +327,40 @@ def test_a_calibration_of_other_images_is_refused(euroc: Path) -> None:
         text = sensor_yaml(displaced(i)).replace("[320, 240]", "[640, 480]")
         (euroc / "mav0" / f"cam{i}" / "sensor.yaml").write_text(text)
     with pytest.raises(InputError, match="the image has 320x240 px and the calibration 640x480"):
+        track(euroc)
+
+
+def test_a_folder_beside_a_recording_is_refused_with_its_place(euroc: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no recording in this folder; give .*/room_01$"):
+        open_recording(euroc.parent)
+    for inside in ("cam0", "cam0/data"):
+        with pytest.raises(InputError, match=r"no recording in this folder; give .*/room_01/mav0$"):
+            open_recording(euroc / "mav0" / inside)
+    archive = tmp_path / "room.zip"
+    archive.write_bytes(b"PK\x03\x04" + bytes(30))
+    with pytest.raises(InputError, match=r"room.zip: it is packed; unpack it and give its folder"):
+        open_recording(archive)
+
+
+def test_a_table_that_lists_other_images_is_refused_with_both_names(euroc: Path) -> None:
+    for file in (euroc / "mav0" / "cam1" / "data").iterdir():
+        file.rename(file.with_suffix(".jpg"))
+    with pytest.raises(InputError, match=rf"none of its {N} images, such as {START_NS}.png, is in .*{START_NS}.jpg"):
+        open_recording(euroc)
+
+
+@pytest.mark.parametrize("place", ["state_groundtruth_estimate0", "imu0"])
+def test_truth_and_samples_are_checked_before_the_images_are_read(
+    euroc: Path, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fgbaseline.data.tracking.sources.image_files.decoded", None)
+    file = euroc / "mav0" / place / "data.csv"
+    file.write_text(file.read_text().splitlines()[0])
+    what = "poses" if place != "imu0" else "samples"
+    with pytest.raises(InputError, match=f"^{file}: the file has no {what} in it"):
+        track(euroc)
+    file.write_text("1,2\n")
+    with pytest.raises(InputError, match=f"^{file}: line 1: (expected|it has 2 words)"):
         track(euroc)
 
 

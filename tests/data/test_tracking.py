@@ -15,6 +15,7 @@ from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.formats.npz_writer import write_tracks
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
 from fgbaseline.data.tracking.rig import CameraModel, Distortion, rectify
+from fgbaseline.data.tracking.sources.image_files import EightBits
 from fgbaseline.data.tracking.track_file import TrackFile
 from fgbaseline.diagnosis import diagnose, track_statistics
 from fgbaseline.geometry import FloatArray, InputError, StereoCamera, StereoMeasurement, se3
@@ -153,6 +154,24 @@ def test_cameras_of_different_exposure_match(room: Room, images: list[tuple[Floa
     assert len(found.number) > 0.9 * len(equal.number) > 100
     true = room.project(0, room.points(0, found.pixel[:, :2])[0])
     assert np.median(np.abs(true - found.pixel).max(axis=1)) < 0.1
+
+
+def test_tracks_go_on_where_a_lamp_changes_the_scale_of_16_bits(images: list[tuple[FloatArray, FloatArray]]) -> None:
+    """The second image has twelve bits in place of ten, and a quarter of the brightness in 8: most tracks go on."""
+    kept = []
+    for lamp in (0, 4000):
+        tracker, convert, found = StereoTracker(CAMERA), (EightBits(), EightBits()), []
+        for k, pair in enumerate(images[:2]):
+            raw = [image.astype(np.uint16) << 2 for image in pair]
+            for image in raw:
+                image[:20, :20] = max(lamp * k, 1000)
+            left, right = (to(image) for to, image in zip(convert, raw, strict=True))
+            assert left is not None
+            assert right is not None
+            assert (left[30:] == images[k][0][30:] >> (2 if lamp * k else 0)).all()
+            found.append(tracker.step(left, right))
+        kept.append(int(np.isin(found[1].number, found[0].number).sum()))
+    assert kept[1] > 0.9 * kept[0] > 50
 
 
 def test_pictures_are_thinned_evenly_to_their_size(images: list[tuple[FloatArray, FloatArray]]) -> None:

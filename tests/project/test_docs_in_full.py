@@ -13,6 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,9 @@ import pytest
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.formats import attach_truth
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.geometry import se3
+from fgbaseline.data.tracking.rig import CameraModel
+from fgbaseline.data.tracking.sources import open_recording
+from fgbaseline.geometry import FloatArray, se3
 
 from ..builders.commands import COMMAND, environment
 from ..builders.documents import DOCUMENTS, ROOT, blocks, commands, file_name, name
@@ -46,8 +49,10 @@ REAL = {
     "ground_truth": "ground_truth",
 }
 """name in the documents -> the recording that stands for it"""
-ABSENT = ("dataset-room1_512_16", "left", "run.bag", "velocities.csv", "tracks.npz")
+ABSENT = ("dataset-room1_512_16", "tracks.npz")
 """recordings in the documents for which none stands"""
+FORMS_OF_06 = ("left", "right", "camchain-imucam.yaml", "run.bag", "velocities.csv")
+"""forms that the images of folder 06 are given, or its motion"""
 EXTRINSIC = "utias/2011_09_30_drive_0027_sync_KLT.mat"
 """recording whose extrinsic the drive of folder 06 has"""
 HOST = "tcp://host:8786"
@@ -84,6 +89,8 @@ class FullPlace:
         if (RECORDINGS / EXTRINSIC).exists():
             imu_T_cam = data.read(RECORDINGS / EXTRINSIC).imu_T_cam
             (self.folder / "imu_T_cam.txt").write_text(" ".join(map(repr, imu_T_cam[:3].ravel().tolist())))
+            if all((self.folder / known).exists() for known in ("06", "imu0.csv")) and find_spec("cv2") is not None:
+                self._forms_of_06(imu_T_cam)
         if not (self.folder / "drive.npz").exists() or not (self.folder / "poses.txt").exists():
             sequence = simulate(Simulation(seed=3))
             assert sequence.truth is not None
@@ -101,6 +108,35 @@ class FullPlace:
         table = np.column_stack([mine.landmarks.index, mine.landmarks.position])
         rows = [f"{int(index)},{x},{y},{z}" for index, x, y, z in table.tolist()]
         (self.folder / "mine.csv").write_text("\n".join(["id,x,y,z", *rows]) + "\n")
+
+    def _forms_of_06(self, imu_T_cam: FloatArray) -> None:
+        """Folder 06 as two folders with Kalibr's camera chain, and as a bag; and its motion as velocities."""
+        recording = open_recording(self.folder / "06")
+        right = recording.right
+        assert right is not None
+        (self.folder / "camchain-imucam.yaml").write_text(camchain(recording.left, right, imu_T_cam))
+        stamps = [round(t * 1e9) for t in recording.t.tolist()]
+        for i, side in enumerate(("left", "right")):
+            (self.folder / side).mkdir()
+            for stamp, file in zip(stamps, sorted((self.folder / "06" / f"image_{i}").iterdir()), strict=True):
+                (self.folder / side / f"{stamp:019d}.png").symlink_to(file.resolve())
+        camera = np.tile(np.eye(4), (len(stamps), 1, 1))
+        camera[:, :3] = np.loadtxt(next((self.folder / "06").glob("poses*.txt"))).reshape(-1, 3, 4)
+        twist = se3.log(se3.relative(camera @ se3.inverse(imu_T_cam))) / np.diff(recording.t)[:, None]
+        rows = np.column_stack([recording.t, np.vstack([twist, twist[-1:]])])
+        np.savetxt(self.folder / "velocities.csv", rows, delimiter=",")
+        if find_spec("rosbags") is not None:
+            from ..data.test_bags import BagWriter
+
+            bag = BagWriter("ros1", self.folder)
+            samples = np.loadtxt(self.folder / "imu0.csv", delimiter=",")
+            begin = 10**18
+            with bag.writer:
+                for stamp, *row in samples.tolist():
+                    bag.imu("/imu0", begin + int(stamp), row)
+                for stamp, pair in zip(stamps, recording.pairs(), strict=True):
+                    for side, image in zip(("left", "right"), pair[:2], strict=True):
+                        bag.image(f"/cam/{side}/image_raw", begin + stamp, image)
 
     def _their_filter(self) -> None:
         """`my-filter`, registered in a package, and `my_filter`, a program without a line of ours."""
@@ -126,6 +162,8 @@ class FullPlace:
         if "report_image" in command and not has_chromium():
             return  # said by tests/project/test_docs.py
         needed = [*arguments, "utias"] if "mine.toml" in arguments else arguments
+        if missing := [form for form in FORMS_OF_06 if form in arguments and not (self.folder / form).exists()]:
+            pytest.skip(f"{', '.join(missing)}: made of {REAL['06']}, {REAL['imu0.csv']} and {EXTRINSIC}")
         if missing := set(ABSENT) & set(arguments):
             pytest.skip(f"no recording stands for {', '.join(sorted(missing))}")
         for known in set(REAL) & {part.partition("/")[0] for part in needed}:
@@ -170,6 +208,19 @@ class FullPlace:
         assert result.returncode == 0, result.stderr[-2000:]
 
 
+def camchain(left: CameraModel, right: CameraModel, imu_T_cam: FloatArray) -> str:
+    """Kalibr's camera chain of a rectified pair; `imu_T_cam` (4, 4) of the left camera."""
+    rows = []
+    for camera, model, key, motion in (
+        ("cam0", left, "T_cam_imu", se3.inverse(imu_T_cam)),
+        ("cam1", right, "T_cn_cnm1", se3.inverse(right.imu_T_cam) @ left.imu_T_cam),
+    ):
+        rows += [f"{camera}:", f"  {key}: {motion.tolist()}", "  camera_model: pinhole", "  distortion_model: radtan"]
+        rows += [f"  intrinsics: {list(model.intrinsics)}", "  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]"]
+        rows += [f"  resolution: {list(model.size)}"]
+    return "\n".join([*rows, ""])
+
+
 def _ended(command: list[str], cwd: Path, **env: str) -> subprocess.CompletedProcess[str]:
     kept = {key: value for key, value in environment(**env).items() if key not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     return subprocess.run(
@@ -179,8 +230,6 @@ def _ended(command: list[str], cwd: Path, **env: str) -> subprocess.CompletedPro
 
 def has_rerun() -> bool:
     """Whether the extra `rerun` is installed."""
-    from importlib.util import find_spec
-
     return find_spec("rerun") is not None
 
 

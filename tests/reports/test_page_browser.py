@@ -3,6 +3,7 @@
 Skipped where there is no Chromium, or no Playwright to drive it; FGBASELINE_CHROMIUM names another one.
 """
 
+import io
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Excluded, Landmarks
+from fgbaseline.data.tracking import Picture, Pictures
 from fgbaseline.reports.figures.paths import paths_overlaid
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style
@@ -130,6 +133,46 @@ def test_a_frame_shows_the_outcome_of_each_observation_and_its_true_reprojection
     used = opened.page.inner_html('[data-side="left"]')
     opened.page.select_option("#frame-view select", "2")
     assert opened.page.inner_html('[data-side="left"]') != used
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_a_frame_without_images_leads_to_the_nearest_that_has_them(
+    chromium: Any, run: Run, tmp_path: Path, width: int
+) -> None:
+    """Images of one frame in 16; marks are as large as suits the width of the image."""
+    packed = io.BytesIO()
+    Image.new("L", (30, 20)).save(packed, "JPEG")
+    t, both = run.problem.sequence.t, (packed.getvalue(),) * 2
+    images = Pictures(step=16, size=(600, 400), pairs={k: Picture(float(t[k]), both) for k in range(0, 60, 16)})
+    file = tmp_path / "report.html"
+    file.write_text(render(run, as_dict(run), {}, images), encoding="utf-8")
+    opened = Opened(chromium, file.as_uri(), width=width)
+    opened.set_frame(7)
+    assert opened.count("#frame-view image") == 0
+    assert "no images of this frame; the nearest are those of" in opened.text(".frame-summary")
+    opened.page.click(".frame-summary button")
+    assert opened.text("#clock").startswith("frame 0 ")
+    assert opened.count("#frame-view image") == 2
+    assert opened.count(".frame-summary button") == 0
+    radius = opened.attribute("#frame-view .used .measured", "d").partition("a")[2].split()[0]
+    assert radius == "4" if width == 1400 else 2.0 <= float(radius) < 3.0
+    assert opened.page.evaluate("document.documentElement.scrollWidth") == width
+    opened.page.context.close()
+
+
+def test_a_table_that_is_wider_than_the_page_scrolls_in_its_place(chromium: Any, address: str) -> None:
+    opened = Opened(chromium, address, width=1400)
+    headings = "() => getComputedStyle(document.querySelector('#table .main thead')).position"
+    sizes = ((1500, "0.4rem", ".wide:not(.scrolls)", "sticky"), (1450, "2rem", ".scrolls", "static"))
+    for width, size, place, position in sizes:
+        opened.page.evaluate(f"document.querySelector('#table .main').style.fontSize = '{size}'")
+        opened.page.set_viewport_size({"width": 900, "height": 900})
+        opened.page.wait_for_timeout(100)
+        opened.page.set_viewport_size({"width": width, "height": 900})
+        opened.page.wait_for_selector(f"#table {place}")
+        assert opened.page.evaluate("document.documentElement.scrollWidth") == width
+        assert opened.page.evaluate(headings) == position
+    opened.page.context.close()
 
 
 def test_values_of_the_frame_are_there_as_numbers(opened: Opened, run: Run) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import gtsam
 import numpy as np
 import pytest
 
@@ -16,7 +17,7 @@ from fgbaseline.smoother import ISAM2Settings
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gauss_newton import compact_graph, gauss_newton
 from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
-from fgbaseline.smoother.graph.keys import AUXILIARY_POSE
+from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, landmark_key
 from fgbaseline.smoother.initialization.initial_values import initial_landmarks
 from fgbaseline.smoother.isam2.incremental_smoother import IncrementalSmoother
 
@@ -86,6 +87,25 @@ def test_gauss_newton_from_far_initial_values_ends_at_the_minimum_or_reports_fai
     early = gauss_newton(graph, start, max_steps=2)
     assert "still falls after 2" in early.failure
     assert graph.error(early.values) > 2.0 * lowest
+
+
+def test_a_landmark_that_no_camera_sees_leaves_the_others_at_their_minimum() -> None:
+    """Behind its cameras a landmark has zero Jacobians (GTSAM), so that the system is indeterminate."""
+    problem = matched(drive(seconds=4.0, features_per_frame=20.0))
+    path = dead_reckoned_path(problem.increment, problem.initial_pose)
+    landmarks = initial_landmarks(problem, path)
+    graph, start = full_graph(problem), values_from_state(path, landmarks)
+    key = landmark_key(int(landmarks.index[0]))
+    start.update(key, start.atPoint3(key) - 1e4 * path[-1, :3, 0])
+    with pytest.raises(RuntimeError, match="Indeterminate"):
+        graph.linearize(start).optimize()
+    others = gtsam.NonlinearFactorGraph()
+    for factor in (graph.at(i) for i in range(graph.size())):
+        if key not in factor.keys():  # noqa: SIM118 (of a factor)
+            others.add(factor)
+    end = gauss_newton(graph, start)
+    lowest = gauss_newton(others, values_from_state(path, landmarks)).values
+    assert others.error(end.values) < (1.0 + 1e-4) * others.error(lowest)
 
 
 @pytest.mark.slow

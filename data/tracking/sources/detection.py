@@ -1,5 +1,6 @@
 """The form of a recording of images, by its folders and its first bytes; and motion that is given beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -9,7 +10,7 @@ from fgbaseline.geometry import InputError, se3
 from ...formats.bag_file import METADATA, STORAGE, is_bag
 from ...formats.imu_attachment import read_imu
 from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
-from ...formats.named_file import shown
+from ...formats.named_file import reading, shown
 from ...formats.trajectory_reader import read_extrinsic
 from ...formats.velocity_csv import read_velocity_csv
 from .bags import open_bag
@@ -20,6 +21,8 @@ from .kitti_raw import open_kitti_raw
 from .two_folders import open_two_folders
 
 Cameras = Literal["stereo", "left"]
+ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ", b"Rar!")
+"""first bytes of archives that recordings are published in"""
 FORMS = (
     "expected a EuRoC folder (mav0 or its parent), a KITTI odometry folder (image_0, image_1, calib.txt, times.txt), a "
     "KITTI raw drive (image_00, image_01, oxts), a ROS bag, two folders (LEFT --right RIGHT --calibration YAML) or one "
@@ -67,27 +70,48 @@ def _open(path: Path, options: ImageOptions) -> ImageRecording:
         return open_bag(path, options.calibration, options.topics, left_alone=left_alone)
     if options.topics:
         raise InputError(f"topics: {shown(path)} is no ROS bag")
+    if path.is_file():
+        with reading(path), path.open("rb") as file:
+            packed = file.read(8).startswith(ARCHIVES)
+        what = "is packed; unpack it and give its folder" if packed else f"is a file and no ROS bag; {FORMS}"
+        raise InputError(f"{shown(path)}: it {what}")
     if not path.is_dir():
         raise InputError(f"{shown(path)}: there is no such folder of images or bag; {FORMS}")
     if options.right is not None and left_alone:
         raise InputError(f"right: {shown(options.right)} is given with --cameras left; leave out one of the two")
     if options.right is not None or (left_alone and options.calibration is not None):
         return open_two_folders(path, options.right, options.calibration, options.times)
-    if not (path / METADATA).exists() and (stored := next((f for f in path.iterdir() if f.suffix in STORAGE), None)):
+    with reading(path):
+        inside = sorted(path.iterdir())
+    if not (path / METADATA).exists() and (stored := next((f for f in inside if f.suffix in STORAGE), None)):
         raise InputError(
             f"{shown(path / METADATA)} is missing, the description of a ROS 2 bag; give {stored.name} itself"
         )
     for name in ("calibration", "times"):
         if getattr(options, name) is not None:
             raise InputError(f"{name}: it belongs to folders of images; add --right FOLDER, or --cameras left for one")
-    if any((path / name).is_dir() for name in ("mav0", "cam0", "cam1")):
-        return open_euroc(path, left_alone=left_alone)
-    if any((path / name).is_dir() for name in ("image_0", "image_1")) or (path / "calib.txt").is_file():
-        return open_kitti_odometry(path, left_alone=left_alone)
-    inside = [folder.name for folder in path.iterdir() if folder.is_dir()]
-    if {"image_00", "image_01"} & set(inside) or any("_drive_" in name for name in inside):
-        return open_kitti_raw(path, left_alone=left_alone)
+    form = _form(path)
+    if form is not None:
+        return form(path, left_alone=left_alone)
+    nearest = next((place for place in (*inside, *path.resolve().parents[:2]) if _form(place)), None)
+    if nearest is not None:
+        raise InputError(f"{shown(path)}: there is no recording in this folder; give {shown(nearest)}")
     raise InputError(f"{shown(path)}: there is no recording in this folder; {FORMS}")
+
+
+def _form(folder: Path) -> Callable[..., ImageRecording] | None:
+    """Reader of the form that a folder has by the names in it; None where it has none or cannot be read."""
+    try:
+        inside = {place.name for place in folder.iterdir() if place.is_dir()}
+    except OSError:  # also where it is a file
+        return None
+    if inside & {"mav0", "cam0", "cam1"}:
+        return open_euroc
+    if inside & {"image_0", "image_1"} or (folder / "calib.txt").is_file():
+        return open_kitti_odometry
+    if inside & {"image_00", "image_01", "image_02", "oxts"} or any("_drive_" in name for name in inside):
+        return open_kitti_raw
+    return None
 
 
 def _with_motion(recording: ImageRecording, options: ImageOptions) -> ImageRecording:

@@ -115,6 +115,11 @@ def _images(folder: Path) -> _Images:
             raise InputError(f"expected lines `stamp in ns,file name`, got {','.join(wrong or [])[:60]!r}")
     there = {file.name for file in image_files(folder / "data")}
     kept = [(int(row[0]), folder / "data" / row[1].strip()) for row in rows if row[1].strip() in there]
+    if not kept:
+        raise InputError(
+            f"{shown(table)}: none of its {plural(len(rows), 'image')}, such as {rows[0][1].strip()}, is in "
+            f"{shown(folder / 'data')}, which has {min(there)}"
+        )
     found = _rising(np.array([stamp for stamp, _ in kept], np.int64), [file for _, file in kept], folder)
     missing = len(rows) - len(kept)
     text = f"{shown(table)}: {plural(missing, 'image')} of {len(rows)} not found: skipped."

@@ -46,18 +46,20 @@ def decoded(data: bytes) -> Raw | None:
 
 
 class EightBits:
-    """Conversion of one camera's images to 8 bits; the first of them decides the shift, and all others keep it."""
+    """Conversion of one camera's images to 8 bits, by the largest value so far: no image is clipped.
+
+    The shift only rises. An image after a brighter one keeps its scale; a step of the scale is one of the exposure.
+    """
 
     def __init__(self) -> None:
-        self._shift: int | None = None
+        self._shift = 0
 
     def __call__(self, image: Raw | None) -> Image | None:
         """The image in 8 bits; None stays None."""
         if image is None or image.dtype == np.uint8:
             return image
-        if self._shift is None:
-            self._shift = next(bits for bits in BITS if int(image.max()) < 2**bits) - 8
-        eight: Image = np.minimum(image >> self._shift, 255).astype(np.uint8)
+        self._shift = max(self._shift, next(bits for bits in BITS if int(image.max()) < 2**bits) - 8)
+        eight: Image = (image >> self._shift).astype(np.uint8)
         return eight
 
 

@@ -94,7 +94,7 @@ def open_kitti_raw(folder: Path, *, left_alone: bool = False) -> ImageRecording:
 
 
 def _drive(folder: Path) -> Path:
-    if any((folder / name).is_dir() for name in ("image_00", "image_01")):
+    if any((folder / name).is_dir() for name in ("image_00", "image_01", "image_02", "oxts")):
         return folder.resolve()
     drives = sorted(p for p in folder.iterdir() if p.is_dir() and "_drive_" in p.name)
     if len(drives) != 1:

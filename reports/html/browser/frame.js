@@ -3,6 +3,8 @@ class FrameView {
   constructor(place) {
     this.sides = run.camera.baseline === null ? ["left"] : ["left", "right"];
     place.querySelector('[data-side="right"]').parentElement.hidden = this.sides.length === 1;
+    const isWide = run.camera.width > 2 * run.camera.height;
+    place.querySelector(".images").classList.toggle("beside", this.sides.length === 2 && !isWide);
     this.images = this.sides.map(side => {
       const image = svg("svg", { role: "img", "aria-label": side + " image: measured and reprojected observations" });
       place.querySelector(`[data-side="${side}"]`).append(image);
@@ -63,6 +65,7 @@ class FrameView {
     const height = scale * run.camera.height;
     image.setAttribute("viewBox", `0 0 ${width} ${height.toFixed(1)}`);
     const parts = [];
+    const size = Math.max(0.5, Math.min(1, width / 600));  // of marks
     const under = run.images[chosen.frame];
     if (under) parts.push(svg("image", { href: under[side], width, height, preserveAspectRatio: "none" }));
     for (const one of seen) {
@@ -73,9 +76,9 @@ class FrameView {
       if (one.predicted) {
         const [px, py] = [2 * side, 2 * side + 1].map(row => scale * one.predicted[row]);
         group.append(svg("path", { class: "error", d: `M${x.toFixed(1)} ${y.toFixed(1)}L${bounded(px)} ${bounded(py)}` }));
-        group.append(svg("path", { class: "predicted", d: `M${bounded(px)} ${bounded(py)}m-3.5 0h7m-3.5 -3.5v7` }));
+        group.append(svg("path", { class: "predicted", d: `M${bounded(px)} ${bounded(py)}${mark("predicted", size)}` }));
       }
-      group.append(svg("path", { class: "measured", d: `M${x.toFixed(1)} ${y.toFixed(1)}${MARKS[one.fate]}` }));
+      group.append(svg("path", { class: "measured", d: `M${x.toFixed(1)} ${y.toFixed(1)}${mark(one.fate, size)}` }));
       group.addEventListener("pointermove", event => showHint(event, this.about(one, key)));
       group.addEventListener("pointerleave", hideHint);
       parts.push(group);
@@ -127,15 +130,30 @@ class FrameView {
     const why = [...reasons].sort((a, b) => b[1] - a[1]).map(([reason, n]) => `${n} × ${run.reasons[reason]}`);
     this.words.textContent = `Frame ${chosen.frame}, ${timeOf(chosen.frame)}: ${parts.join(", ")}.`
       + (why.length ? ` Excluded: ${why.join(", ")}.` : "");
+    const nearest = nearestImages();
+    if (nearest === null || nearest === chosen.frame) return;
+    const button = html("button", { type: "button" }, `frame ${nearest}`);
+    button.addEventListener("click", () => goTo(nearest));
+    this.words.append(" The page has no images of this frame; the nearest are those of ", button, ".");
   }
 }
 
 // Observations of a track before the chosen frame that its tail shows.
 const TAIL = 10;
 
-// Relative paths around a measured point, distinguished by shape and not by color alone.
+// The frame with images that is nearest to the chosen one; null where no frame has any.
+function nearestImages() {
+  const away = k => Math.abs(k - chosen.frame);
+  return Object.keys(run.images).map(Number).reduce((best, k) => (best === null || away(k) < away(best) ? k : best), null);
+}
+
+// A path around a measured or predicted point, relative to it; kinds differ in shape and not by color alone.
+function mark(kind, size) {
+  return MARKS[kind].replace(/\d+(\.\d+)?/g, length => String(Math.round(10 * length * size) / 10));
+}
 const MARKS = {
-  used: "m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0",
+  used: "m-4 0a4 4 0 0 0 8 0a4 4 0 0 0 -8 0",
   rejected: "m-4.5 0l4.5 -4.5l4.5 4.5l-4.5 4.5z",
   excluded: "m-3.5 -3.5l7 7m0 -7l-7 7",
+  predicted: "m-3.5 0h7m-3.5 -3.5v7",
 };

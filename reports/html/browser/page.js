@@ -25,6 +25,17 @@ fold();
 const bar = document.getElementById("controls");
 new ResizeObserver(() => document.documentElement.style.setProperty("--bar", bar.offsetHeight + "px")).observe(bar);
 
+// A table that is wider than the page scrolls in its place; only a narrower one has headings that stay in sight.
+for (const table of document.querySelectorAll("#table .main")) {
+  const fit = () => {
+    const place = table.parentElement;
+    place.classList.remove("scrolls");
+    place.classList.toggle("scrolls", table.offsetWidth > place.parentElement.clientWidth + 1);
+  };
+  whenResized(document.body, fit);
+  fit();
+}
+
 // Legends have what is shown.
 onShown.push(() => {
   for (const entry of document.querySelectorAll(".legend li")) entry.hidden = !chosen.shown.has(entry.dataset.key);
