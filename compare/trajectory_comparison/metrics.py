@@ -1,4 +1,4 @@
-"""All metrics of a comparison: association, alignment, errors, drift, consistency, reprojection and ranking."""
+"""Computes the metrics of a comparison: association, alignment, errors, drift, consistency, reprojection, ranking."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,7 +10,7 @@ from fgbaseline import compare
 from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
 from fgbaseline.compare.columns import Columns
 from fgbaseline.compare.trajectory.ate_rpe import absolute_error_columns, relative_error_columns
-from fgbaseline.compare.trajectory.divergence import divergence_columns
+from fgbaseline.compare.trajectory.divergence import departure_columns
 from fgbaseline.compare.trajectory.drift import drift_rates
 from fgbaseline.compare.trajectory.error_decomposition import share_intervals
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
@@ -39,7 +39,7 @@ FEWEST = 2
 
 
 def compare_entries(entries: Entries, settings: Settings) -> Comparison:
-    """Values of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
+    """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
     up, up_from = _up(entries, settings)
     everything = [entries.reference, *entries.estimates]
     settings = replace(
@@ -141,14 +141,14 @@ def _compared(
     reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
     matched, offset = matched_poses(reference, entry, up, settings)
-    absolute, divergence = dict(absolute_error_columns(matched)), dict(divergence_columns(matched, up))
+    absolute, departure = dict(absolute_error_columns(matched)), dict(departure_columns(matched, up))
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:
         unknown = np.full(len(matched), np.nan)
         absolute |= dict.fromkeys(("rotation_deg", "rotation_chord", "pose"), unknown)
-        divergence |= dict.fromkeys(("rotation_deg", "heading_deg"), unknown)
+        departure |= dict.fromkeys(("rotation_deg", "heading_deg"), unknown)
         notes["rotation_deg"] = f"{' and '.join(bare)} {'has' if len(bare) == 1 else 'have'} no orientations"
-    bound = min(FAR, FAR_SHARE * float(divergence["traveled"][-1])) or FAR
+    bound = min(FAR, FAR_SHARE * float(departure["traveled"][-1])) or FAR
     relative = {d.text: _relative(matched, d, settings, notes) for d in settings.deltas}
     tables = {delta: table for delta, table in relative.items() if table is not None}
     positions = matched.reference.position, entry.trajectory.position
@@ -157,7 +157,7 @@ def _compared(
         matched=matched,
         offset=offset,
         absolute=absolute,
-        divergence=divergence,
+        departure=departure,
         relative=tables,
         segments=_or_note("segments", notes, lambda: compare.segment_errors(_oriented(matched))),
         reported_covariance=_or_note("nees", notes, lambda: _reported(reference, entry, matched)),
@@ -165,7 +165,7 @@ def _compared(
         shares=compare.error_decomposition(matched, up),
         share_intervals=share_intervals(matched, up, seed=seed),
         bound=bound,
-        passing=_passing(matched, divergence, bound, notes),
+        passing=_passing(matched, departure, bound, notes),
         statistics={name: spread(absolute[name], seed) for name in ("translation", "rotation_deg", "pose")},
         relative_statistics={
             delta: {name: spread(table[name], seed) for name in ("translation", "rotation_deg")}
@@ -207,11 +207,11 @@ def _map(
 
 
 def _passing(
-    matched: MatchedTrajectories, divergence: Columns, bound: float, notes: dict[str, str]
+    matched: MatchedTrajectories, departure: Columns, bound: float, notes: dict[str, str]
 ) -> Exceedance | None:
     """First pose beyond the bound; only of paths that start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
-        return compare.first_exceedance(divergence, bound)
+        return compare.first_exceedance(departure, bound)
     notes["passing"] = f"it was {matched.alignment.caption}, so the paths do not start together"
     return None
 
