@@ -32,12 +32,12 @@ CALLS: Mapping[str, Mapping[type, tuple[str, ...]]] = {
         gtsam.Marginals: ("__init__", "marginalCovariance", "jointMarginalCovariance"),
     },
 }
-"""what is counted as what; factors that are built and values that are inserted are ours"""
+"""calls of each category, by class; factors that are built and values that are inserted are ours"""
 
 
 @dataclass
 class Spent:
-    """Processor seconds in GTSAM's calls, by what they are counted as."""
+    """Processor seconds in GTSAM's calls, by category."""
 
     seconds: dict[str, float]
 

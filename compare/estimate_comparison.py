@@ -129,7 +129,7 @@ class Result(Displayed):
     inertial: InertialEvidence | None = None
     """None for an estimate without velocity and biases"""
     divergence_common: CommonRmse | None = None
-    """what ranks it: over the frames that all estimators have; None where it is not ranked"""
+    """divergence by which it is ranked, over the frames that all estimators have; None where it is not ranked"""
     ate_common: CommonRmse | None = None
     """RMSE of `truth_aligned` over the common frames"""
 

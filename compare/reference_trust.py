@@ -23,7 +23,7 @@ from .statistics.descriptive import rms_norm
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
 RESOLUTION = 1e-5
-"""m and relative cost, below which a solution and the batch solution do not differ"""
+"""smallest reported difference from the batch solution: position RMSE in m, cost as a relative difference"""
 NOTABLE_INFLATION = 1.1
 """factor in the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
@@ -48,7 +48,7 @@ AT_LEAST = frozenset({"used_share"})
 
 
 class Verdict(IntEnum):
-    """Trust in a reference; the worst finding decides."""
+    """Trust in a reference; the worst criterion decides."""
 
     TRUSTED = 0
     DOUBTFUL = 1
@@ -73,7 +73,7 @@ class Criterion:
     """whether the value must not fall below its limits; else it must not exceed them"""
     verdict: Verdict
     remark: str = ""
-    """circumstance without which the value is misread; empty where there is none"""
+    """note needed to interpret the value (inflated pixel sigma); empty without one"""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -93,17 +93,18 @@ class Trust(Displayed):
 
 @dataclass(frozen=True, slots=True)
 class TrustLimits:
-    """Limits of each finding: doubtful, untrusted."""
+    """Limits of each criterion: doubtful, untrusted."""
 
     pixel_scale: tuple[float, float] = (1.6, 3.0)
-    """normalized pixel residual RMS: see `noise_scale.pixel_scale`"""
+    """estimated over modeled pixel sigma: see `noise_scale.pixel_scale`"""
     motion_scale: tuple[float, float] = (1.4, 2.4)
-    """normalized motion residual RMS: see `noise_scale.motion_scale`"""
+    """normalized motion residual RMS per degree of freedom: see `noise_scale.motion_scale`"""
     used_share: tuple[float, float] = (0.6, 0.3)
     """share of the `expected_observations` that were used"""
     weak_frames: tuple[float, float] = (0.05, 0.25)
     """share of frames with fewer than `weak_below` used observations"""
     weak_below: int = 6
+    """number of used observations below which a frame is weak"""
     untied_intervals: tuple[float, float] = (0.25, 0.6)
     """share of the intervals between frames that no used landmark is observed on both sides of"""
     given_up_frames: tuple[float, float] = (0.0, 0.05)
@@ -121,6 +122,7 @@ def trust(
 ) -> Trust:
     """Verdict on a reference by up to nine criteria, each with its limits: see `CRITERIA` and `TrustLimits`.
 
+    It is UNTRUSTED if it failed or used no observation, and at least DOUBTFUL if the batch solution has one start only.
     Residuals are compared with the problem's own noise model. The two criteria on `batch` need a batch solution.
     """
     if reference.status is Status.FAILED:
@@ -130,33 +132,33 @@ def trust(
     if n_used == 0:
         return Trust(Verdict.UNTRUSTED, ("it used no observation",))
     pixel, motion = pixel_scale(problem, reference), motion_scale(problem, reference)
-    counted = expected_observations(problem)
-    n_offered = max(1, int(counted.sum()))
-    share = int((reference.used & counted).sum()) / n_offered
-    impossible = int((counted & ~has_positive_disparity(problem)).sum()) / n_offered
+    expected = expected_observations(problem)
+    n_expected = max(1, int(expected.sum()))
+    share = int((reference.used & expected).sum()) / n_expected
+    impossible = int((expected & ~has_positive_disparity(problem)).sum()) / n_expected
     per_frame = np.bincount(problem.sequence.observations.frame[reference.used], minlength=problem.n_frames)
     weak = float(np.mean(per_frame < limit.weak_below))
     lost = {event.frame for event in reference.events if event.kind == EventKind.FRAME_WITHOUT_OBSERVATIONS}
     given_up = len(lost) / problem.n_frames
     inflated = inflation_remark(problem)
-    expected = (
+    expected_scale = (
         f"{1.0 / problem.pixel_inflation:.2g} is expected for white track errors, because the pixel sigma is inflated "
         f"{problem.pixel_inflation:.2g} times for time-correlated ones"
         if inflated
         else "1 is expected"
     )
-    recorded = "recorded ones" if (problem.excluded != Excluded.FEATURE_NOT_CHOSEN).all() else "chosen tracks'"
+    recorded = "chosen tracks'" if _features_were_chosen(problem) else "recorded ones"
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     intervals = max(1, problem.n_frames - 1)
     motion_data = "velocities" if problem.imu is None else "inertial samples"
     judged = [
         (
             _criterion(limit, "pixel_scale", pixel, inflated),
-            f"normalized pixel residual RMS {_figure(pixel)} (limit {limit.pixel_scale[0]:g}; {expected})",
+            f"normalized pixel residual RMS {_rounded(pixel)} (limit {limit.pixel_scale[0]:g}; {expected_scale})",
         ),
         (
             _criterion(limit, "motion_scale", motion),
-            f"normalized motion residual RMS {_figure(motion)} (limit {limit.motion_scale[0]:g}; up to 1 is expected)",
+            f"normalized motion residual RMS {_rounded(motion)} (limit {limit.motion_scale[0]:g}; up to 1 is expected)",
         ),
         (
             _criterion(limit, "used_share", share),
@@ -214,19 +216,28 @@ def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -
 
 
 def expected_observations(problem: Problem) -> BoolArray:
-    """Observations (n,) that an estimator should use: those of the problem, and excluded ones of chosen features.
+    """Denominator of `used_share`: mask (n,) of the problem's observations and of those that a mask excluded.
 
-    Excluded far points (disparity above 0, at most FAR_POINT) do not count, as they determine no depth. Observations
-    without positive disparity, which are impossible, do count.
+    Where features were chosen, only their observations count. Excluded far points (disparity above 0, at most
+    FAR_POINT) do not count, as they determine no depth; observations without positive disparity, which are impossible,
+    do.
     """
-    d = disparity(problem.sequence.observations.pixel)
-    wanted = problem.excluded != Excluded.FEATURE_NOT_CHOSEN
-    return np.asarray(problem.mask | (wanted & ~((d > 0.0) & (d <= FAR_POINT))), dtype=np.bool_)
+    observations = problem.sequence.observations
+    d = disparity(observations.pixel)
+    counted = ~((d > 0.0) & (d <= FAR_POINT))
+    if _features_were_chosen(problem):
+        counted &= np.isin(observations.landmark, problem.features)
+    return np.asarray(problem.mask | counted, dtype=np.bool_)
+
+
+def _features_were_chosen(problem: Problem) -> bool:
+    """Whether the problem has only some of the landmarks that its mask leaves."""
+    return bool((problem.excluded == Excluded.FEATURE_NOT_CHOSEN).any())
 
 
 def has_positive_disparity(problem: Problem) -> BoolArray:
-    """Whether an observation (n,) has a positive disparity, as every point in front of the cameras has; one camera has
-    none that is not."""
+    """Mask (n,) of the observations with positive disparity, as every point at a finite distance in front of the
+    cameras has. All True for one camera, which measures no disparity."""
     if problem.sequence.monocular:
         return np.ones(len(problem.excluded), dtype=np.bool_)
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
@@ -275,5 +286,5 @@ def _below(value: float, limits: tuple[float, float]) -> Verdict:
     return Verdict(int(not value >= limits[0]) + int(not value >= limits[1]))
 
 
-def _figure(value: float) -> str:
+def _rounded(value: float) -> str:
     return f"{value:.2g}"

@@ -68,7 +68,7 @@ class EventKind(StrEnum):
     """observations rejected by a chi-square gate"""
     FRAME_DISAGREES = "frame disagrees"
     """all observations of a frame rejected, because most of them exceed a chi-square quantile"""
-    MOTION_DOUBTED = "motion doubted"
+    PROCESS_NOISE_INFLATED = "process noise inflated"
     """noise added to a filter's motion, because successive frames disagree with it and not in themselves"""
     INITIALIZATION_DEFERRED = "initialization deferred"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
@@ -122,7 +122,7 @@ class Innovations(Displayed):
     """(T,) nu^T S^-1 nu over the three rows (uL, uR, (vL + vR) / 2) of all observations of known landmarks in a frame,
     S being the filter's own covariance of nu; NaN where there is none"""
     degrees: IntArray
-    """(T,) degrees of freedom: 3 per observation"""
+    """(T,) degrees of freedom: 3 per observation, or 2 with one camera"""
 
     @staticmethod
     def none(n_frames: int) -> "Innovations":
@@ -163,7 +163,7 @@ class Estimate(Displayed):
     innovations: Innovations | None = None
     """NIS of a filter that records it"""
     gyro_bias: GyroBias | None = None
-    """where it was estimated along with the poses"""
+    """gyroscope bias, if estimated along with the poses"""
     velocity: FloatArray | None = None
     """(T, 3) m/s in world axes; estimated from raw inertial data, as are the two biases"""
     gyroscope_bias: FloatArray | None = None
@@ -214,17 +214,17 @@ class Estimate(Displayed):
         """Draws the path in the two world axes along which it extends farthest, or in those of `axes`."""
         return plot_path(self.world_T_imu[:, :3, 3], self.name, axes)
 
-    def transformed(self, motion: FloatArray) -> "Estimate":
-        """Answer in another world, `motion` (4, 4) being new_T_old: poses and landmarks, by-products too."""
-        R, landmarks, P = motion[:3, :3], self.landmarks, self.state_covariance
+    def transformed(self, new_T_old: FloatArray) -> "Estimate":
+        """Answer in another world, by-products included; `new_T_old` (4, 4) is the pose of the present world in it."""
+        R, landmarks, P = new_T_old[:3, :3], self.landmarks, self.state_covariance
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(
             self,
-            world_T_imu=motion @ self.world_T_imu,
-            landmarks=Landmarks(landmarks.index, se3.transform(motion, landmarks.position), covariance),
+            world_T_imu=new_T_old @ self.world_T_imu,
+            landmarks=Landmarks(landmarks.index, se3.transform(new_T_old, landmarks.position), covariance),
             velocity=None if self.velocity is None else self.velocity @ R.T,
             state_covariance=None if P is None else strapdown.rotated_velocity(P, R, R),
-            by_products={name: other.transformed(motion) for name, other in self.by_products.items()},
+            by_products={name: other.transformed(new_T_old) for name, other in self.by_products.items()},
         )
 
     @staticmethod

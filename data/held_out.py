@@ -16,7 +16,7 @@ class HeldOut(Displayed):
     """n observations of tracks removed from a sequence for validation."""
 
     observations: Observations
-    """as recorded, with the recording's landmark numbers"""
+    """held-out observations as recorded, with the landmark numbers of the recording"""
     piece: IntArray
     """(n,) piece of a track of each observation, 0 to n_pieces - 1: consecutive observations of one point by odometry
     alone; -1 for copies, jumps and pieces shorter than `MIN_PIECE`"""

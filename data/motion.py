@@ -10,14 +10,14 @@ from .sequence import Sequence
 
 
 class Shift(float, Enum):
-    """Interval of a velocity sample, as a shift in intervals; the usual cases."""
+    """Interval over which velocity sample u_k of frame k holds, as a shift in intervals; the usual cases."""
 
     AFTER = 0.0
-    """u_k moves frame k to k+1 (source paper)"""
+    """after frame k: u_k moves frame k to k+1 (source paper)"""
     MIDDLE = -0.5
-    """u_k is the velocity at the instant of frame k: the mean of u_k and u_(k+1) moves k to k+1"""
+    """around frame k, at whose instant it is measured: the mean of u_k and u_(k+1) moves k to k+1"""
     BEFORE = -1.0
-    """u_(k+1) moves k to k+1"""
+    """before frame k: u_(k+1) moves k to k+1"""
 
     def __format__(self, form: str) -> str:
         """Number as text: an Enum would print its name."""

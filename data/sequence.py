@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROTATION_TOLERANCE = 1e-6
+"""largest entry of |R^T R - I|, and largest |det R - 1|, of a rotation matrix R"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Truth(Displayed):
     """Ground truth: poses, landmarks and inertial states.
 
-    The world is the IMU frame of image 0. With raw inertial samples it is any world with its origin near the first
-    pose; a problem transforms it to its own.
+    The world is the IMU frame at frame 0. With raw inertial samples it has the axes of the file, and its origin is the
+    first known pose; `diagnosis.calibrated` aligns it with the world of the problem.
     """
 
     world_T_imu: FloatArray
@@ -65,19 +66,19 @@ class Truth(Displayed):
         world_T_imu[~np.isfinite(world_T_imu).all(axis=(1, 2))] = np.nan
         return Truth(world_T_imu, moved, source)
 
-    def transformed(self, motion: FloatArray) -> "Truth":
-        """The truth in another world; `motion` (4, 4) is new_T_old."""
-        R = motion[:3, :3]
+    def transformed(self, new_T_old: FloatArray) -> "Truth":
+        """The truth in another world; `new_T_old` (4, 4) is the pose of the present world in it."""
+        R = new_T_old[:3, :3]
         return replace(
             self,
-            world_T_imu=motion @ self.world_T_imu,
-            landmarks=None if self.landmarks is None else se3.transform(motion, self.landmarks),
+            world_T_imu=new_T_old @ self.world_T_imu,
+            landmarks=None if self.landmarks is None else se3.transform(new_T_old, self.landmarks),
             velocity=None if self.velocity is None else self.velocity @ R.T,
             up=None if self.up is None else R @ self.up,
         )
 
     def of_frames(self, kept: BoolArray) -> "Truth":
-        """The truth of some of the frames (T,)."""
+        """Truth of the frames where the mask `kept` (T,) is true; landmarks unchanged."""
         state = (self.velocity, self.gyroscope_bias, self.accelerometer_bias)
         velocity, gyroscope_bias, accelerometer_bias = (None if values is None else values[kept] for values in state)
         return replace(
@@ -122,7 +123,7 @@ class Sequence(Displayed):
     findings: tuple[Finding, ...] = ()
     """faults of the file that the reader repaired"""
     time_unit_given: bool = False
-    """True if the user gave the unit of the stamps; the diagnosis then does not test it"""
+    """True if user or image format state the unit of the stamps; the diagnosis then does not test it"""
     left_out: tuple[int, ...] = ()
     """increasing indices of file frames left out because their stamp repeats the previous one"""
 
@@ -161,7 +162,10 @@ class Sequence(Displayed):
 
     @property
     def up(self) -> FloatArray:
-        """Unit vector (3,) that points up in the world: z with raw inertial samples, else `up_imu`."""
+        """Unit vector (3,) that points up in the world of a problem: z with raw inertial samples, else `up_imu`.
+
+        The truth as read from a file may be in another world, with its own `Truth.up`.
+        """
         if self.imu is not None:
             return np.array([0.0, 0.0, 1.0])
         assert self.up_imu is not None
@@ -185,7 +189,7 @@ class Sequence(Displayed):
             facts["truth"] = f"{self.truth.known.sum():,} frames, path {length:.1f} m ({self.truth.source})"
         camera = self.camera
         base = "one camera" if isinstance(camera, MonocularCamera) else f"baseline {camera.baseline:.3f} m"
-        facts["camera"] = f"{camera.fu:.1f} x {camera.fv:.1f} px, {base}"
+        facts["camera"] = f"fu {camera.fu:.1f} px, fv {camera.fv:.1f} px, {base}"
         return facts | {f"remark {i}": text for i, text in enumerate(self.remarks, 1)}
 
     def to_frame(self) -> "pd.DataFrame":
@@ -224,8 +228,8 @@ def require_scale(sequence: Sequence) -> None:
     """Refuses one camera without raw inertial samples: nothing else determines the scale. Raises InputError."""
     if sequence.monocular and sequence.imu is None:
         raise InputError(
-            "features: its observations are of one camera (uR and vR are NaN), and only raw inertial samples determine "
-            "their scale; add --imu CSV, or the keys imu_time_stamps, imu_angular_velocity and imu_linear_acceleration"
+            "features: with one camera (uR and vR are NaN) only raw inertial samples determine the scale of the "
+            "trajectory; add --imu CSV, or the keys imu_time_stamps, imu_angular_velocity and imu_linear_acceleration"
         )
 
 
@@ -264,7 +268,10 @@ def check_sequence(s: Sequence) -> None:
             raise InputError(f"{name}: expected a number above 0 and at most {LARGEST:g}, got {float(value)!r}")
     _require_finite("features", s.observations.pixel[:, :2] if s.monocular else s.observations.pixel)
     if s.monocular and not np.isnan(s.observations.pixel[:, 2:]).all():
-        raise InputError("features: uR and vR of a recording with one camera are NaN")
+        row = int(np.argmin(np.isnan(s.observations.pixel[:, 2:]).all(axis=1)))
+        raise InputError(
+            f"features: uR and vR must be NaN for one camera, but row {row} is {s.observations.pixel[row].tolist()}"
+        )
     if len(s.observations) and (
         s.observations.frame.max() >= T
         or s.observations.landmark.max() >= s.n_landmarks

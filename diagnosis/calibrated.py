@@ -1,4 +1,4 @@
-"""The `calibrated` preset: a repaired and masked recording with the estimated noise and without priors."""
+"""The `calibrated` preset: a repaired and masked recording with the estimated noise and without landmark priors."""
 
 from dataclasses import dataclass, field, replace
 
@@ -18,6 +18,7 @@ from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
+from .inertial.result import InertialDiagnosis
 from .monocular.problem import monocular_problem
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
@@ -28,12 +29,15 @@ from .tracks.observation_mask import MaskSettings, choose_features, exclusions
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Settings in place of a diagnosis: the recording is taken as recorded."""
+    """Settings of a problem whose recording is taken as recorded, without a diagnosis."""
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
+    """with raw inertial samples only the pixel noise"""
     shift: float = Shift.AFTER
-    """intervals: see `motion.zero_order_hold`; as recorded, the velocity of frame k moves frame k to k + 1"""
+    """intervals after its stamp from which a velocity holds (`motion.zero_order_hold`); 0: that of frame k moves frame
+    k to k + 1"""
     mask: MaskSettings = field(default_factory=MaskSettings)
+    """not for one camera, whose observations cannot be predicted from each other"""
     kernel: HuberKernel | None = field(default_factory=HuberKernel)
 
 
@@ -41,24 +45,35 @@ def calibrated(
     sequence: Sequence,
     features: int | None = None,
     *,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | InertialDiagnosis | None = None,
     settings: Calibration | None = None,
     repairs: Repairs | None = None,
     processes: int = 1,
 ) -> Problem:
-    """The problem that the recording supports, with the first pose fixed at the identity.
+    """Estimation problem of a recording: diagnosed, repaired and masked, with the noise estimated from it.
 
-    Without `settings` the recording is diagnosed (unless its `diagnosis` is given) and repaired, with the estimated
-    noise. Where nothing can be estimated, or with `settings`, the recording is taken as recorded. Values in `repairs`
-    take precedence over the diagnosis. The noise of an increment is the standard deviation of a velocity times dt. A
-    fractional shift correlates the errors of neighboring increments, which is not modeled. `features` keeps that many
-    landmarks, those observed most often after masking. With raw inertial samples the problem has a start in place of
-    increments, and the noise that the recording states. The number of `processes` does not change the result. Raises
-    InputError for impossible repairs, for repairs together with `settings`, and where the units are in doubt.
+    With `settings`, or where nothing can be estimated, the recording is taken as recorded. A `diagnosis` of the
+    recording is used in place of a new one (`diagnose`, or `diagnose_inertial` for raw inertial samples). Values in
+    `repairs` take precedence over it. `features` is the number of landmarks to keep, those observed most often after
+    masking (None: all). The number of `processes` does not change the result.
+
+    Body velocities: the first pose is fixed at the identity. The noise of an increment is the standard deviation of a
+    velocity times dt; a fractional shift correlates the errors of neighboring increments, which is not modeled.
+
+    Raw inertial samples: `Problem.imu` replaces the increments. `Problem.start` is the initial state that was
+    estimated, with its covariance; roll and pitch are not fixed. The noise of the samples is as given with them, and
+    that of the pixels is estimated.
+
+    Raises InputError for impossible repairs, arguments that contradict each other or that the recording has no use for,
+    units in doubt, and where no initial state is found.
     """
     require_scale(sequence)
+    if settings is not None and diagnosis is not None:
+        raise InputError("diagnosis: a recording that is taken as it is has none; give a diagnosis or settings")
     if sequence.imu is not None:
-        return _inertial(sequence, features, settings, repairs, processes)
+        return _inertial(sequence, features, diagnosis, settings, repairs, processes)
+    if isinstance(diagnosis, InertialDiagnosis):
+        raise InputError("diagnosis: it is one of raw inertial samples, and the recording has body velocities")
     if settings is not None and repairs is not None:
         raise InputError("repairs: a recording that is taken as it is has none; give repairs or settings, not both")
     if settings is None:
@@ -80,18 +95,31 @@ def calibrated(
 
 
 def _inertial(
-    sequence: Sequence, features: int | None, settings: Calibration | None, repairs: Repairs | None, processes: int
+    sequence: Sequence,
+    features: int | None,
+    diagnosis: Diagnosis | InertialDiagnosis | None,
+    settings: Calibration | None,
+    repairs: Repairs | None,
+    processes: int,
 ) -> Problem:
-    """The problem of a recording with raw inertial samples, whose start takes the place of velocities."""
+    """Problem of a recording with raw inertial samples."""
     if repairs is not None:
         raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
+    if isinstance(diagnosis, Diagnosis):
+        raise InputError("diagnosis: it is one of body velocities; raw inertial samples need `diagnose_inertial`")
+    if settings is not None and settings.shift != Shift.AFTER:
+        raise InputError("settings: a shift is one of body velocities, and the recording has raw inertial samples")
     if sequence.monocular:
+        if diagnosis is not None:
+            raise InputError("diagnosis: a recording with one camera has none; leave it out")
         if settings is not None:
+            if settings.mask != MaskSettings():
+                raise InputError("settings: the mask predicts by stereo, and the recording has one camera")
             return monocular_problem(sequence, features, settings.noise.pixel, settings.kernel)
         return monocular_problem(sequence, features, None, HuberKernel())
     if settings is not None:
         return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
-    return inertial_problem(diagnose_inertial(sequence, processes), features)
+    return inertial_problem(diagnosis or diagnose_inertial(sequence, processes), features)
 
 
 def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Problem:
@@ -104,7 +132,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
         f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px, {noise.linear_velocity:.3f} m/s and "
         f"{noise.angular_velocity:.4f} rad/s",
     )
-    problem = _with_features(
+    problem = _velocity_problem(
         repaired.sequence, repaired.excluded, features, noise, diagnosis.shift, HuberKernel(), remarks
     )
     return replace(
@@ -118,7 +146,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
 
 def _origin(found: Diagnosis, repairs: Repairs) -> str:
     given = len(repairs.sigma.model_dump(exclude_none=True))
-    rest = "found in the recording" if found.sigmas is not None else "assumed, not estimated from the recording"
+    rest = "estimated from the recording" if found.sigmas is not None else "assumed, not estimated from the recording"
     return rest if given == 0 else "user-specified" if given == 3 else f"user-specified in part, the rest {rest}"
 
 
@@ -135,8 +163,8 @@ def _bridged(problem: Problem, diagnosis: Diagnosis, noise: NoiseSettings) -> Pr
         return problem
     linear, angular = (np.sqrt(np.mean(found.deviation[found.blind, part] ** 2)) for part in (slice(3), slice(3, 6)))
     remark = (
-        f"over {plural(len(found.blind), 'interval')} that the cameras do not see, velocities are averaged over "
-        f"neighbors: their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
+        f"in {plural(len(found.blind), 'interval')} with too few common landmarks, velocities are averaged over "
+        f"neighboring intervals: their noise is {linear:.3f} m/s and {angular:.4f} rad/s there"
     )
     return replace(
         problem,
@@ -163,7 +191,7 @@ def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration
         "assumed, not estimated from the recording",
         _shift_remark(shift),
     )
-    return _with_features(sequence, excluded, features, noise, shift, settings.kernel, remarks)
+    return _velocity_problem(sequence, excluded, features, noise, shift, settings.kernel, remarks)
 
 
 def _shift_remark(shift: float) -> str:
@@ -174,7 +202,7 @@ def _shift_remark(shift: float) -> str:
     return remark + correlated
 
 
-def _with_features(
+def _velocity_problem(
     sequence: Sequence,
     excluded: NDArray[np.uint8],
     features: int | None,

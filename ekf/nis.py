@@ -8,7 +8,7 @@ It is computed before kernel and gate: rejected innovations are evidence as well
 import numpy as np
 
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import ROWS
+from fgbaseline.geometry.measurement import STEREO_ROWS
 
 from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 
@@ -30,7 +30,7 @@ def three_row_nis(posterior: PosePosterior, innovation: PoseInnovation) -> float
 
     The squared norm of the printed four rows is larger by (vL - vR)^2 / (2 V), which does not depend on the state.
     """
-    if innovation.residual.shape[1] == len(ROWS):
+    if innovation.residual.shape[1] == len(STEREO_ROWS):
         return posterior.nis
     apart = innovation.residual[:, 1] - innovation.residual[:, 3]
     return posterior.nis - 0.5 * float(apart @ apart) / float(innovation.variance[1])

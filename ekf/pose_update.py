@@ -15,7 +15,7 @@ from .motion_model import POSE
 
 
 class PoseInnovation(NamedTuple):
-    """Innovation of n observations of known landmarks, r rows each, with its Jacobian by the pose."""
+    """Innovation of n observations of known landmarks, r rows each, with its Jacobian w.r.t. the pose."""
 
     residual: FloatArray
     """(n, r) z - z~, px"""

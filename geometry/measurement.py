@@ -2,16 +2,17 @@
 
 It has the rows, their noise, whitening and robust weight.
 
-The source paper measures z = [uL, vL, uR, vR] with variance V each. A rectified pair predicts vL = vR = v. The rows
-(uL, uR, (vL + vR) / 2) with variances (V, V, V/2) therefore have the same likelihood: their sum of squared whitened
-residuals is smaller by (vL - vR)^2 / (2 V), which does not depend on the state.
+The source paper (docs/glossary.md) measures z = [uL, vL, uR, vR] with variance V each. A rectified pair predicts
+vL = vR = v. The rows (uL, uR, (vL + vR) / 2) with variances (V, V, V/2) therefore have the same likelihood: their sum
+of squared whitened residuals is smaller by (vL - vR)^2 / (2 V), which does not depend on the state.
 
 One camera has the rows (uL, vL) with variances (V, V).
 
-All estimators, the diagnosis and the comparison use the three rows. The four rows are used only by the documented
-filter without a kernel. A kernel is a function of the whitened norm of the three rows. The whitening covariance is that
-of the residual: R = diag(V, V, V/2) in smoother, triangulation and diagnosis, and H Sigma H^T + R, the covariance of
-the innovation, in a filter.
+Likelihoods and costs use these three rows, or two. All four are used by the filter of the source paper without a
+kernel (pose and landmark update), and by reprojection errors in px. A kernel is a function of the whitened norm of the
+three rows. The whitening covariance is that of the residual: R = diag(V, V, V/2) in smoother, triangulation and
+diagnosis, and H Sigma H^T + R, the covariance of the innovation, in a filter. GTSAM's factors have rows and variances
+from here, and prediction and Jacobians of their own.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +26,8 @@ from .monocular import Camera, MonocularCamera
 from .so3 import FloatArray
 from .stereo import PIXEL_ROWS, StereoCamera, StereoRows
 
-ROWS = ("uL", "uR", "v")
+STEREO_ROWS = ("uL", "uR", "v")
+"""components of the measurement vector of a rectified pair, in this order"""
 MONOCULAR_ROWS = ("uL", "v")
 ROW_VARIANCE = np.array([1.0, 1.0, 0.5])
 """variances of (uL, uR, v), relative to the variance V of one of the four rows"""
@@ -63,7 +65,7 @@ def squared_norm(residual: FloatArray, covariance: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class HuberKernel:
-    """Huber loss on the whitened norm of an observation's three rows: quadratic up to `threshold` sigmas."""
+    """Huber loss on the whitened norm of an observation's rows: quadratic up to `threshold` sigmas."""
 
     threshold: float = 2.5
 
@@ -99,7 +101,7 @@ class HuberKernel:
 
 @dataclass(frozen=True, slots=True)
 class StereoMeasurement:
-    """Measurement model of a problem: camera, noise and robust kernel."""
+    """Measurement model of a stereo pair or one camera: intrinsics, noise and robust kernel."""
 
     camera: Camera
     variance: float
@@ -114,7 +116,7 @@ class StereoMeasurement:
     @property
     def n_rows(self) -> int:
         """Number r of rows of an observation, its degrees of freedom: 3, or 2 for one camera."""
-        return len(MONOCULAR_ROWS if self.monocular else ROWS)
+        return len(MONOCULAR_ROWS if self.monocular else STEREO_ROWS)
 
     @property
     def row_variance(self) -> FloatArray:
@@ -131,8 +133,8 @@ class StereoMeasurement:
         """Rows (..., r) of pixels or residuals uL, vL, uR, vR (..., 4)."""
         return pixel[..., :2] if self.monocular else three_rows(pixel)
 
-    def pixel_distance(self, residual: FloatArray) -> FloatArray:
-        """Euclidean norms (n,), px, of what is measured in residuals (n, 4): of uL, vL, uR, vR, or of uL and vL."""
+    def reprojection_error(self, residual: FloatArray) -> FloatArray:
+        """Euclidean norms (n,), px, of residuals (n, 4): over uL, vL, uR, vR, or uL, vL for one camera."""
         return np.asarray(np.linalg.norm(residual[:, :2] if self.monocular else residual, axis=1))
 
     def whitened(self, residual: FloatArray) -> FloatArray:
@@ -148,7 +150,7 @@ class StereoMeasurement:
         return squared if self.kernel is None else self.kernel.weighted(squared)
 
     def loss(self, squared: FloatArray) -> FloatArray:
-        """Kernel loss of squared whitened norms (...); the norms themselves without a kernel."""
+        """Twice the kernel's loss of squared whitened norms (...); the squared norms without a kernel."""
         return squared if self.kernel is None else self.kernel.loss(squared)
 
     def curvature_correction(self, squared: FloatArray) -> FloatArray:
@@ -162,9 +164,9 @@ class StereoMeasurement:
         return self.kernel.terms(squared)
 
     def documented_innovation(self, pixel: FloatArray, predicted: FloatArray) -> "DocumentedInnovation":
-        """Innovation of the documented filter: pixels (n, 4) minus predicted rows (n, 3).
+        """Innovation of the filter of the source paper: pixels (n, 4) minus predicted rows (n, 3).
 
-        Has the four rows as printed without a kernel, and three rows with one, which needs their norm.
+        It has the paper's four rows without a kernel, and three rows with one, which needs their norm.
         """
         if self.kernel is None:
             rows = list(PIXEL_ROWS)
@@ -207,23 +209,23 @@ class Prediction:
 
     @property
     def depth(self) -> FloatArray:
-        """Depths z (n,), m, of points at a finite distance."""
-        return np.asarray(1.0 / self.rows.inverse_depth, dtype=np.float64)
+        """Homogeneous coordinates z (n,): depths in m where w = 1, as for points given as (n, 3)."""
+        return np.asarray(1.0 / self.rows.inverse_z, dtype=np.float64)
 
     @property
     def cosine(self) -> FloatArray:
         """Cosines (n,) of the angle between optical axis and ray; not positive behind the camera."""
         x, y, _ = self.rows.normalized
-        return np.asarray(np.copysign(1.0 / np.sqrt(x * x + y * y + 1.0), self.rows.inverse_depth), dtype=np.float64)
+        return np.asarray(np.copysign(1.0 / np.sqrt(x * x + y * y + 1.0), self.rows.inverse_z), dtype=np.float64)
 
     @cached_property
     def _by_camera_point(self) -> FloatArray:
-        """Derivatives (rn, 4) by the homogeneous point in the left camera frame, stacked row by row."""
-        along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.rows.inverse_depth.size))
+        """Derivatives (rn, 4) w.r.t. the homogeneous point in the left camera frame, stacked row by row."""
+        along = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, self.rows.inverse_z.size))
         return np.ascontiguousarray(self.camera.row_derivatives(self.rows, along).transpose(2, 0, 1)).reshape(-1, 4)
 
     def pose_jacobian(self) -> FloatArray:
-        """Jacobian (n, r, 6) by the right perturbation [v, w] of world_T_imu: H of equation 13.
+        """Jacobian (n, r, 6) w.r.t. the right perturbation [v, w] of world_T_imu: the source paper's H, equation 13.
 
         T exp(delta) moves the point s in the IMU frame by -hat(delta) s = [-s4 I, hat(s)] delta.
         """
@@ -236,7 +238,7 @@ class Prediction:
         return H
 
     def point_jacobian(self) -> FloatArray:
-        """Jacobian (n, r, 4) by the homogeneous world point."""
+        """Jacobian (n, r, 4) w.r.t. the homogeneous world point."""
         r = len(self.rows.pixel)
         return np.asarray(self._by_camera_point @ (self.cam_T_imu @ self.imu_T_world)).reshape(-1, r, 4)
 
@@ -255,7 +257,7 @@ def predict(camera: Camera, cam_T_imu: FloatArray, world_T_imu: FloatArray, poin
 def back_projected(camera: Camera, rows: FloatArray, inverse_depth: float = np.nan) -> FloatArray:
     """Homogeneous points (n, 4) [x/z, y/z, 1, 1/z] in the left camera frame from rows (n, r); exact at infinity.
 
-    A stereo pair measures 1/z; for one camera it is `inverse_depth`, 1/m.
+    A stereo pair measures 1/z; for one camera `inverse_depth`, 1/m, takes its place.
     """
     points = np.ones((len(rows), 4))
     points[:, 0] = (rows[:, 0] - camera.cu) / camera.fu

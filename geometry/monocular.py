@@ -51,7 +51,7 @@ class MonocularCamera:
     def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
         """Directional derivatives (2, k, ...) of the rows; see `StereoCamera.row_derivatives`."""
         x, y, _ = seen.normalized
-        by_u, by_v = self.fu * seen.inverse_depth, self.fv * seen.inverse_depth
+        by_u, by_v = self.fu * seen.inverse_z, self.fv * seen.inverse_z
         return np.stack([by_u * (along[0] - x * along[2]), by_v * (along[1] - y * along[2])])
 
     def project(self, points: ArrayLike) -> FloatArray:

@@ -1,4 +1,6 @@
-"""Rectified stereo camera: pixels [uL, vL, uR, vR] of a point in the left camera frame (equation 10).
+"""Rectified stereo camera: pixels [uL, vL, uR, vR] of a point in the left camera frame.
+
+The equation numbers are those of the source paper (docs/glossary.md); this is equation 10.
 
 The pair observes the homogeneous point q = (x, y, z, w), with w = 1 for a point at a finite distance, at
 
@@ -17,6 +19,8 @@ from numpy.typing import ArrayLike
 
 from .so3 import FloatArray
 
+PIXEL_COMPONENTS = ("uL", "vL", "uR", "vR")
+"""components of the pixels of an observation, in this order"""
 PIXEL_ROWS = (0, 2, 1, 2)
 """index into (uL, uR, v) of the prediction of each of uL, vL, uR, vR"""
 MIN_DEPTH = 0.5
@@ -25,14 +29,17 @@ camera plane the Jacobian is unbounded."""
 
 
 class StereoRows(NamedTuple):
-    """Predicted rows of points, with what their derivatives need; coordinates first, then the points (...)."""
+    """Predicted rows of points, with what their derivatives need; coordinates first, then the points (...).
+
+    r is 3, or 2 for one camera.
+    """
 
     pixel: FloatArray
-    """(3, ...) uL, uR and v, px"""
+    """(r, ...) uL, uR and v, or uL and v, px"""
     normalized: FloatArray
-    """(3, ...) x/z, y/z and w/z (1/m), normalized by depth"""
-    inverse_depth: FloatArray
-    """(...) 1/z, 1/m"""
+    """(3, ...) x/z, y/z and w/z, the inverse depth (1/m)"""
+    inverse_z: FloatArray
+    """(...) 1/z of the point as given: the inverse depth where w = 1"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +86,11 @@ class StereoCamera:
     def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
         """Directional derivatives (3, k, ...) of the rows along k directions `along` (3 or 4, k, ...), m.
 
-        `along[i]` is the derivative of coordinate i of q by each of the k parameters. Three coordinates suffice for
+        `along[i]` is the derivative of coordinate i of q w.r.t. each of the k parameters. Three coordinates suffice for
         points at a finite distance, where w is constant.
         """
         x, y, w = seen.normalized
-        near = seen.inverse_depth
+        near = seen.inverse_z
         result = np.empty((3, *along.shape[1:]))  # filled in place: the arrays are short and calls are what costs
         left, right, v = result
         np.subtract(along[0], np.multiply(x, along[2], out=left), out=left)
@@ -106,7 +113,10 @@ class StereoCamera:
         return np.ascontiguousarray(np.moveaxis(self.rows(q).pixel[list(PIXEL_ROWS)], 0, -1))
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
-        """Jacobian (..., 4, 3) of `project` by points (..., 3): K_s dpi/dq in equations 11 and 13."""
+        """Jacobian (..., 4, 3) of `project` w.r.t. points (..., 3): K_s dpi/dq in equations 11 and 13.
+
+        It is for user-written filters (docs/examples/my-filter.md); the estimators linearize by `measurement.predict`.
+        """
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         identity = np.eye(3).reshape(3, 3, *([1] * (q.ndim - 1)))
         along = np.broadcast_to(identity, (3, 3, *q.shape[1:]))

@@ -133,7 +133,7 @@ def integrate(
     G[:, ROTATION, :3] = G[:, VELOCITY, 3:] = -J1_dt
     G[:, VELOCITY, :3] = by_turn[1] - J1_dt_slope
     total = G.sum(axis=0)
-    later = np.zeros((n, STATE, 6))  # derivatives by a step of the walk
+    later = np.zeros((n, STATE, 6))  # derivatives w.r.t. a step of the walk
     later[:, :9] = total - np.cumsum(G, axis=0)
     later[:, 9:] = np.eye(6)
     white, walk = np.repeat(densities[[0, 2]], 3), np.repeat(densities[[1, 3]], 3)

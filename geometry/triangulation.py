@@ -196,7 +196,7 @@ def _linearized(measurement: StereoMeasurement, observed: _Observed, q: FloatArr
     np.multiply(camera.row_derivatives(seen, along), white[:, None], out=A[:, :3])
     np.multiply(observed.measured - seen.pixel, white, out=A[:, 3])
     squared = np.einsum("in,in->n", A[:, 3], A[:, 3])
-    squared[~(seen.inverse_depth > 0.0)] = np.inf
+    squared[~(seen.inverse_z > 0.0)] = np.inf
     terms = np.empty((16, len(squared)))
     terms[0], weight, curvature = measurement.robust_terms(squared)
     A *= np.sqrt(weight)

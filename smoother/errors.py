@@ -18,7 +18,7 @@ class UnrecoverableError(Exception):
 
 
 FAILURES = (IndeterminateSystemError, UnrecoverableError, RuntimeError, LinAlgError)
-"""what ends a run without an answer; GTSAM raises RuntimeError, numpy LinAlgError"""
+"""exceptions that end a run without an answer; GTSAM raises RuntimeError, numpy LinAlgError"""
 
 
 def failure_reason(error: Exception) -> str:

@@ -20,7 +20,7 @@ DROPPED: Mapping[str, tuple[str, str]] = {
     EventKind.LANDMARK_DROPPED: ("landmark", "landmarks"),
     EventKind.FRAME_WITHOUT_OBSERVATIONS: ("frame's observations", "frames' observations"),
 }
-"""what one event of a kind drops, and several"""
+"""noun for what one event of a kind drops, and its plural"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

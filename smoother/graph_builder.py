@@ -33,7 +33,7 @@ class GraphBuilder:
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
         self.online = FrameStates.unknown(problem)
-        """as estimated online; filled by the solver, as is `landmark_position`"""
+        """states as estimated online; the solver fills them, and `landmark_position`"""
         self.landmark_position: dict[int, FloatArray] = {}
         """landmark -> position (3,), m, as estimated at its latest observation"""
         self.current_poses: Callable[[IntArray], FloatArray] | None = None

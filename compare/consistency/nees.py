@@ -1,7 +1,8 @@
 """Normalized estimation error squared (NEES) of poses (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4).
 
-The error is e = log(T^-1 T_true) (T, 6), the right perturbation [v, w] (m, rad) in the body frame of the estimated
-pose, to which the covariance belongs. No alignment precedes it: every estimate starts at the true first pose.
+The error of a pose X is e = log(X^-1 X_true), the right perturbation [v, w] (m, rad) in the body frame of the estimated
+pose, to which the covariance belongs. No alignment precedes it: estimate and truth agree on the first pose, or with raw
+inertial samples on its position and heading (see `state`).
 """
 
 import numpy as np
@@ -17,22 +18,22 @@ PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
 
 
 def body_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
-    """Error e = log(T^-1 T_other) (T, 6), [v, w] in m and rad, in the estimated body frame; NaN without a pose.
+    """Errors e = log(X^-1 X_other), shape (n_frames, 6), [v, w] in m and rad, in the estimated body frames.
 
-    `other` is the truth, or another estimate.
+    X is the pose of `estimate`, X_other that of the truth or of another estimate; NaN where either is missing.
     """
-    T, T_other = estimate.world_T_imu, other.world_T_imu
-    error = np.full((len(T), 6), np.nan)
-    k = np.flatnonzero(np.isfinite(T).all(axis=(1, 2)) & np.isfinite(T_other).all(axis=(1, 2)))
-    error[k] = se3.log(se3.inverse(T[k]) @ T_other[k])
+    X, X_other = estimate.world_T_imu, other.world_T_imu
+    error = np.full((len(X), 6), np.nan)
+    k = np.flatnonzero(np.isfinite(X).all(axis=(1, 2)) & np.isfinite(X_other).all(axis=(1, 2)))
+    error[k] = se3.log(se3.inverse(X[k]) @ X_other[k])
     return error
 
 
 def nees(estimate: Estimate, truth: Truth) -> FloatArray:
-    """Normalized estimation error squared e^T P^-1 e (T,) of each pose, e = log(T^-1 T_true) in the body frame, [v, w].
+    """NEES e^T P^-1 e, shape (n_frames,), with the pose error e = log(X^-1 X_true) of `body_error`.
 
     Its mean is 6 for a consistent estimator. NaN without truth, pose or positive definite covariance (the first pose
-    is held). Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+    is fixed). Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
     """
     return nees_table(estimate, truth)["pose"].to_numpy()
 

@@ -1,10 +1,10 @@
 """Errors and consistency of the states that raw inertial data determine: pose, velocity and biases.
 
 Errors are those of `geometry.strapdown`: [translation, rotation, velocity, gyroscope bias, accelerometer bias]. That of
-the pose is e = log(T^-1 T_true) in the estimated body frame. The others are the true less the estimated value, with
+a pose X is e = log(X^-1 X_true) in the estimated body frame. The others are the true less the estimated value, with
 velocities in world axes. The NEES has the velocity of the extended pose instead (Brossard et al., IEEE T-RO 2022):
 R J(theta)^-1 R^T (v_true - v), with J the left Jacobian of the rotation error theta. Both are equal to first order, so
-that the covariance is the same. Position and velocity then turn alike with theta. Samples relate them to 0.02 mm a
+that the covariance is the same. Position and velocity then rotate alike with theta. Samples relate them to 0.02 mm a
 frame, which theta times the velocity error exceeds: 1 mm at 2 degrees and 0.3 m/s.
 
 No alignment precedes the NEES: position and heading of frame 0 define the world of both. Where the truth begins later,
@@ -45,9 +45,9 @@ def _extended_pose_error(estimate: Estimate, other: Truth | Estimate) -> FloatAr
     """Error (T, 15) as in `state_error`, with the velocity error of the extended pose, in world axes."""
     error = state_error(estimate, other)
     k = np.flatnonzero(np.isfinite(error[:, :9]).all(axis=1))
-    T, T_other = _with_velocity(estimate, k), _with_velocity(other, k)
-    moved = se3.log(se3.inverse(T) @ T_other)[:, :3]
-    error[k, strapdown.VELOCITY] = (T[:, :3, :3] @ moved[:, :, None])[..., 0]
+    X, X_other = _with_velocity(estimate, k), _with_velocity(other, k)
+    in_body = se3.log(se3.inverse(X) @ X_other)[:, :3]
+    error[k, strapdown.VELOCITY] = (X[:, :3, :3] @ in_body[:, :, None])[..., 0]
     return error
 
 

@@ -5,9 +5,10 @@ import numpy as np
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3, strapdown
+from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 
 from .inertial_cost import inertial_squares, start_square
-from .reprojection import ROWS, reprojection
+from .reprojection import reprojection
 
 
 def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
@@ -21,7 +22,7 @@ def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
     table = table[taken[table["observation"].to_numpy()]]
     if len(table) < taken.sum():
         return float("nan")
-    squared = problem.measurement.loss(pixel_squares(problem, table[list(ROWS)].to_numpy()))
+    squared = problem.measurement.loss(pixel_squares(problem, table[list(PIXEL_COMPONENTS)].to_numpy()))
     start = 0.0 if problem.start is None else start_square(problem, problem.start, estimate)
     return 0.5 * float(
         squared.sum() + motion_squares(problem, estimate).sum() + start + prior_squares(problem, estimate, taken)

@@ -24,7 +24,7 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from .reprojection import NEAR
 
 GATE = 6.0
-"""times the median of the smallest errors"""
+"""factor on the median of the smallest errors"""
 GATE_RANGE = (3.0, 12.0)
 """px; bounds of the gate"""
 BLOCK = 5.0
@@ -110,7 +110,7 @@ def cross_prediction_errors(
         points = triangulate_tracks(measurement, world_T_cam[seen], piece[seen], pixel[seen], n)
         p_cam = se3.transform(se3.inverse(world_T_cam[~seen]), points.position[piece[~seen]])
         with np.errstate(divide="ignore", invalid="ignore"):
-            norm = measurement.pixel_distance(pixel[~seen] - sequence.camera.project(p_cam))
+            norm = measurement.reprojection_error(pixel[~seen] - sequence.camera.project(p_cam))
         error[~seen] = np.where((p_cam[:, 2] > 0.0) & np.isfinite(norm), norm, np.inf)
     return error
 

@@ -6,9 +6,10 @@ from scipy.special import gammainc, gammaincc
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 
 from .cost import motion_degrees, motion_squares, pixel_squares, prior_squares
-from .reprojection import ROWS, reprojection
+from .reprojection import reprojection
 
 RANGE = (1e-9, 1e9)
 """interval of the search for a scale"""
@@ -26,7 +27,7 @@ def pixel_scale(problem: Problem, estimate: Estimate) -> float:
     """
     table = reprojection(problem.sequence, estimate)
     table = table[table["used"]]
-    squared = pixel_squares(problem, table[list(ROWS)].to_numpy())
+    squared = pixel_squares(problem, table[list(PIXEL_COMPONENTS)].to_numpy())
     threshold = None if problem.kernel is None else problem.kernel.threshold
     observed = float(np.sum(problem.measurement.weighted(squared)))
     if not np.isfinite(observed):

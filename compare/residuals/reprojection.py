@@ -8,10 +8,10 @@ import pandas as pd
 from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 
 from ..statistics.descriptive import quantile, summarized, without_nan
 
-ROWS = ("uL", "vL", "uR", "vR")
 NEAR = 3.0
 """px; error below which an observation counts in `under_3px`"""
 MAD_TO_SIGMA = 1.4826
@@ -47,7 +47,7 @@ def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
             "observation": chosen,
             "frame": o.frame[chosen],
             "landmark": o.landmark[chosen],
-            **{row: residual[:, i] for i, row in enumerate(ROWS)},
+            **{row: residual[:, i] for i, row in enumerate(PIXEL_COMPONENTS)},
             "error": np.linalg.norm(measured, axis=1),
             "depth": p_cam[:, 2],
             "used": estimate.used[chosen],
@@ -74,7 +74,7 @@ def component_summary(table: pd.DataFrame) -> dict[str, dict[str, float]]:
 
     The spread of Gaussian residuals is their standard deviation. A few residuals of thousands of pixels change neither.
     """
-    return {row: _robust(without_nan(table[row])) for row in ROWS}
+    return {row: _robust(without_nan(table[row])) for row in PIXEL_COMPONENTS}
 
 
 def _robust(residual: FloatArray) -> dict[str, float]:

@@ -5,7 +5,7 @@ import pandas as pd
 
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import MONOCULAR_ROWS, ROWS
+from fgbaseline.geometry.measurement import MONOCULAR_ROWS, STEREO_ROWS
 
 from ..statistics.chi_square import p_value
 
@@ -50,8 +50,8 @@ def whitened_summary(problem: Problem, table: pd.DataFrame) -> dict[str, float |
     tracks = track_chi_square(problem, rows)
     degrees = float(tracks["degrees"].sum())
     white = whitened_rows(problem, rows)
-    names = MONOCULAR_ROWS if problem.measurement.monocular else ROWS
-    spread = {f"spread_{name}": float("nan") for name in ROWS}
+    names = MONOCULAR_ROWS if problem.measurement.monocular else STEREO_ROWS
+    spread = {f"spread_{name}": float("nan") for name in STEREO_ROWS}
     if len(white):
         spread |= {f"spread_{name}": float(np.sqrt(np.mean(white[:, i] ** 2))) for i, name in enumerate(names)}
     return {

@@ -15,7 +15,7 @@ from .association import interpolated
 STEPS = 400
 MOST_POSES = 2000
 AS_GOOD = 1.05
-"""times the smallest RMSE: offsets up to it are equally good"""
+"""factor on the smallest RMSE up to which offsets are equally good"""
 
 
 @dataclass(frozen=True, slots=True)

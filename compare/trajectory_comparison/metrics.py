@@ -1,4 +1,4 @@
-"""All metrics of a comparison: association, alignment, errors, drift, consistency, reprojection and ranking."""
+"""Computes the metrics of a comparison: association, alignment, errors, drift, consistency, reprojection, ranking."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -39,7 +39,7 @@ FEWEST = 2
 
 
 def compare_entries(entries: Entries, settings: Settings) -> Comparison:
-    """Values of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
+    """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
     up, up_from = _up(entries, settings)
     everything = [entries.reference, *entries.estimates]
     settings = replace(

@@ -1,4 +1,4 @@
-"""Columns of a trajectory file, identified by the names in its header or by their count."""
+"""Columns of a text trajectory (TUM, EuRoC, KITTI, CSV), identified by the names in its header or by their count."""
 
 import re
 from collections.abc import Sequence
@@ -69,8 +69,8 @@ class Columns:
         return self.time if self.time is not None else self.number
 
     @property
-    def read(self) -> list[int]:
-        """The columns whose numbers are read, in order: stamp, matrix, position, quaternion, covariance."""
+    def indices(self) -> list[int]:
+        """Indices of the columns to parse, in order: stamp, matrix, position, quaternion, covariance."""
         pose = [*self.matrix, *self.position, *self.quaternion, *self.covariance]
         return pose if self.stamp is None else [self.stamp, *pose]
 
@@ -151,7 +151,7 @@ def counted_columns(lines: Lines, *, whole: bool) -> Columns:
     if width == 9 and [lines.words(i)[0] for i in range(min(3, len(lines.text)))] in (["0", "1", "2"], ["1", "2", "3"]):
         return _behind_an_index(pose)
     raise InputError(
-        f"line {lines.number[0]}: it has {plural(width, 'word')}, but without a header that names them a line has 8 "
+        f"line {lines.number[0]}: it has {plural(width, 'field')}, but without a header that names them a line has 8 "
         "numbers (TUM and EuRoC), 4 (positions), 12 or 13 (KITTI), 11 or 17 (with velocities behind), or 20 or 44 "
         "(with covariances)"
     )

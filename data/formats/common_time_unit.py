@@ -8,7 +8,7 @@ from ..time_unit import TimeUnit
 Spans = Mapping[TimeUnit, tuple[float, float]]
 """first and last stamp, s, by the unit that they would be in"""
 CLEARLY = 10.0
-"""times the next best: a unit is decided by so much more time in common"""
+"""factor by which the time in common by one unit exceeds that by the next best, so that the unit is decided"""
 
 
 def units_in_common(first: Spans, second: Spans) -> tuple[TimeUnit, TimeUnit] | None:

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 
 from ..finding import Finding
 from ..observations import IntArray, Observations
 from .array_stream import ArrayStream
-from .one_camera import ROWS, require_one_kind
+from .one_camera import require_one_kind
 
 MOST_EQUAL = 0.01
 """share of the entries whose four rows may be equal by chance"""
@@ -152,8 +153,8 @@ def _require_finite(index: IntArray, values: FloatArray, layout: _Layout, first_
     entry, row = (int(i[0]) for i in np.nonzero(~finite))
     frame, landmark = layout.place(index[entry : entry + 1])
     raise InputError(
-        f"{layout.key}: {ROWS[first_row + row]} of landmark {landmark[0]} in frame {frame[0]} is {values[entry, row]}; "
-        "write -1 in all four rows where a landmark was not observed"
+        f"{layout.key}: {PIXEL_COMPONENTS[first_row + row]} of landmark {landmark[0]} in frame {frame[0]} is "
+        f"{values[entry, row]}; write -1 in all four rows where a landmark was not observed"
     )
 
 

@@ -24,7 +24,7 @@ from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]
 FASTER = 3.0
-"""times the recording's: lines that are so much farther apart are not one for each frame"""
+"""factor on the recording's interval: lines that are farther apart are not one for each frame"""
 
 
 def attach_truth(sequence: Sequence, path: FilePath | Trajectory, frame: BodyFrame | None) -> Sequence:

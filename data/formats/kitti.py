@@ -14,7 +14,7 @@ from .stamps import no_unit, possible_units, stamps_of
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
-"""how far from a rotation the nine numbers may be: files with four digits are within it"""
+"""largest error of orthogonality of the nine numbers: files with four digits are within it"""
 EXACT = 1e-14
 """up to which they are left as they are"""
 

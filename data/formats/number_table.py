@@ -1,6 +1,6 @@
-"""Text files of numbers, the same count on each line: decoded, split into lines, each fault with its line.
+"""Reads text files of numbers with equally many fields on each line; each fault is reported with its line.
 
-In plain Python, so that a fault is reported before numpy is imported; `NumberTable` has arrays.
+This module is plain Python, so that a fault is reported before numpy is imported; `NumberTable` has arrays.
 """
 
 import re
@@ -31,13 +31,13 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 WINDOWS_NAN = re.compile(r"nan\([a-z]*\)", re.IGNORECASE)
 MISSING = ("", "none", "null", "na", "n/a")
-"""words that pandas, Python, JSON and R write for NaN, in lower case"""
+"""fields that pandas, Python, JSON and R write for NaN, in lower case"""
 DATE = re.compile(r"\d{4}-\d{1,2}-\d{1,2}([T ].*)?")
 
 
 @dataclass(frozen=True, slots=True)
 class NumberTable:
-    """n lines of m numbers, and where in the file each of them stands."""
+    """n lines of m numbers, with their line numbers in the file."""
 
     numbers: "array[float]"
     """n times m, line by line"""
@@ -61,17 +61,17 @@ class NumberTable:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The lines of a text file that hold data, without comments, and what stands above them."""
+    """Lines of data in a text file, with the header and comments above them."""
 
     number: Sequence[int]
-    """where in the file each stands, from 1"""
+    """line number of each in the file, from 1"""
     text: Sequence[str]
     separator: str | None
     """a comma, a semicolon, or None for blanks and tabs"""
     title: str | None
-    """the first line, where no word of it is a number"""
+    """first line, if none of its fields is a number"""
     comments: tuple[str, ...]
-    """the comments above the first line of data, without their marks"""
+    """comments above the first line of data, without comment characters"""
     title_line: int = 1
 
     def require_some(self, what: str = "numbers") -> None:
@@ -83,20 +83,20 @@ class Lines:
 
     @property
     def width(self) -> int:
-        """Number of words on the first line of data."""
+        """Number of fields on the first line of data."""
         return len(self.words(0))
 
     def words(self, i: int) -> list[str]:
-        """The words of line i of the data."""
+        """Fields of line i of the data."""
         return split(self.text[i], self.separator)
 
     def column(self, k: int) -> list[str]:
-        """The k-th word of each line, without blanks or quotes; all lines must be as wide as the first."""
+        """Field k of each line, without blanks or quotes; all lines must have as many fields as the first."""
         return [line.split(self.separator, k + 1)[k].strip(' \t"') for line in self.text]
 
 
 def read_lines(file: Path) -> Lines:
-    """The lines of a text file (UTF-8 or UTF-16, also packed by gzip), without blank lines and comments.
+    """Lines of a text file (UTF-8 or UTF-16, also packed by gzip), without blank lines and comments.
 
     Raises InputError naming the line for what is no text or has decimal commas; OSError as `open` does.
     """
@@ -121,7 +121,7 @@ def read_lines(file: Path) -> Lines:
 
 
 def _without_comment(line: str) -> tuple[str, str]:
-    """The data of a line, and its comment."""
+    """Data of a line, and its comment."""
     bare, _, comment = line.partition("#")
     content = bare.strip()
     return ("", content) if content.startswith("%") else (content, comment)
@@ -139,12 +139,12 @@ def _lines_of_data(every: Sequence[str], first: int) -> tuple[Sequence[int], lis
 
 
 def split(text: str, separator: str | None) -> list[str]:
-    """The words of a line, without blanks or quotes around them."""
+    """Fields of a line, without blanks or quotes around them."""
     return [word.strip(' \t"') for word in text.split(separator)]
 
 
 def _without_last_separator(texts: list[str], separator: str) -> list[str]:
-    """Lines without the separator behind their last word; where the last word is empty, its separator stays."""
+    """Lines without a separator at the end; one before an empty last field stays."""
     widths = [_count(text, separator) for text in texts if not text.endswith(separator)]
     width = max(widths, default=0)
     return [
@@ -154,10 +154,10 @@ def _without_last_separator(texts: list[str], separator: str) -> list[str]:
 
 
 def numbers_of(lines: Lines, columns: Sequence[int] | None = None, *, nan: bool = False) -> NumberTable:
-    """The numbers of all columns, or of some of them.
+    """Numbers of all columns, or of some of them.
 
-    Raises InputError naming the line where it is not as wide as the first, or a word is no finite number. `nan` allows
-    NaN, also as an empty word or one of MISSING.
+    Raises InputError naming a line that has not as many fields as the first, or a field that is no finite number. `nan`
+    allows NaN, also as an empty field or one of MISSING.
     """
     lines.require_some()
     width = lines.width
@@ -209,7 +209,7 @@ def require_width(lines: Lines, counts: dict[int, str]) -> None:
 
 
 def is_number(word: str) -> bool:
-    """Whether a word is a number as every language writes it; NaN and infinity are numbers too."""
+    """Whether a field is a number as every language writes it; NaN and infinity are numbers too."""
     try:
         float(word)
     except ValueError:
@@ -298,7 +298,7 @@ def _require_numbers(lines: Lines, columns: Sequence[int], *, nan: bool) -> None
 
 
 def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
-    """The error of `_require_numbers`, or of a file in which each word is a number and the whole is no table."""
+    """The error of `_require_numbers`, or of a file of which each field is a number and the whole is no table."""
     try:
         _require_numbers(lines, columns, nan=nan)
     except InputError as error:

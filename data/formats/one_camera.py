@@ -3,10 +3,10 @@
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 
 from ..observations import IntArray, Observations
 
-ROWS = ("uL", "vL", "uR", "vR")
 IGNORED_BASELINE = "b is ignored: all observations are of one camera."
 
 
@@ -24,8 +24,8 @@ def require_one_kind(key: str, frame: IntArray, landmark: IntArray, pixel: Float
         i = int(np.argmax(broken))
         row = int(np.argmax(~finite[i]))
         raise InputError(
-            f"{key}: {ROWS[row]} of landmark {landmark[i]} in frame {frame[i]} is {pixel[i, row]}; leave out what was "
-            "not observed (-1 in all four rows of a block), and for one camera write NaN in both uR and vR"
+            f"{key}: {PIXEL_COMPONENTS[row]} of landmark {landmark[i]} in frame {frame[i]} is {pixel[i, row]}; leave "
+            "out what was not observed (-1 in all four rows of a block), and for one camera write NaN in both uR and vR"
         )
     if not alone.all():
         one, two = int(np.argmax(alone)), int(np.argmin(alone))

@@ -1,4 +1,7 @@
-"""Parsed trajectory file: poses, and the unit, quaternion order and times that the file leaves open."""
+"""Parsed trajectory file (TUM, EuRoC, KITTI, CSV, npz, bag topic): poses, and what the file leaves open.
+
+Left open are the unit of the stamps, the order of the quaternion components, and the stamps of KITTI files.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +20,7 @@ from .quaternion_order import xyzw
 from .stamps import Stamps, no_unit
 
 STRAIGHT = 1e-3
-"""share of a path's extent: one that leaves a straight line by less does not bend"""
+"""share of the extent of a path: a path whose deviation from a straight line is smaller does not bend"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,25 +35,25 @@ class ParsedTrajectory:
     rotation: FloatArray | None
     """(n, 3, 3) `world_R_body`, quaternions read in the first of `orders`; None where there are positions only"""
     line: IntArray | None = None
-    """(n,) the line that each pose stands on"""
+    """(n,) line of the file that each pose is from"""
     quaternion: FloatArray | None = None
-    """(n, 4) the four numbers as they stand in the file"""
+    """(n, 4) quaternion components in the order of the file"""
     orders: tuple[Order, ...] = ("xyzw",)
-    """the orders that they may have, the usual one first; one where the file states it"""
+    """possible orders of the quaternion components, the usual one first; one if the file states it"""
     stamps: Stamps | None = None
-    """None where the file has none"""
+    """time stamps of the poses; None for a file without"""
     units: tuple[TimeUnit, ...] = (TimeUnit.S,)
-    """that the stamps may have, the likeliest first; none where no unit makes their rate a recorder's"""
+    """possible units of the stamps, the likeliest first; empty if their rate is no recorder's in any unit"""
     unit_known: bool = True
     """whether header or size of the stamps show their unit"""
     frame: IntArray | None = None
-    """(n,) the number of each pose's frame, where there are no stamps but numbers"""
+    """(n,) frame number of each pose, for a file with such numbers in place of stamps"""
     covariance_numbers: FloatArray | None = None
     """(n, 12), (n, 36) as written in text, or (n, 6, 6) of the right perturbation"""
     up: FloatArray | None = None
-    """(3,) what points up in its world, where the format defines it"""
+    """(3,) unit vector that points up in the world of the poses, if the format defines it"""
     landmarks: Landmarks | None = None
-    """in its world, where the source has them"""
+    """landmarks in the world of the poses, if the source has them"""
     remarks: tuple[str, ...] = ()
     """remarks on the detection: each completes a sentence that begins with the file name"""
 
@@ -62,10 +65,10 @@ class ParsedTrajectory:
         *,
         oriented: bool = True,
     ) -> Trajectory:
-        """The trajectory by a unit of the stamps and an order of the quaternions, by default the likeliest.
+        """Trajectory for a unit of the stamps and an order of the quaternion components, by default the likeliest.
 
-        Poses without stamps take those of `times` that have one for each frame; without such, t is the number of the
-        frame. `oriented` False leaves the orientations out. Raises InputError where no times fit.
+        Poses without stamps take the first of `times` that has a stamp for each of them; without `times`, t is the
+        frame number. `oriented` False leaves the orientations out. Raises InputError where no times fit.
         """
         t, stamped = self._seconds(unit or (self.units[0] if self.units else TimeUnit.S), times)
         rotation = self.rotation_in(order or self.orders[0]) if oriented else None
@@ -76,13 +79,13 @@ class ParsedTrajectory:
         return Trajectory(t, poses, self.name, self.source, self.line, stamped, oriented=rotation is not None)
 
     def rotation_in(self, order: Order) -> FloatArray | None:
-        """(n, 3, 3) the rotations with quaternions in this order."""
+        """Rotations (n, 3, 3) for quaternion components in this order."""
         if order == self.orders[0] or self.quaternion is None or self.rotation is None:
             return self.rotation
         return so3.rotation_from_quaternion(xyzw(self.quaternion, order))
 
     def covariance(self, order: Order | None = None) -> FloatArray | None:
-        """(n, 6, 6) of the right perturbation [v, w] of each pose, m and rad; None without covariances."""
+        """Covariances (n, 6, 6) of the right perturbation [v, w] of each pose, m and rad; None for a file without."""
         rotation = self.rotation_in(order or self.orders[0])
         if self.covariance_numbers is None or rotation is None:
             return None

@@ -9,7 +9,7 @@ from .columns import Order
 STEP = 20
 """poses between two whose rotation is compared"""
 CLEARLY = 3.0
-"""times: a convention is recognized where it fits so much better than the one assumed"""
+"""factor by which a convention must fit better than the assumed one to be recognized"""
 NOTICED = 0.5
 """deg; a misfit below it is no reason to look for another convention"""
 

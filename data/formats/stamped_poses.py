@@ -8,9 +8,9 @@ from ..observations import IntArray
 from .stamps import Stamps
 
 UNIT_TOLERANCE = 1e-3
-"""how far from 1 the length of a quaternion may be: files with four decimals are within it; it is made exact here"""
+"""largest deviation of a quaternion's length from 1: files with four decimals are within it; it is normalized here"""
 ROTATION_TOLERANCE = 1e-6
-"""how far from a rotation a matrix may be that is written"""
+"""largest error of orthogonality of a rotation matrix to be written"""
 
 
 def require_rising(stamps: Stamps, line: IntArray) -> None:

@@ -32,7 +32,7 @@ class Stamps:
     whole: tuple[int, ...] | None
     """exact values, where all of them are whole numbers"""
     unit: TimeUnit | None
-    """where the header has it"""
+    """unit of the stamps, if the header has it"""
     words: Sequence[str] = ()
     """(n,) as written"""
 

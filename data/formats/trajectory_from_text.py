@@ -1,4 +1,4 @@
-"""Parser of text trajectories; lines without a pose and repeated stamps are left out and counted."""
+"""Parses text trajectories (TUM, EuRoC, KITTI, CSV); drops and counts lines without a pose and repeated stamps."""
 
 from dataclasses import replace
 
@@ -19,17 +19,17 @@ from .trajectory_text import TrajectoryText
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
 STEPS = (0.01, 0.1, 1.0, 10.0, 100.0)
-"""m, of decimal digits"""
+"""m, steps of positions that are rounded to decimal digits"""
 MIN_STEPS = 1e4
-"""in the largest position, where digits are lost to it"""
+"""number of steps in the largest position from which on digits may have been lost to it"""
 COARSE = 2.0
-"""times what the positions move from line to line on average"""
+"""factor on the mean motion from line to line above which a step is coarse"""
 FORWARD = 0.9
-"""the cosine of the angle to the body's x axis: a body that travels so is no camera"""
+"""cosine of the angle between motion and x axis of the body above which the body is no camera"""
 
 
-def parsed(text: TrajectoryText) -> ParsedTrajectory:
-    """The trajectory in a text. Raises InputError, without the name of the file."""
+def parse_text(text: TrajectoryText) -> ParsedTrajectory:
+    """Trajectory of an opened text file. Raises InputError, without the name of the file."""
     lines, columns, values, numbers = text.lines, text.columns, text.table.values, text.table.line
     pose = values if columns.stamp is None else values[:, 1:]
     n_pose = len(columns.matrix) or len(columns.position) + len(columns.quaternion)
@@ -71,7 +71,7 @@ def parsed(text: TrajectoryText) -> ParsedTrajectory:
 
 
 def _rounding_remark(position: FloatArray) -> tuple[str, ...]:
-    """A remark on positions (n, 3) far from the origin that `%g` or a float32 rounded to steps in which they jump."""
+    """Remark on positions (n, 3), far from the origin, that were rounded (`%g`, float32) to steps above the motion."""
     for axis, x in zip("xyz", position.T, strict=True):
         largest = float(np.abs(x).max(initial=0.0))
         if largest < MIN_STEPS * STEPS[0] or float(np.ptp(x)) == 0.0:
@@ -88,7 +88,7 @@ def _rounding_remark(position: FloatArray) -> tuple[str, ...]:
 
 
 def _in_meters(pose: FloatArray, unit: float, columns: Columns) -> FloatArray:
-    """Positions and covariances (n, m) behind each other, their lengths in multiples of `unit` m, in m."""
+    """Positions and covariances (n, m), side by side, converted to m from lengths in multiples of `unit` m."""
     scale = np.ones(pose.shape[1])
     scale[:3] = unit
     if len(columns.covariance) == 12:
@@ -102,7 +102,7 @@ def _in_meters(pose: FloatArray, unit: float, columns: Columns) -> FloatArray:
 def _known(
     line: IntArray, stamp: FloatArray | None, pose: FloatArray, columns: Columns
 ) -> tuple[IntArray, Columns, list[str]]:
-    """Indices (m,) of the lines (n,) that have a pose, the columns that they have, and what there is to remark."""
+    """Indices (m,) of the lines (n,) that have a pose, the columns that these have, and remarks."""
     if columns.quaternion and np.isnan(pose[:, 3:7]).all() and np.isfinite(pose[:, :3]).any():
         remarks = ["its quaternions are NaN"]
         columns, pose = replace(columns, quaternion=(), covariance=()), pose[:, :3]
@@ -130,7 +130,7 @@ def _chosen(words: list[str], rows: IntArray) -> list[str]:
 def _with_stamps(
     file: ParsedTrajectory, lines: Lines, columns: Columns, kept: IntArray, value: FloatArray, pose: FloatArray
 ) -> tuple[ParsedTrajectory, IntArray]:
-    """The file with the stamps or frame numbers of the lines `kept`, and which of these (m,) are left."""
+    """File with stamps or frame numbers of the lines `kept`, and indices (m,) into `kept` without repeated stamps."""
     place = columns.time if columns.time is not None else columns.number
     assert place is not None
     words = _chosen(lines.column(place), kept)
@@ -170,7 +170,7 @@ def _covariance_remark(columns: Columns) -> tuple[str, ...]:
 
 
 def _up_of_camera(position: FloatArray, rotation: FloatArray) -> FloatArray | None:
-    """Up in the world of a camera; None where the body travels along its x axis, as no camera's frame does."""
+    """Up direction (3,) in the world of a camera; None for a body that moves along its x axis and is thus no camera."""
     steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
     length = np.linalg.norm(steps, axis=1)
     moving = np.asarray(length > 0.1 * np.max(length, initial=0.0))

@@ -1,4 +1,8 @@
-"""Reader of trajectories in all known formats, detected from the content and never from the file name."""
+"""Reads trajectories: TUM, EuRoC, KITTI and other CSV, npz, and topics of bags.
+
+The format is detected from the content, never from the file name: `trajectory_text` opens a file, `columns` recognizes
+its columns, and `trajectory_from_text` parses its lines.
+"""
 
 from dataclasses import replace
 
@@ -14,7 +18,7 @@ from .columns import Order
 from .named_file import FilePath, reading, regular_file
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
-from .trajectory_from_text import parsed
+from .trajectory_from_text import parse_text
 from .trajectory_npz import read_trajectory_npz
 from .trajectory_text import (
     OpenedTrajectory,
@@ -35,13 +39,13 @@ def read_trajectory(
     time_unit: TimeUnit | None = None,
     quaternion: Order | None = None,
 ) -> Trajectory:
-    """The trajectory in a TUM, KITTI, EuRoC or npz file, or another CSV, called `name` (the file's stem by default).
+    """Trajectory of a TUM, KITTI, EuRoC or npz file, or another CSV, called `name` (the file's stem by default).
 
-    The format is detected from the content; `form` insists on one. KITTI files have no time stamps: line k is taken at
-    `times[k]`, s (see `read_times`); without times it is frame k, and the trajectory is not `stamped`. A file of
-    another format has stamps of its own, and `times` is not looked at. `time_unit` and `quaternion` settle what the
-    file leaves open. Raises InputError naming file and line (or pose) for a wrong count, what is no number, stamps that
-    are not sorted or lost their digits, and poses that are no rigid motion.
+    The format is detected from the content; `form` requires one. KITTI files have no time stamps: line k is taken at
+    `times[k]`, s (see `read_times`); without times it is frame k, and the trajectory is not `stamped`. Files of other
+    formats have stamps, and `times` is ignored. `time_unit` and `quaternion` decide what the file leaves open. Raises
+    InputError naming file and line (or pose) for a wrong count, fields that are no numbers, stamps that are not sorted
+    or lost digits, and poses that are no rigid motion.
     """
     file = read_trajectory_file(path, form, name)
     return file.trajectory(
@@ -50,15 +54,15 @@ def read_trajectory(
 
 
 def read_pose_covariances(path: FilePath) -> FloatArray | None:
-    """The covariances (n, 6, 6) of the poses of a trajectory file; None for files that have none.
+    """Covariances (n, 6, 6) of the poses of a trajectory file; None for files without covariances.
 
-    They are those of the right perturbation [v, w], m and rad, one for each pose that `read_trajectory` gives.
+    They are those of the right perturbation [v, w], m and rad, one for each pose that `read_trajectory` returns.
     """
     return read_trajectory_file(path).covariance()
 
 
 def read_tum(path: FilePath) -> tuple[FloatArray, FloatArray]:
-    """Time stamps (n,), s as they stand, strictly rising, and poses (n, 4, 4) `world_T_body` of a TUM file.
+    """Time stamps (n,), s, unchanged and strictly rising, and poses (n, 4, 4) `world_T_body` of a TUM file.
 
     Raises as `read_trajectory`.
     """
@@ -81,7 +85,7 @@ def read_kitti(path: FilePath) -> FloatArray:
 
 
 def read_extrinsic(path: FilePath) -> FloatArray:
-    """The pose (4, 4) of the left camera on the IMU, in one line of 12 numbers. Raises InputError."""
+    """Pose (4, 4) of the left camera in the IMU frame, from one line of 12 numbers. Raises InputError."""
     with reading(path):
         text = regular_file(path).read_text("utf-8-sig", errors="replace")
         lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
@@ -101,14 +105,14 @@ def read_trajectory_file(
 
 
 def parsed_file(opened: OpenedTrajectory) -> ParsedTrajectory:
-    """The trajectory in an opened file or topic of a bag. Raises as `read_trajectory`."""
+    """Parsed trajectory of an opened file or topic of a bag. Raises as `read_trajectory`."""
     if isinstance(opened, TrajectoryTopic):
         return read_bag_trajectory(opened.bag, opened.topic, opened.name)
     with reading(opened.source), np.errstate(all="ignore"):
         if not isinstance(opened, TrajectoryText):
             return _of_npz(opened)
-        read, lines = parsed(opened), opened.lines
-        if opened.named or len(read.orders) == 1 or (lines.separator is None and lines.width in (8, 9, 20, 44)):
+        read, lines = parse_text(opened), opened.lines
+        if opened.has_header or len(read.orders) == 1 or (lines.separator is None and lines.width in (8, 9, 20, 44)):
             return read
         order = " ".join(read.orders[0])
         return replace(read, remarks=(*read.remarks, f"no header names the order of its quaternions; {order} is usual"))

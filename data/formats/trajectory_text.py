@@ -1,7 +1,7 @@
-"""Trajectory files opened: format and columns recognized, each word a number, nothing checked as a path yet.
+"""Opens trajectory files: detects format (TUM, EuRoC, KITTI, CSV, npz) and columns, and parses the fields as numbers.
 
-In plain Python, so that a missing or broken file is reported before numpy is imported. Files are opened all before the
-first of them is parsed (`trajectory_reader`).
+Stamps and poses are checked later (`trajectory_from_text`). This module is plain Python, so that a missing or broken
+file is reported before numpy is imported. A comparison opens all of its files before it parses the first.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrajectoryText:
-    """A text file of poses."""
+    """Opened text file of poses (TUM, EuRoC, KITTI or another CSV)."""
 
     name: str
     source: str
@@ -30,8 +30,8 @@ class TrajectoryText:
     lines: Lines
     columns: Columns
     table: NumberTable
-    """numbers of `columns.read`"""
-    named: bool
+    """numbers (n, c) in the columns `columns.indices`"""
+    has_header: bool
     """whether a header names the columns"""
 
 
@@ -57,10 +57,10 @@ OpenedTrajectory = TrajectoryText | TrajectoryArchive | TrajectoryTopic
 
 
 def open_trajectory(path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None) -> OpenedTrajectory:
-    """Opens a trajectory file or a topic of a bag, called `name` (its stem by default); `form` insists on a format.
+    """Opens a trajectory file, called `name` (its stem by default), or a topic of a bag (without a default name).
 
-    Raises InputError naming file and line for a missing file, what is no text, columns of no known format, and a word
-    that is no number.
+    `form` requires that format; it is ignored for a topic of a bag. Raises InputError naming file and line for a
+    missing file, a file that is no text, columns of no known format, and a field that is no number.
     """
     if form is not None and form not in get_args(TrajectoryFormat):
         raise InputError(f"format: there is no '{form}'; known are {', '.join(get_args(TrajectoryFormat))}")
@@ -76,26 +76,26 @@ def open_trajectory(path: FilePath, form: TrajectoryFormat | None = None, name: 
         lines = read_lines(file)
         lines.require_some("poses")
         columns = named_columns(lines) if form != "kitti" else None
-        named = columns is not None
+        has_header = columns is not None
         if columns is None:
             columns = counted_columns(lines, whole=form == "euroc" or _is_whole(lines))
         _require_form(form, lines, columns)
         if form == "euroc":
             columns = replace(columns, unit=columns.unit or "ns")
-        table = numbers_of(lines, columns.read, nan=True)
-        if columns.nanoseconds is not None:
+        table = numbers_of(lines, columns.indices, nan=True)
+        if columns.nanoseconds is not None:  # only reports a bad field: the exact stamps are taken from the text
             numbers_of(lines, [columns.nanoseconds])
-        return TrajectoryText(name, shown(path), lines, columns, table, named)
+        return TrajectoryText(name, shown(path), lines, columns, table, has_header)
 
 
 def _is_whole(lines: Lines) -> bool:
-    """Whether every stamp in the first column is a whole number, with or without zeros behind its point."""
+    """Whether every stamp in the first column is an integer, possibly written with a zero fraction (`12.000`)."""
     parts = (line.split(lines.separator, 1)[0].strip(' \t"').partition(".") for line in lines.text)
     return all(before.isdecimal() and not behind.strip("0") for before, _, behind in parts)
 
 
 def _require_form(form: TrajectoryFormat | None, lines: Lines, columns: Columns) -> None:
-    """Raises InputError where the columns are not those of the format that is insisted on."""
+    """Raises InputError where the columns are not those of the required format."""
     comma = lines.separator is not None
     wrong = {
         "tum": comma or bool(columns.matrix) or columns.time != 0,
@@ -103,9 +103,9 @@ def _require_form(form: TrajectoryFormat | None, lines: Lines, columns: Columns)
         "kitti": not columns.matrix,
     }
     expected = {
-        "tum": "8 numbers (TUM) between blanks",
-        "euroc": "8 or 17 numbers (EuRoC) between commas",
-        "kitti": "12 numbers (KITTI)",
+        "tum": "a TUM line (t tx ty tz qx qy qz qw, separated by spaces)",
+        "euroc": "a line of a EuRoC CSV (8 or 17 fields, separated by commas)",
+        "kitti": "a KITTI line (12 numbers)",
     }
     if form is not None and wrong.get(form):
         raise InputError(f"line {lines.number[0]}: expected {expected[form]}, got {lines.text[0][:60]!r}")

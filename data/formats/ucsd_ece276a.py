@@ -35,9 +35,9 @@ from .one_camera import IGNORED_BASELINE, is_of_one_camera
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS, FRAME})
 VELOCITY_KEYS = frozenset({"linear_velocity", "angular_velocity", "rotational_velocity"})
 EXACT = 1e-9
-"""how far from 0 or 1 the entries may be that have to be 0 or 1"""
+"""largest deviation of entries that have to be 0 or 1"""
 WORLD_TOLERANCE = 1e-6
-"""how far from the identity the true pose of frame 0 may be and still count as the world's origin"""
+"""largest deviation from the identity of a true pose of frame 0 that counts as the origin of the world"""
 
 _ODD_EXTRINSIC = (
     "cam_T_imu is read as the 2020 course wrote it: its rotation takes IMU to camera, its translation is the "

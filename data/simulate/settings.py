@@ -81,7 +81,7 @@ class Simulation:
 
     path: PathName = "town"
     along: Sequence | Velocities | None = None
-    """whose velocities to follow, for the path `along`; taken as true, each held until the next frame"""
+    """recording or velocities to follow on the path `along`: taken as true, each constant until the next frame"""
     along_gyro_bias: Vector = (0.0, 0.0, 0.0)
     """rad/s, taken off the angular velocities of `along` first: a recorded bias would roll the street over"""
     duration: float | None = None
@@ -90,7 +90,7 @@ class Simulation:
     """frames a second; 10, or the stamps of `along`"""
     seed: int = 0
     world: WorldName | None = None
-    """what there is to see; a room for `handheld`, `drone` and what moves at less than 1.5 m/s, otherwise a street"""
+    """surroundings; by default a room for `handheld`, `drone` and speeds below 1.5 m/s, otherwise a street"""
     rig: Rig | None = None
     """camera and extrinsic; by default that of `along`, a small rig for `handheld` and `drone`, else KITTI's car"""
 
@@ -112,8 +112,8 @@ class Simulation:
     time_offset: float = 0.0
     """s: the velocity stamped t is that of the motion at t + time_offset"""
     velocity_of_interval: Interval = "after"
-    """what sample k says: `after` moves frame k to k + 1 exactly; `before` moved k - 1 to k exactly; `mean` is the
-    velocity at the instant of frame k, so that the mean of neighbors moves k to k + 1 to second order in dt"""
+    """interval of velocity sample k: `after` moves frame k to k + 1 exactly; `before` moved k - 1 to k exactly; `mean`
+    is the velocity at the instant of frame k, so that the mean of neighbors moves k to k + 1 to second order in dt"""
     linear_axes: str = IDENTITY
     """axis convention of the recorded linear velocity, such as `x,-y,-z`: see `axes_matrix`"""
     angular_axes: str = IDENTITY

@@ -205,7 +205,7 @@ def _no_motion(r: ImageRecording) -> str | None:
     """What a run lacks, and what to add; None where it has everything."""
     absent = f"{', '.join(r.absent)} missing: " if r.absent else ""
     if r.right is None and r.imu is None:
-        scale = "its images are of one camera, and only raw inertial samples determine their scale"
+        scale = "its images are of one camera, and only raw inertial samples determine the scale"
         return f"{absent}{scale}; add --imu CSV"
     if r.velocities is None and r.imu is None:
         return f"{absent}it has images and no motion; add --imu CSV or --velocities CSV"

@@ -24,7 +24,7 @@ MAX_BIAS = 1.0
 GAIN_RANGE, GAIN_DEVIATION = 0.35, 0.12
 """an axis is seen where its recorded component follows the cameras' with a gain this near to 1, known this well"""
 EXCITED = 2.0
-"""times what calibration errors of one deviation leak into a component, from which on it is a motion of its own"""
+"""factor on the leakage of 1-sigma calibration errors into a component, above which it is excited by itself"""
 
 Design = Callable[[FloatArray, BoolArray], FloatArray]
 """the regressors (n, 3, p) of calibration errors, of turned recorded velocities (n, 3) at chosen intervals"""

@@ -33,14 +33,14 @@ class ScaleRatio(NamedTuple):
     ratio: float
     """NaN without a sample"""
     known: bool
-    """whether both correlate, so that it is more than the ratio of two noises"""
+    """whether both velocities correlate, so that the ratio is not that of two noises"""
     correlation: float = 0.0
     samples: int = 0
-    """that are compared"""
+    """number of samples that are compared"""
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Between which the factor of the motion lies: the slopes of the two regressions of one on the other.
+        """Bounds of the factor of the motion: the slopes of the two regressions of one velocity on the other.
 
         The noise of its regressor attenuates each of them (Frisch 1934); SURE standard errors are added.
         """

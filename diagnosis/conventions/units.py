@@ -42,7 +42,7 @@ LEAD = 1.0
 MIN_KNOWN = 20
 """intervals whose motion the cameras show"""
 OVERSHOOT, LARGE_RATE = 20.0, 0.3
-"""times what the cameras see, and rad/s: rates beyond both are no noise of a gyroscope"""
+"""factor on the rates from the cameras, and rad/s: rates beyond both are no noise of a gyroscope"""
 NAMES = ("time", "angular", "linear", "baseline")
 LABELS = {
     "time": "stamps",

@@ -17,7 +17,7 @@ from ..conventions.time_delay import TimeDelay
 from ..conventions.units import Units
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
-from ..windows.residuals import OFFSET, TURN
+from ..windows.residuals import MISALIGNMENT, OFFSET
 from .velocity_outliers import VelocityOutliers
 
 
@@ -57,7 +57,7 @@ class Diagnosis(Displayed):
     @property
     def gyro_bias(self) -> FloatArray:
         """(3,) rad/s, gyroscope reading at rest, in recorded axes."""
-        return np.zeros(3) if self.fit is None else self.angular.matrix.T @ self.fit.shared[:3]
+        return np.zeros(3) if self.fit is None else self.angular.matrix.T @ self.fit.calibration[:3]
 
     @property
     def gyro_bias_deviation(self) -> FloatArray:
@@ -69,20 +69,22 @@ class Diagnosis(Displayed):
         """Ratio of the recorded linear velocity to that of the odometry, and its standard error."""
         if self.fit is None:
             return 1.0, np.inf
-        return 1.0 + float(self.fit.shared[3]), float(self.fit.deviation[3])
+        return 1.0 + float(self.fit.calibration[3]), float(self.fit.deviation[3])
 
     @property
     def misalignment(self) -> tuple[FloatArray, FloatArray]:
         """(3,) rad, rotation vector of the error of imu_T_cam, in its own axes, and standard errors (3,)."""
         if self.fit is None:
             return np.zeros(3), np.full(3, np.inf)
-        return self.fit.shared[TURN], self.fit.deviation[TURN]
+        return self.fit.calibration[MISALIGNMENT], self.fit.deviation[MISALIGNMENT]
 
     @property
     def disparity_offset(self) -> tuple[float, float]:
         """Amount in px by which every recorded disparity is too small, and its standard error."""
         return (
-            (0.0, np.inf) if self.fit is None else (float(self.fit.shared[OFFSET]), float(self.fit.deviation[OFFSET]))
+            (0.0, np.inf)
+            if self.fit is None
+            else (float(self.fit.calibration[OFFSET]), float(self.fit.deviation[OFFSET]))
         )
 
     @property

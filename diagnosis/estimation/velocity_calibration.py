@@ -20,7 +20,7 @@ from .velocity_outliers import VelocityOutliers, velocity_outliers
 MIN_INTERVALS = 20
 """with a motion from odometry"""
 SURE_SHIFT = 2.0
-"""standard errors from a usual shift, beyond which another one is used; `time_delay.INFLATION` is in them already"""
+"""standard errors from a usual shift, beyond which another one is used; STANDARD_ERROR_FACTOR is in them already"""
 SNAP = 0.15
 """intervals: a shift this near to a usual one (`Shift`) is taken for it"""
 

@@ -25,7 +25,7 @@ MOVING_LINKS = 5
 MIN_USABLE = 6
 """features of a frame, below which odometry has no motion"""
 GAP = 2.5
-"""times the median interval"""
+"""factor on the median interval above which an interval is a gap"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -43,7 +43,7 @@ def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
         n_landmarks=tracks.n_landmarks,
         truth=truth_of_landmarks(sequence.truth, tracks.n_landmarks),
     )
-    origin = "found in the recording" if found.fit is not None else "assumed, not estimated from the recording"
+    origin = "estimated from the recording" if found.fit is not None else "assumed, not estimated from the recording"
     remarks = (f"pixel noise {origin}: {found.pixel:.2f} px", *imu_remarks(sequence))
     problem = problem_of(repaired, tracks.excluded, features, found.pixel, HuberKernel(), found.start, path, remarks)
     return replace(

@@ -13,7 +13,7 @@ MIN_BIAS, MIN_ANGLE, MIN_OFFSET, MIN_SCALE = 0.005, np.deg2rad(0.5), 0.003, 0.02
 MIN_ACCELEROMETER_BIAS, MIN_GRAVITY = 0.3, 0.15
 """m/s^2"""
 NOISIER = 2.0
-"""times the stated density"""
+"""factor on the stated noise density above which samples are noisier than stated"""
 
 
 def sensor_findings(checks: SensorChecks, densities: tuple[float, float] | None = None) -> tuple[Finding, ...]:

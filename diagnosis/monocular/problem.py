@@ -46,7 +46,7 @@ def monocular_problem(
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[o.counts(sequence.n_landmarks)[o.landmark] < SHORTEST] = Excluded.SHORT
     noise = found.pixel if pixel is None else pixel
-    origin = "found in the recording" if pixel is None and found.window is not None else "assumed"
+    origin = "estimated from the recording" if pixel is None and found.window is not None else "assumed"
     remarks = (
         f"pixel noise {origin}: {noise:.2f} px",
         *imu_remarks(sequence),

@@ -9,7 +9,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
-from ..windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_each_window
+from ..windows.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
 from ..windows.residuals import N_CALIBRATION
 from ..windows.selection import spread_spans, unbroken_spans, windows_of
 from .correlated_noise import Inflation, inflation_of
@@ -35,8 +35,8 @@ class CalibrationFit:
 
     sigmas: NoiseSettings
     """noise for a filter, correlated errors included"""
-    shared: FloatArray
-    """(8,) see `residuals.N_CALIBRATION`"""
+    calibration: FloatArray
+    """(8,) calibration parameters: see `residuals.N_CALIBRATION`"""
     deviation: FloatArray
     """(8,) standard errors, from the spread between windows where that is larger than the formal ones
 
@@ -70,16 +70,16 @@ def fit_windows(
         return None
     baseline = sequence.stereo_camera.baseline
     sigmas = replace(START, linear_velocity=START.linear_velocity * baseline)
-    shared = [np.zeros(N_CALIBRATION)] * len(windows)
+    estimates = [np.zeros(N_CALIBRATION)] * len(windows)
     fits: list[WindowFit] = []
     for _ in range(ROUNDS):
-        fits = fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, shared, 1, processes)
+        fits = fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, sigmas, estimates, 1, processes)
         windows = [(data, fit.poses, fit.points) for (data, _, _), fit in zip(windows, fits, strict=True)]
-        shared = [fit.shared for fit in fits]
+        estimates = [fit.calibration for fit in fits]
         sigmas = _components(fits, sigmas, baseline)
-    shared_mean, error = _agreed(fits)
+    mean, error = _agreed(fits)
     unbroken = windows_of(sequence, odometry, twist, unbroken_spans(odometry), deviation)
-    inflation = inflation_of(sequence, unbroken, shared_mean, sigmas, processes)
+    inflation = inflation_of(sequence, unbroken, mean, sigmas, processes)
     believed = NoiseSettings(
         sigmas.pixel * inflation.pixel,
         sigmas.linear_velocity * inflation.velocity,
@@ -89,7 +89,7 @@ def fit_windows(
     if sigmas.angular_velocity > FLOOR.angular_velocity:
         error = error * _widening(np.where(np.isnan(residual), 0.0, redundancy))
     motion = residual / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3) / np.sqrt(redundancy)
-    return CalibrationFit(believed, shared_mean, error, len(fits), inflation, sigmas, motion)
+    return CalibrationFit(believed, mean, error, len(fits), inflation, sigmas, motion)
 
 
 def _widening(redundancy: FloatArray) -> float:
@@ -138,13 +138,13 @@ def _redundant_residuals(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]
 
 
 def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
-    """The information-weighted mean (8,) of the shared parameters, windows far off left out, and its deviation."""
-    information = np.array([fit.shared_information for fit in fits])
-    values = np.array([fit.shared for fit in fits])
+    """The information-weighted mean (8,) of the calibration parameters, windows far off left out, and its deviation."""
+    information = np.array([fit.calibration_information for fit in fits])
+    values = np.array([fit.calibration for fit in fits])
     center = np.median(values, axis=0)
     spread = 1.4826 * np.median(np.abs(values - center), axis=0) + 1e-9
     keep = (np.abs(values - center) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
-    total = information[keep].sum(axis=0) + SHARED_PRIOR
+    total = information[keep].sum(axis=0) + CALIBRATION_PRIOR
     mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))
     claimed = np.sqrt(np.diag(np.linalg.inv(total)))
     # The same mean's variance from how the windows differ: (sum I)^-1 sum I d d^T I (sum I)^-1

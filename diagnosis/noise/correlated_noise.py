@@ -15,10 +15,10 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..windows.bundle_adjustment import fit_each_window
-from ..windows.residuals import SCALE, TURN, Window, WindowData
+from ..windows.residuals import MISALIGNMENT, SCALE, Window, WindowData
 
 LOOSE = 30.0
-"""times the velocity noise, for fits that the cameras dominate"""
+"""factor on the velocity noise for fits that the cameras dominate"""
 MIN_LANDMARKS = 8
 """landmarks of a fit that the cameras dominate"""
 MIN_WINDOWS = 3
@@ -43,19 +43,19 @@ class Inflation:
 
 
 def inflation_of(
-    sequence: Sequence, windows: list[Window], shared: FloatArray, sigmas: NoiseSettings, processes: int = 1
+    sequence: Sequence, windows: list[Window], calibration: FloatArray, sigmas: NoiseSettings, processes: int = 1
 ) -> Inflation:
-    """Inflation from windows without gaps, with their common `shared` parameters (8,) and white noise `sigmas`."""
+    """Inflation from windows without gaps, with their common `calibration` parameters (8,) and white noise `sigmas`."""
     loose = NoiseSettings(sigmas.pixel, LOOSE * sigmas.linear_velocity, LOOSE * sigmas.angular_velocity)
     pairs = [window for window in windows if len(window[2]) >= 2 * MIN_LANDMARKS]
     both = [_half(window, parity) for window in pairs for parity in (0, 1)]
-    ends = _ends(sequence, both, loose, shared, processes)
+    ends = _ends(sequence, both, loose, calibration, processes)
     halves = _factor([_between(one, other) for one, other in zip(ends[::2], ends[1::2], strict=True)])
     by_cameras, by_velocities = [], []
     enough = [window for window in windows if len(window[2]) >= MIN_LANDMARKS]
-    whole = _ends(sequence, enough, loose, shared, processes)
+    whole = _ends(sequence, enough, loose, calibration, processes)
     for (data, _, _), (seen, C) in zip(enough, whole, strict=True):
-        driven, C_driven = _driven(data, shared, sigmas)
+        driven, C_driven = _driven(data, calibration, sigmas)
         gap = se3.log(se3.inverse(seen) @ driven)
         by_cameras.append((gap, C, C_driven))
         by_velocities.append((gap, C_driven, halves**2 * C))
@@ -76,24 +76,24 @@ def _between(one: End, other: End) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _half(window: Window, parity: int) -> Window:
     """Half of the window's landmarks, even or odd."""
     data, poses, points = window
-    chosen = data.row % 2 == parity
-    half = replace(data, frame=data.frame[chosen], row=data.row[chosen] // 2, pixel=data.pixel[chosen])
+    chosen = data.landmark % 2 == parity
+    half = replace(data, frame=data.frame[chosen], landmark=data.landmark[chosen] // 2, pixel=data.pixel[chosen])
     return half, poses, points[parity::2]
 
 
 def _ends(
-    sequence: Sequence, windows: list[Window], loose: NoiseSettings, shared: FloatArray, processes: int
+    sequence: Sequence, windows: list[Window], loose: NoiseSettings, calibration: FloatArray, processes: int
 ) -> list[End]:
     """Last pose of each window from the tracks."""
-    common = [shared] * len(windows)
+    common = [calibration] * len(windows)
     fits = fit_each_window(sequence.stereo_camera, sequence.imu_T_cam, windows, loose, common, ITERATIONS, processes)
     return [(fit.poses[-1], fit.last_covariance) for fit in fits]
 
 
-def _driven(data: WindowData, shared: FloatArray, sigmas: NoiseSettings) -> tuple[FloatArray, FloatArray]:
+def _driven(data: WindowData, calibration: FloatArray, sigmas: NoiseSettings) -> tuple[FloatArray, FloatArray]:
     """Last pose of each window from the velocities, corrected for bias, scale and misalignment."""
-    back = so3.exp_so3(shared[TURN])
-    velocity, rate = data.twist[:, :3] / (1.0 + shared[SCALE]), data.twist[:, 3:] - shared[:3]
+    back = so3.exp_so3(calibration[MISALIGNMENT])
+    velocity, rate = data.twist[:, :3] / (1.0 + calibration[SCALE]), data.twist[:, 3:] - calibration[:3]
     path = se3.compose(se3.exp(np.concatenate([velocity @ back, rate @ back], axis=1) * data.dt[:, None]))
     sigma = np.hypot(np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3), data.deviation)
     J = se3.adjoint(se3.inverse(path[-1]) @ path[1:]) * sigma[:, None] * data.dt[:, None, None]
@@ -101,7 +101,7 @@ def _driven(data: WindowData, shared: FloatArray, sigmas: NoiseSettings) -> tupl
 
 
 def _factor(differences: list[tuple[FloatArray, FloatArray, FloatArray]]) -> float:
-    """The f at which the median of d^T (f^2 C + A)^-1 d over (d, C, A) is that of chi-square; 1 where it is less."""
+    """Factor f at which the median of d^T (f^2 C + A)^-1 d over (d, C, A) is that of chi-square; 1 where it is less."""
     if len(differences) < MIN_WINDOWS:
         return 1.0
     d, C, A = (np.array(part) for part in zip(*differences, strict=True))

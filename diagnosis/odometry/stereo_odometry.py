@@ -159,7 +159,7 @@ def _whitened_block(camera: StereoCamera, links: _Block, R: FloatArray, p: Float
 
 
 def _deviations(links: _Block, along: FloatArray) -> FloatArray:
-    """(3, 3, n) B: B B^T is the covariance of predicted rows, whose derivatives by the point are along[:, :3]."""
+    """(3, 3, n) B: B B^T is the covariance of predicted rows, whose derivatives w.r.t. the point are along[:, :3]."""
     B = np.empty((3, 3, along.shape[2]))
     B[:, 1] = (along[:, :3] * links.by_disparity).sum(axis=1)
     B[:, 0] = along[:, 0] * links.by_column - B[:, 1]

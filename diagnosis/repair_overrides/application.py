@@ -16,7 +16,7 @@ from ..noise.calibration_fit import CalibrationFit
 from ..noise.correlated_noise import Inflation
 from ..repairs.repaired_sequence import TrackRepairs
 from ..tracks.observation_mask import MaskSettings
-from ..windows.residuals import N_CALIBRATION, OFFSET, SCALE, TURN
+from ..windows.residuals import MISALIGNMENT, N_CALIBRATION, OFFSET, SCALE
 from .settings import Repairs
 
 SAME = 1e-3
@@ -96,17 +96,17 @@ def _fit(found: Diagnosis, repairs: Repairs) -> CalibrationFit:
         NoiseSettings(),
         np.empty((0, 6)),
     )
-    shared, deviation = fit.shared.copy(), fit.deviation.copy()
+    calibration, deviation = fit.calibration.copy(), fit.deviation.copy()
     if repairs.gyro_bias is not None:
-        shared[:3], deviation[:3] = axes_matrix(found.angular.name) @ repairs.gyro_bias, 0.0
+        calibration[:3], deviation[:3] = axes_matrix(found.angular.name) @ repairs.gyro_bias, 0.0
     if repairs.velocity_scale is not None:
-        shared[SCALE], deviation[SCALE] = repairs.velocity_scale - 1.0, 0.0
+        calibration[SCALE], deviation[SCALE] = repairs.velocity_scale - 1.0, 0.0
     if repairs.misalignment_deg is not None:
-        shared[TURN], deviation[TURN] = np.deg2rad(repairs.misalignment_deg), 0.0
+        calibration[MISALIGNMENT], deviation[MISALIGNMENT] = np.deg2rad(repairs.misalignment_deg), 0.0
     if repairs.disparity_offset_px is not None:
-        shared[OFFSET], deviation[OFFSET] = repairs.disparity_offset_px, 0.0
+        calibration[OFFSET], deviation[OFFSET] = repairs.disparity_offset_px, 0.0
     sigmas = replace(fit.sigmas, **repairs.sigma.model_dump(exclude_none=True))
-    return replace(fit, sigmas=sigmas, shared=shared, deviation=deviation)
+    return replace(fit, sigmas=sigmas, calibration=calibration, deviation=deviation)
 
 
 def mask_settings(repairs: Repairs) -> tuple[MaskSettings, TrackRepairs]:

@@ -15,7 +15,7 @@ from fgbaseline.geometry.measurement import three_rows
 GATE_RANGE = (3.0, 12.0)
 """px"""
 GATE = 6.0
-"""times the median prediction error"""
+"""factor on the median prediction error"""
 
 
 @dataclass(frozen=True, slots=True)

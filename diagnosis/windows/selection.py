@@ -14,10 +14,10 @@ from ..tracks.track_segments import track_chains
 from .residuals import Window, WindowData
 
 FRAMES = 25
-"""frames of a window: longer than most tracks"""
+"""number of frames of a window: more than most tracks have"""
 MAX_WINDOWS = 48
 MAX_UNBROKEN = 24
-"""windows without gaps, the longest ones"""
+"""number of the longest windows without gaps"""
 MIN_TRACK = 3
 MIN_OBSERVATIONS = 60
 MIN_UNBROKEN = 5
@@ -42,7 +42,7 @@ def spread_spans(n_frames: int) -> list[Span]:
 
 
 def unbroken_spans(odometry: Odometry) -> list[Span]:
-    """Windows without an interval over which the cameras see nothing, the longest stretches first."""
+    """Windows without an interval that lacks odometry, the longest ones first."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], odometry.known, [False]]).astype(np.int8)))
     spans: list[Span] = []
     for start, end in zip(edges[::2], edges[1::2], strict=True):
@@ -66,29 +66,29 @@ def windows_of(
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
     starts, before = o.frame_starts(sequence.n_frames), 0
     parts: list[tuple[WindowData, FloatArray]] = []
-    observed, views, rows = [], [], []
+    observed, views, landmarks = [], [], []
     for start, size in spans:
         chosen = np.arange(starts[start], starts[start + size])
         chosen = chosen[chain[chosen] >= 0]
-        _, row, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
-        chosen = chosen[length[row] >= MIN_TRACK]
+        _, index, length = np.unique(chain[chosen], return_inverse=True, return_counts=True)
+        chosen = chosen[length[index] >= MIN_TRACK]
         if len(chosen) < MIN_OBSERVATIONS:
             continue
         intervals = slice(start, start + size - 1)
         poses = se3.compose(step[intervals])
-        row = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
+        landmark = np.unique(chain[chosen], return_inverse=True)[1].astype(np.int64)
         frame = o.frame[chosen] - start
         rows_of_pixels = three_rows(o.pixel[chosen])
-        data = WindowData(frame, row, rows_of_pixels, twist[intervals], dt[intervals], deviation[intervals])
+        data = WindowData(frame, landmark, rows_of_pixels, twist[intervals], dt[intervals], deviation[intervals])
         parts.append((data, poses))
         observed.append(chosen)
         views.append((poses @ sequence.imu_T_cam)[frame])
-        rows.append(row + before)
-        before += int(row.max()) + 1
+        landmarks.append(landmark + before)
+        before += int(landmark.max()) + 1
     if not parts:
         return []
-    pixel, row = o.pixel[np.concatenate(observed)], np.concatenate(rows)
+    pixel, landmark = o.pixel[np.concatenate(observed)], np.concatenate(landmarks)
     unit = StereoMeasurement(sequence.camera, 1.0, HuberKernel())
-    points = triangulate_tracks(unit, np.concatenate(views), row, pixel, before).position
-    ends = np.cumsum([data.row.max() + 1 for data, _ in parts])[:-1]
+    points = triangulate_tracks(unit, np.concatenate(views), landmark, pixel, before).position
+    ends = np.cumsum([data.landmark.max() + 1 for data, _ in parts])[:-1]
     return [(data, poses, own) for (data, poses), own in zip(parts, np.split(points, ends), strict=True)]

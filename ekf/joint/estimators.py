@@ -85,9 +85,9 @@ def _run(problem: Problem, progress: Progress | None, settings: JointSettings) -
     history = BodyHistory(T, joint.motion.start)
     seconds = np.zeros(T)
     failure = ""
-    for k, seen in enumerate(problem.observations().by_frame(T)):
+    for k, observed in enumerate(problem.observations().by_frame(T)):
         frame_start = time.perf_counter()
-        joint.process_frame(k, seen)
+        joint.process_frame(k, observed)
         body, n = joint.state.body, joint.state.n_body
         covariance = joint.state.P[:n, :n]
         if not (np.isfinite(body.pose).all() and np.isfinite(covariance).all()):
@@ -134,7 +134,7 @@ def _status(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, st
     if failure:
         return Status.FAILED, failure
     trouble = {
-        EventKind.FRAME_DISAGREES: "most observations disagreed with the prediction, which took no part",
+        EventKind.FRAME_DISAGREES: "most observations disagreed with the prediction, and the frame was rejected",
         EventKind.COVARIANCE_LOST: "the joint covariance was no longer positive definite",
         EventKind.STATE_FULL: f"the state was full: {joint.n_deferred} observations were not used",
     }

@@ -9,7 +9,7 @@ import numpy as np
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import ROWS
+from fgbaseline.geometry.measurement import STEREO_ROWS
 
 CELL = 64.0
 """Edge of the square image cells, px."""
@@ -25,7 +25,7 @@ def select_features(candidates: FloatArray, inside: FloatArray, places: int) -> 
     if n <= max(places, 0):
         return selected
     cell = _cells(np.concatenate([candidates, inside]))
-    nearness = candidates[:, 0] - candidates[:, 1] if candidates.shape[1] == len(ROWS) else np.zeros(n)
+    nearness = candidates[:, 0] - candidates[:, 1] if candidates.shape[1] == len(STEREO_ROWS) else np.zeros(n)
     order = np.lexsort((-nearness, cell[:n]))
     number = np.bincount(cell[:n])
     turn = np.empty(n, dtype=np.int64)

@@ -12,11 +12,12 @@ from fgbaseline.geometry.measurement import back_projected, predict
 
 from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
-from .gating import MAX_REJECTED, GatedObservations, gate_observations, motion_noise_factor
+from .gating import GatedObservations, gate_observations
 from .gyro_bias import BiasedVelocityMotion
 from .inverse_depth_prior import inverse_depths, scene_depth
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
+from .process_noise import MAX_REJECTED, ProcessNoise
 from .second_order import second_order_of
 from .settings import JointSettings, Linearization
 from .state import ABSENT, CommonError, JointState
@@ -53,7 +54,9 @@ class JointFilter:
         self.measurement = problem.measurement
         self.row_variance = self.measurement.row_variance
         self.feature = problem.feature_row(o.landmark)
+        """(n,) index into `problem.features` of each observation"""
         self.measured = self.measurement.measured(o.pixel)
+        """(n, r) measured rows, px"""
         self.motion: MotionModel = motion_model(problem)
         if settings.gyro_bias is not None:
             self.motion = BiasedVelocityMotion(problem, settings.gyro_bias)
@@ -62,22 +65,19 @@ class JointFilter:
         self.map = LandmarkMap(m)
         self.n_deferred = 0
         """number of observations not used because the state was full"""
-        self.n_rejected = 0
-        """number of frames rejected as a whole since the last that was not"""
-        self.motion_noise = np.zeros_like(self.motion.covariance)
-        """(n, n) covariance that the motion has added to the body state since then"""
+        self.process_noise = ProcessNoise(len(self.motion.covariance))
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
-    def process_frame(self, k: int, seen: slice) -> None:
-        """Process frame k with the observations `seen`, a slice of the problem's."""
-        index = np.arange(seen.start, seen.stop)
+    def process_frame(self, k: int, observed: slice) -> None:
+        """Process frame k with its observations, a slice of the problem's."""
+        index = np.arange(observed.start, observed.stop)
         row = self.feature[index]
         self.map.last_seen[row] = k
         self._marginalize_unseen(k - self.settings.unseen_frames)
-        if self.n_rejected >= MAX_REJECTED:
+        if self.process_noise.n_rejected >= MAX_REJECTED:
             self._marginalize(self.state.feature.copy())
-            self._trust_motion()
+            self.process_noise.reset()
         if k > 0:
             self._predict(k)
         absent = self.state.slot_of[row] == ABSENT
@@ -86,7 +86,7 @@ class JointFilter:
             self._initialize_from_prior(row[self._select(k, index, at_prior)])
         new = absent & ~at_prior
         wanted = new & self._update(k, index[self.state.slot_of[row] != ABSENT])
-        if self.settings.coordinates is LandmarkRepresentation.WORLD:  # where nothing is at infinity
+        if self.settings.coordinates is LandmarkRepresentation.WORLD:  # which cannot represent a point at infinity
             wanted &= self.measured[index, 0] > self.measured[index, 1]
         if (wanted != new).any():
             self._record_rejection(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
@@ -122,35 +122,36 @@ class JointFilter:
             F = first_estimate_transition(prediction.transition, state.predicted, state.body, prediction.body)
             prediction = prediction._replace(transition=F)
         state.predict(prediction)
-        self.motion_noise = prediction.covariance(self.motion_noise)
+        self.process_noise.propagate(prediction)
 
     def _update(self, k: int, index: IntArray) -> bool:
-        """Update with observations `index` (n,) of active landmarks.
+        """Update with observations `index` (n,) of active landmarks; return whether the pose may initialize new ones.
 
-        False if the whole frame disagrees or S is not positive definite: then nothing was updated. True otherwise, also
-        where every observation was rejected by itself.
+        False if the whole frame is rejected or S is not positive definite, as pose and landmarks are then those of the
+        prediction. True otherwise, also where every observation was rejected by itself.
         """
         if len(index) == 0:
             return True
-        seen = self._reject_behind_camera(k, self._linearize(index))
-        if len(seen.observed) == 0:
+        linearized = self._reject_behind_camera(k, self._linearize(index))
+        if len(linearized.observed) == 0:
             return True
         state = self.state
-        variance = self._variance(seen)
-        innovation = Innovation.of(seen.H, seen.residual, state.P)
-        verdict = gate_observations(innovation.nis_per_observation(variance), self.measurement, self.settings)
+        variance = self._variance(linearized)
+        innovation = Innovation.of(linearized.H, linearized.residual, state.P)
+        verdict = self._gate(innovation.nis_per_observation(variance))
         order = verdict.order
-        innovation = innovation.in_order(order)
+        as_observed, innovation = innovation, innovation.in_order(order)
         factor = self._record_nis(k, innovation, variance[order])
         if verdict.rejection is not EventKind.FRAME_DISAGREES:
-            self._trust_motion()
-        elif self.n_rejected > 0 and (doubted := self._doubt_motion(k, seen, variance)) is not None:
-            innovation, verdict = doubted
+            self.process_noise.reset()
+        # one such frame is more often one of wrong matches
+        elif self.process_noise.n_rejected > 0 and (retried := self._inflate_process_noise(k, as_observed, variance)):
+            innovation, verdict = retried
             order, factor = verdict.order, None
             innovation = innovation.in_order(order)
-            self._trust_motion()
-        else:  # one such frame is more often one of wrong matches
-            self.n_rejected += 1
+            self.process_noise.reset()
+        else:
+            self.process_noise.n_rejected += 1
         variance = variance[order]
         if verdict.rejection is not None:
             self._record_rejection(k, verdict.rejection, ~verdict.accepted)
@@ -169,51 +170,36 @@ class JointFilter:
         except NotPositiveDefiniteError:
             self._record_rejection(k, EventKind.COVARIANCE_LOST, verdict.accepted)
             return False
-        self.used[seen.observed[verdict.accepted]] = True
+        self.used[linearized.observed[verdict.accepted]] = True
         if not state.P.diagonal().min() >= 0.0:
             negative = "P - W^T W has a negative variance after the update"
             self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
 
-    def _variance(self, seen: _LinearizedObservations) -> FloatArray:
+    def _variance(self, linearized: _LinearizedObservations) -> FloatArray:
         """Variances (n, r) of the noise of innovations, with the squares of second-order terms for one camera."""
         if not self.measurement.monocular:
-            return np.broadcast_to(self.row_variance, seen.residual.shape)
-        terms = second_order_of(self.camera, self.cam_T_imu, self.state, seen.H.slot)
+            return np.broadcast_to(self.row_variance, linearized.residual.shape)
+        terms = second_order_of(self.camera, self.cam_T_imu, self.state, linearized.H.slot)
         return self.row_variance + terms.variance + terms.mean**2
 
-    def _trust_motion(self) -> None:
-        self.n_rejected = 0
-        self.motion_noise = np.zeros_like(self.motion_noise)
-
-    def _doubt_motion(
-        self, k: int, seen: _LinearizedObservations, variance: FloatArray
+    def _inflate_process_noise(
+        self, k: int, innovation: Innovation, variance: FloatArray
     ) -> tuple[Innovation, GatedObservations] | None:
-        """Innovation with more noise in the motion since the last accepted frame, which P then has; None if rejected.
+        """Retry a rejected frame under inflated process noise, which P then has; None if it is still rejected.
 
         Two successive frames disagree with the prediction: where this frame's observations agree with each other, the
         motion between the frames is less certain than modeled.
         """
-        P, n, pose = self.state.P, self.state.n_body, seen.H.pose_jacobian
-        innovation = Innovation.of(seen.H, seen.residual, P)
-        covariance = innovation.own_covariances(variance)
-        of_motion = pose @ self.motion_noise[:POSE, :POSE] @ np.swapaxes(pose, 1, 2)
-        factor = motion_noise_factor(seen.residual, covariance, of_motion)
-        if factor is None:
+        found = self.process_noise.inflate(innovation, self.state.P, variance, self._gate)
+        if found is None:
             return None
-        before = P[:n, :n].copy()
-        P[:n, :n] += factor * self.motion_noise
-        innovation = Innovation.of(seen.H, seen.residual, P)
-        try:
-            verdict = gate_observations(innovation.nis_given_others(variance), self.measurement, self.settings)
-        except NotPositiveDefiniteError:
-            verdict = None
-        if verdict is None or verdict.rejection is EventKind.FRAME_DISAGREES:
-            P[:n, :n] = before
-            return None
-        text = f"the motion since the last accepted frame has {factor:.0f} times its modeled covariance added"
-        self.events.append(Event(k, EventKind.MOTION_DOUBTED, text))
-        return innovation, verdict
+        text = f"the motion since the last accepted frame has {found.factor:.0f} times its modeled covariance added"
+        self.events.append(Event(k, EventKind.PROCESS_NOISE_INFLATED, text))
+        return found.innovation, found.gated
+
+    def _gate(self, nis: FloatArray) -> GatedObservations:
+        return gate_observations(nis, self.measurement, self.settings)
 
     def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         """Record the NIS of the frame, before kernel and gate, and return the factor of S."""
@@ -228,27 +214,32 @@ class JointFilter:
     def _linearize(self, index: IntArray) -> _LinearizedObservations:
         state, slot = self.state, self.state.slot_of[self.feature[index]]
         charts = state.charts[slot]
-        seen = now = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
-        if self.settings.linearization is Linearization.FIRST_ESTIMATE:
-            seen = predict(
+        at_first_estimates = latest = predict(
+            self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot])
+        )
+        if self.settings.linearization is Linearization.FIRST_ESTIMATE:  # Jacobians at these, residuals at the latest
+            at_first_estimates = predict(
                 self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
             )
-        H = StackedJacobian(slot, seen.pose_jacobian(), seen.point_jacobian() @ charts[:, :, :3], state.n_body)
-        return _LinearizedObservations(index, H, self.measured[index] - now.pixel, np.minimum(now.cosine, seen.cosine))
+        H_pose, H_point = at_first_estimates.pose_jacobian(), at_first_estimates.point_jacobian()
+        H = StackedJacobian(slot, H_pose, H_point @ charts[:, :, :3], state.n_body)
+        cosine = np.minimum(latest.cosine, at_first_estimates.cosine)
+        return _LinearizedObservations(index, H, self.measured[index] - latest.pixel, cosine)
 
-    def _reject_behind_camera(self, k: int, seen: _LinearizedObservations) -> _LinearizedObservations:
-        front = seen.cosine > MIN_COSINE
+    def _reject_behind_camera(self, k: int, linearized: _LinearizedObservations) -> _LinearizedObservations:
+        front = linearized.cosine > MIN_COSINE
         if front.all():
-            return seen
+            return linearized
         self._record_rejection(k, EventKind.BEHIND_CAMERA, ~front)
         return _LinearizedObservations(
-            seen.observed[front], seen.H.select(front), seen.residual[front], seen.cosine[front]
+            linearized.observed[front], linearized.H.select(front), linearized.residual[front], linearized.cosine[front]
         )
 
     def _apply_correction(self, delta: FloatArray) -> None:
-        """Apply the correction delta (size,) to the state, and transform P where the linearization is invariant.
+        """Apply the correction delta (size,) to the state, and for `Linearization.INVARIANT` P <- B P B^T.
 
-        Landmarks have the rows nu of N, their `motion_jacobian`, and (nu+ - nu-) A of B: `unobservable_directions`.
+        B = I + (N+ - N-) A (`unobservable_directions`), with N- before and N+ after the correction, and A = Ad(T-) on
+        the pose's columns. The rows of a landmark in N are its `motion_jacobian`.
         """
         state, n = self.state, self.state.n_body
         before = state.body
@@ -271,8 +262,9 @@ class JointFilter:
         """Initialize landmarks from one observation each, back-projected from the current pose estimate.
 
         This is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
-        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n. For one camera a third row
-        measures the inverse depth by that of the scene, whose error is common to the new landmarks.
+        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n. For one camera a third row is a
+        pseudo-measurement: each inverse depth is that of the scene (`inverse_depth_prior`), with an error that the new
+        landmarks have in common.
         """
         n, state = len(index), self.state
         first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE

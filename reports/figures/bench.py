@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 MARKERS = "osD^vP*Xh<>p"
 MOST_CASES = 12
-"""that a figure has room for"""
+"""number that a figure has room for"""
 FEW_DECADES = 100.0
 FEW_SIZES = 3.0
-"""times, by which sizes have to differ before a power of them says something"""
+"""factor by which sizes have to differ for an exponent to be estimated"""
 
 
 def draw(results: "Results", metric: "Metric | None", cases: pd.DataFrame, costs: pd.DataFrame) -> dict[str, Figure]:

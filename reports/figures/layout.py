@@ -72,7 +72,7 @@ def _fix_labels(figure: Figure, measured: Mapping[Axes, Bbox]) -> None:
     inches = figure.dpi_scale_trans
     columns: dict[int, list[tuple[Axes, float]]] = defaultdict(list)
     for axes in figure.axes:
-        moved = axes.get_window_extent().min - measured[axes].min if axes in measured else np.zeros(2)
+        moved = np.subtract(axes.get_window_extent().min, measured[axes].min) if axes in measured else np.zeros(2)
         if axes.xaxis.label.get_text():
             if axes not in measured:
                 axes.xaxis.get_tightbbox()

@@ -40,7 +40,7 @@ SQUARE = (0.6, 1.0 / 0.6)
 """height over width of a picture of the report's kind, at least and at most"""
 COLUMNS = 2
 MARGIN = 1.1
-"""times the largest box: all stages have one scale"""
+"""factor on the largest box: all stages have one scale"""
 STAGE_ASPECT = 0.3
 """height over width of the panel of a stage, at least"""
 COLORS = colormaps["cividis_r"]

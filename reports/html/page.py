@@ -1,4 +1,4 @@
-"""Model of a page: sentences, tables, figures and plots in sections, and the one template that lays them out."""
+"""Model of a page: sentences (made in `phrases`), tables, figures and plots in sections, for the one template."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -83,7 +83,7 @@ class Page:
     """Content of a page. Verdict and table come first, paths beside them, then the sections."""
 
     kind: str
-    """what it reports: report, comparison, diagnosis, bench"""
+    """kind of result: report, comparison, diagnosis, bench"""
     title: str
     about: str
     """a sentence or two below the title"""

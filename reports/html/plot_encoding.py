@@ -64,7 +64,7 @@ def _text(array: np.ndarray) -> str:
 TRUTH_LINE = "truth"
 """key of ground truth among the lines of a chart; those of estimators are numbers"""
 OUTLIER = 10.0
-"""times farther than every other line: then one line alone would flatten all others on a linear axis"""
+"""factor by which one line is farther than every other, so that it alone flattens the others on a linear axis"""
 
 Lines = Mapping[str, FloatArray]
 

@@ -1,4 +1,4 @@
-"""Sentences on a comparison: the caption of its tables, and its verdict, the trust in the reference first."""
+"""Sentences at the top of a comparison's page and on the terminal, trust in the reference first; table captions."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Verdict on a run: sentences with one fact each, its number and its threshold."""
+"""Sentences at the top of a run's page and on the terminal: one fact each, with its number and threshold."""
 
 from collections.abc import Callable
 from dataclasses import replace

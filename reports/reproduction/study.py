@@ -17,7 +17,7 @@ from .repair_stages import Stage, diagnosed_stages, simulated_stages
 
 LOW_PIXEL_VARIANCE = 0.01
 LOW_MOTION = 1e-6
-"""times W"""
+"""factor on W"""
 
 
 @dataclass(frozen=True, slots=True)

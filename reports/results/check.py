@@ -48,7 +48,7 @@ class Line:
     bounds: Bounds | None
     """None where there is no baseline to take them from"""
     tolerance: str
-    """what is allowed beside the baseline, such as '5 %'; empty for bounds that are written down"""
+    """allowance on the baseline, such as '5 %'; empty for bounds that are written down"""
     before: float | None
     """in the baseline"""
     reason: str

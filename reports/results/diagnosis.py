@@ -30,7 +30,7 @@ class Found:
     counts: str
     """frames, observations and tracks, in words"""
     measured: str
-    """what the motion is measured by"""
+    """source of the motion: body velocities or inertial samples"""
     document: dict[str, Any]
     """content of diagnosis.json"""
     findings: tuple[Finding, ...]

@@ -136,7 +136,7 @@ POSED = {
     name: getattr(RunSettings(), name)
     for name in ("preset", "features", "landmarks", "as_recorded", "held_out", "repairs", "truth")
 }
-"""what a problem decides: name -> the setting that leaves it alone"""
+"""settings that a problem decides: name -> the value that leaves it alone"""
 
 
 def _source_of(given: Path | Sequence | Problem | ParsedTrajectory | Trajectory | Truth | None) -> str | None:

@@ -21,7 +21,7 @@ FIXED_POSE_SIGMA = 1e-6
 
 
 class FactorBuilder:
-    """Builds the GTSAM factors of one problem."""
+    """Builds the GTSAM factors of one problem; GTSAM linearizes them, with Jacobians of its own."""
 
     def __init__(self, problem: Problem) -> None:
         camera = problem.sequence.camera
@@ -54,12 +54,12 @@ class FactorBuilder:
             return self.between(frame)
         return self.inertial.motion(frame, self.inertial.preintegrated(frame, states.bias[frame]))
 
-    def held_state(self, frame: int, states: FrameStates) -> gtsam.NonlinearFactor:
-        """Prior factor that holds the pose of a frame; velocity and biases have the covariance that they have then."""
+    def fixed_state(self, frame: int, states: FrameStates) -> gtsam.NonlinearFactor:
+        """Prior factor that fixes the pose of a frame; velocity and biases have their covariance given that pose."""
         if self.inertial is not None:
-            return self.inertial.held_pose(frame, states)
-        held = gtsam.noiseModel.Diagonal.Sigmas(self.fixed_pose_sigmas)
-        return gtsam.PriorFactorPose3(pose_key(frame), gtsam.Pose3(states.world_T_imu[frame]), held)
+            return self.inertial.fixed_pose(frame, states)
+        fixed = gtsam.noiseModel.Diagonal.Sigmas(self.fixed_pose_sigmas)
+        return gtsam.PriorFactorPose3(pose_key(frame), gtsam.Pose3(states.world_T_imu[frame]), fixed)
 
     def pose_prior(self) -> gtsam.PriorFactorPose3:
         """Prior factor of the pose of frame 0."""

@@ -1,9 +1,9 @@
-"""GTSAM factors of raw inertial data: preintegrated samples between frames, and the start with its covariance.
+"""GTSAM factors of raw inertial data: preintegrated samples between frames, and the initial state.
 
 The preintegration is GTSAM's on the Galilean group (`PreintegratedCombinedMeasurementsG`): it is exact for pieces of
 constant angular velocity and specific force, as `geometry.strapdown` is, and has the same covariance. GTSAM's default
-`PreintegratedCombinedMeasurements` holds the attitude over a piece, which tilts the specific force by half a piece's
-turn: 0.02 m/s^2 at 0.5 rad/s and 100 Hz.
+`PreintegratedCombinedMeasurements` keeps the attitude constant over a piece. That tilts the specific force by half of
+the piece's rotation: 0.02 m/s^2 at 0.5 rad/s and 100 Hz.
 """
 
 import gtsam
@@ -17,25 +17,28 @@ from .gtsam_conversions import STATE_ORDER, bias_from_gtsam, bias_to_gtsam, reor
 from .keys import state_keys
 
 INTEGRATION_VARIANCE = 1e-20
-"""m^2/s, in place of zero, of GTSAM's own noise of the position: the integration is exact"""
-HELD_SIGMA = 1e-6
-"""m/s, rad/s and m/s^2: what stands for zero in the covariance of a velocity or bias that is known"""
-HELD_POSE = 10.0
-"""times what stands for zero in a pose without inertial data: velocity and biases of the first frame hang on it, and
-Cholesky loses twice as many digits as this has"""
+"""m^2/s, density of GTSAM's integration noise of the position, in place of zero: the integration is exact"""
+FIXED_SIGMA = 1e-6
+"""m/s, rad/s and m/s^2: sigma that replaces zero for a velocity or bias of known value"""
+FIXED_POSE_FACTOR = 10.0
+"""factor on `FactorBuilder.fixed_pose_sigmas`: the sigmas that replace zero for a fixed pose, with inertial data.
+Velocity and biases of frame 0 are determined relative to that pose. Cholesky loses digits by the square of such a
+sigma, which must therefore not be too small."""
 
 
 class InertialFactors:
-    """Builds the factors of the samples and the start of a problem."""
+    """Builds the factors of the samples and the initial state of a problem."""
 
-    def __init__(self, imu: ImuIntervals, start: InertialStart, initial_pose: FloatArray, held: FloatArray) -> None:
-        """`held` (6,) are standard deviations, rad and m, that stand for zero in the covariance of a pose."""
+    def __init__(
+        self, imu: ImuIntervals, start: InertialStart, initial_pose: FloatArray, fixed_pose_sigmas: FloatArray
+    ) -> None:
+        """`fixed_pose_sigmas` (6,) replace zero for a fixed pose: rotation (rad), translation (m), GTSAM's order."""
         self._imu, self.start, self._initial_pose = imu, start, initial_pose
-        self._held = np.concatenate([HELD_POSE * held, np.full(9, HELD_SIGMA)])
+        self._fixed_sigmas = np.concatenate([FIXED_POSE_FACTOR * fixed_pose_sigmas, np.full(9, FIXED_SIGMA)])
         self._params: dict[bytes, gtsam.PreintegrationCombinedParams] = {}
 
     def preintegrated(self, k: int, bias: FloatArray) -> gtsam.PreintegratedCombinedMeasurementsG:
-        """Samples from frame k to k + 1, integrated with biases (6,), gyroscope first."""
+        """Preintegrated samples from frame k to k + 1 at biases (6,): gyroscope rad/s, then accelerometer m/s^2."""
         at = self._imu.pieces(k)
         result = gtsam.PreintegratedCombinedMeasurementsG(self._params_of(k), bias_to_gtsam(bias))
         pieces = zip(
@@ -46,7 +49,7 @@ class InertialFactors:
         return result
 
     def _params_of(self, k: int) -> gtsam.PreintegrationCombinedParams:
-        """Noise of an interval; few differ."""
+        """GTSAM's preintegration parameters (gravity, noise) of interval k, cached by its few different densities."""
         densities = self._imu.densities[k]
         key = densities.tobytes()
         if key not in self._params:
@@ -70,8 +73,8 @@ class InertialFactors:
         start = self.start
         return self.state_prior(0, self._initial_pose, start.velocity, start.bias, start.covariance)
 
-    def held_pose(self, k: int, states: FrameStates) -> gtsam.CustomFactor:
-        """Prior of the state of frame k with its pose held."""
+    def fixed_pose(self, k: int, states: FrameStates) -> gtsam.CustomFactor:
+        """Prior of the state of frame k with its pose fixed."""
         covariance = np.zeros((strapdown.STATE, strapdown.STATE))
         covariance[6:, 6:] = states.given_pose(k)
         return self.state_prior(k, states.world_T_imu[k], states.velocity[k], states.bias[k], covariance)
@@ -79,12 +82,14 @@ class InertialFactors:
     def state_prior(
         self, k: int, pose: FloatArray, velocity: FloatArray, bias: FloatArray, covariance: FloatArray
     ) -> gtsam.CustomFactor:
-        """Prior of the state of frame k: pose (4, 4), velocity (3,), biases (6,), covariance (15, 15), our order.
+        """Prior of the state of frame k: pose (4, 4), velocity (3,) in world axes, m/s, biases (6,), rad/s and m/s^2.
 
-        GTSAM has no prior over several variables. Its linear container has the Jacobian of the linearization point,
-        which is not that of its error where the start's tilt is off.
+        `covariance` (15, 15) is that of [translation, rotation, velocity, gyroscope bias, accelerometer bias], the pose
+        by its right perturbation. This is a CustomFactor because GTSAM has no joint prior of pose, velocity and bias.
+        A LinearContainerFactor keeps the Jacobian of its linearization point, which is wrong once roll and pitch of the
+        initial state are corrected.
         """
-        matrix = reorder_tangent(covariance) + np.diag(self._held**2)
+        matrix = reorder_tangent(covariance) + np.diag(self._fixed_sigmas**2)
         noise = gtsam.noiseModel.Gaussian.Covariance(matrix)
         pose_T_world, keys = se3.inverse(pose), state_keys(k, True)
 

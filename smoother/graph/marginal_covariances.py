@@ -82,7 +82,7 @@ def marginal_covariances(
     found: dict[int, FloatArray] = {}
     found_together: dict[int, FloatArray] = {}
     while pending:
-        # Depth first: only the joint covariances on the way to the root are held.
+        # Depth first: only the joint covariances on the way to the root are kept.
         i, parent = pending.pop()
         clique = _joint(conditionals[i], parent)
         d, key = len(conditionals[i].inverse), conditionals[i].key

@@ -72,7 +72,7 @@ class UninitializedLandmarks:
     def initialize(self, candidates: list[int], world_T_imu: FloatArray) -> list[NewLandmark]:
         """Initialize the candidates whose position is determined along the poses (T, 4, 4).
 
-        With the poses held, the triangulated landmark must be in front of every camera that saw it, and no direction
+        With the poses fixed, the triangulated landmark must be in front of every camera that saw it, and no direction
         may have a larger standard deviation than the rule allows.
         """
         if self._problem.landmark_prior is not None:

@@ -61,7 +61,7 @@ class _KnownLandmarks:
         with np.errstate(divide="ignore", invalid="ignore"):  # at the camera's plane
             seen = model.camera.rows(self._rotation @ point + self._translation)
             J = model.camera.row_derivatives(seen, along)
-            front = 1.0 / seen.inverse_depth > model.camera.min_depth
+            front = 1.0 / seen.inverse_z > model.camera.min_depth
         if not front.all():
             if not front.any():
                 return None

@@ -19,7 +19,7 @@ class Prediction(NamedTuple):
     pose: FloatArray
     """(4, 4) world_T_imu"""
     covariance: FloatArray
-    """(6, 6) of its right perturbation [v, w], with the pose before held"""
+    """(6, 6) of its right perturbation [v, w], with the pose before fixed"""
     factor: gtsam.NonlinearFactor
     """factor of the motion"""
 

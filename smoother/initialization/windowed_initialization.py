@@ -47,7 +47,7 @@ def optimize_window(
     landmarks = triangulate_along(factors.problem, o.select(often[o.landmark]), states.world_T_imu)
     o = o.select(np.isin(o.landmark, landmarks.index))
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    graph.add(factors.held_state(first, states))
+    graph.add(factors.fixed_state(first, states))
     for k in range(first, last):
         graph.add(factors.motion(k, states))
     for k in range(first, last + 1):

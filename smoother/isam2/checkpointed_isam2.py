@@ -23,7 +23,7 @@ class Update(NamedTuple):
     """elimination group by key: larger groups are eliminated later; unlisted keys are in group 0"""
     relinearize: bool = False
     """force relinearization at this update"""
-    held: gtsam.KeyList | None = None
+    no_relin_keys: gtsam.KeyList | None = None
     """variables that keep their linearization points at this update"""
 
 
@@ -55,13 +55,13 @@ class CheckpointedISAM2:
         removed: Listing[int] = (),
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
-        held: gtsam.KeyList | None = None,
+        no_relin_keys: gtsam.KeyList | None = None,
     ) -> gtsam.ISAM2Result:
         """Update the tree; where GTSAM fails, restore it and raise IndeterminateSystemError.
 
         Without `groups` GTSAM eliminates all variables of the new factors last.
         """
-        step = Update(factors, values, tuple(removed), groups, relinearize, held)
+        step = Update(factors, values, tuple(removed), groups, relinearize, no_relin_keys)
         if len(self._since_checkpoint) >= max(self._interval, int(CHECKPOINT_SHARE * self._updates)):
             self._take_checkpoint()
         try:
@@ -83,7 +83,7 @@ class CheckpointedISAM2:
             step.values,
             list(step.removed),
             constrainedKeys=None if step.groups is None else self._groups.with_those_of(step.groups),
-            noRelinKeys=step.held,
+            noRelinKeys=step.no_relin_keys,
             force_relinearize=step.relinearize,
         )
         self.tree.calculateEstimatePose3(self._first)

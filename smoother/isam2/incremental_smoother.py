@@ -24,9 +24,10 @@ from .settings import ISAM2Settings
 
 PRIOR = -1
 """Index in place of an observation for the factor of a landmark's prior."""
-SETTLING_FRAMES = 4
-"""Consecutive updates that relinearize, from one with new landmarks only on: they and the last poses start far off."""
-SETTLING_UPDATES = 8
+REINITIALIZATION_FRAMES = 4
+"""Number of consecutive updates that relinearize every variable, beginning with an update in which all observed
+landmarks are new. Initial values of these landmarks and of the latest poses may be far off."""
+FINAL_UPDATES = 8
 """Largest number of updates after the last frame; three to five are usual."""
 
 
@@ -57,13 +58,15 @@ class IncrementalSmoother:
         self._dropped: set[int] = set()
         self.n_frames = 0
         """number of frames in the graph"""
-        self._settling_frames = 0
-        """frames for which every update relinearizes"""
+        self._reinitialization_frames = 0
+        """number of frames to come whose updates relinearize every variable"""
         self._ordering = EliminationOrdering(self._inertial)
-        self._first = self._held_before = 0
-        """first frame in the tree, and the first one whose variables are not among the older ones"""
-        self._held = gtsam.KeyList()
-        """older variables of the tree: they are relinearized with the whole tree only"""
+        self._first = 0
+        """first frame in the tree"""
+        self._no_relin_before = 0
+        """first frame whose variables are not in `_no_relin_keys`"""
+        self._no_relin_keys = gtsam.KeyList()
+        """variables older than `recent_frames`: they are relinearized with the whole tree only"""
         self._marginalize_at = settings.tree_frames
         """next frame after which to marginalize"""
         self.events: list[Event] = []
@@ -83,7 +86,7 @@ class IncrementalSmoother:
 
     def settle(self) -> None:
         """Update without new factors after the last frame, until every variable is within its threshold."""
-        for _ in range(SETTLING_UPDATES):
+        for _ in range(FINAL_UPDATES):
             try:
                 if self.solver.relinearize() == 0:
                     return
@@ -119,8 +122,8 @@ class IncrementalSmoother:
             self._marginalize_at = first + self._settings.tree_frames
 
     def _start_tree_at(self, first: int) -> None:
-        self._first = self._held_before = first
-        self._held = gtsam.KeyList()
+        self._first = self._no_relin_before = first
+        self._no_relin_keys = gtsam.KeyList()
 
     def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
         """Update after restoring the whole tree, where it refers to marginalized variables.
@@ -134,7 +137,8 @@ class IncrementalSmoother:
         k, new = update.frame, back - self._dropped
         if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
             self._start_tree_at(0)
-            # next after twice as many frames: all earlier restorations together cost no more than the last
+            # Marginalize again at frame 2k only: the intervals double, so that all earlier restorations together cost
+            # no more than the last.
             self._marginalize_at = max(self._marginalize_at, 2 * k)
             return update
         self.events += [
@@ -182,21 +186,22 @@ class IncrementalSmoother:
             graph.add(self.builder.observation(i, self.key[j]))
             owner.append((j, i))
         if update.new_landmarks and not update.tracked:
-            self._settling_frames = SETTLING_FRAMES
+            self._reinitialization_frames = REINITIALIZATION_FRAMES
         sighted = [*new.values(), *(self.key[j] for j in update.tracked)]
         there = [j for j in dropped if j in self.key]
         removed = [slot for j in there for slot in self._slots[j].values()]
         self._ordering.remove([self.key[j] for j in there])
-        groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._settling_frames > 0)
+        groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._reinitialization_frames > 0)
+        # first frame of each factor in the order of `graph`: motion, then landmark priors (no pose) and observations
         frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
-        relinearize, held = self._relinearization(k)
+        relinearize, no_relin_keys = self._relinearization(k)
         try:
             state = state_keys(k, self._inertial)
-            slots = self.solver.update(graph, frames, values, state, removed, groups, relinearize, held)
+            slots = self.solver.update(graph, frames, values, state, removed, groups, relinearize, no_relin_keys)
         except IndeterminateSystemError:
             self._ordering.remove(new.values())
             raise
-        self._settling_frames = max(0, self._settling_frames - 1)
+        self._reinitialization_frames = max(0, self._reinitialization_frames - 1)
         for j in there:
             del self.key[j], self._slots[j]
         self.key |= new
@@ -204,20 +209,20 @@ class IncrementalSmoother:
             self._slots.setdefault(j, {})[i] = slot
 
     def _relinearization(self, k: int) -> tuple[bool, gtsam.KeyList | None]:
-        """Whether frame k relinearizes, and the older variables, which keep their linearization points then.
+        """Whether frame k relinearizes, and the older variables, which then keep their linearization points.
 
-        A landmark that is observed again counts as older until the tree is exchanged.
+        A landmark that is observed again counts as older until the tree is rebuilt (marginalization or restoration).
         """
         settings = self._settings
-        if self._settling_frames > 0 or k % settings.relinearize_all_skip == 0:
+        if self._reinitialization_frames > 0 or k % settings.relinearize_all_skip == 0:
             return True, None
         if k % settings.relinearize_skip:
             return False, None
-        before = max(k - settings.recent_frames, self._held_before)
-        for key in self._ordering.older(self._held_before, before):
-            self._held.push_back(key)
-        self._held_before = before
-        return True, gtsam.KeyList(self._held)
+        before = max(k - settings.recent_frames, self._no_relin_before)
+        for key in self._ordering.older(self._no_relin_before, before):
+            self._no_relin_keys.push_back(key)
+        self._no_relin_before = before
+        return True, gtsam.KeyList(self._no_relin_keys)
 
     def suspect_landmarks(self, error: IndeterminateSystemError, dropped: Collection[int]) -> dict[int, str]:
         """See `IncrementalGraph.suspect_landmarks`.
@@ -265,7 +270,7 @@ class IncrementalSmoother:
         return bool(dropped)
 
     def used(self) -> BoolArray:
-        """Mask (n,) of the problem's observations in the graph."""
+        """Mask (n,) over `problem.observations()` of those in the graph; see `Problem.scatter_mask`."""
         used = np.zeros(len(self.builder.observations), dtype=np.bool_)
         used[[i for slots in self._slots.values() for i in slots if i != PRIOR]] = True
         return used

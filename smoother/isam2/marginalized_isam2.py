@@ -60,7 +60,7 @@ class MarginalizedISAM2:
         removed: Collection[int] = (),
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
-        held: gtsam.KeyList | None = None,
+        no_relin_keys: gtsam.KeyList | None = None,
     ) -> Listing[int]:
         """Update the tree, see `CheckpointedISAM2`; returns the slots of the new factors, in their order.
 
@@ -75,7 +75,7 @@ class MarginalizedISAM2:
             values.insert(AUXILIARY_POSE, values.atPose3(newest[0]))
         else:
             places.append(self._auxiliary_slot)
-        result = self._isam.update(tied, values, places, groups, relinearize, held)
+        result = self._isam.update(tied, values, places, groups, relinearize, no_relin_keys)
         *new, self._auxiliary_slot = result.getNewFactorsIndices()
         for slot in removed:
             self._graph.remove(slot)

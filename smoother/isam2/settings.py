@@ -38,7 +38,7 @@ class ISAM2Settings:
     relinearize_accelerometer_bias: float = 0.2
     """m/s^2"""
     relinearize_landmark: float = 0.002
-    """as a share of its distance"""
+    """threshold of a landmark, as a share of its distance"""
     relinearize_skip: int = 3
     """updates from one relinearization to the next; the fixed-lag smoother relinearizes at each"""
     relinearize_all_skip: int = 3

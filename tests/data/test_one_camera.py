@@ -82,7 +82,7 @@ def test_without_inertial_samples_it_is_refused_in_a_sentence(tmp_path: Path) ->
     arrays = {key: value for key, value in arrays.items() if key not in IMU_KEYS and not key.startswith("true_")}
     arrays |= {"linear_velocity": np.ones((3, T)), "angular_velocity": np.zeros((3, T))}
     np.savez(tmp_path / "velocities.npz", **arrays)
-    with pytest.raises(InputError, match="only raw inertial samples determine their scale") as refused:
+    with pytest.raises(InputError, match="only raw inertial samples determine the scale of the trajectory") as refused:
         data.read(tmp_path / "velocities.npz")
     assert "velocities.npz" in str(refused.value)
     answer = fgbaseline("run", "velocities.npz", "--out", "out", cwd=tmp_path)

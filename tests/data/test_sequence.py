@@ -8,6 +8,7 @@ import pytest
 
 from fgbaseline.data import Observations, Sequence, Truth
 from fgbaseline.geometry import InputError, StereoCamera
+from fgbaseline.geometry.monocular import left_of
 
 from ..builders.synthetic import Scene
 
@@ -17,7 +18,7 @@ assert GOOD.truth.landmarks is not None
 POSES, POINTS = GOOD.truth.world_T_imu, GOOD.truth.landmarks
 
 
-def one_off(frame: int = 0, landmark: int = 0, pixel: float = 1.0) -> Observations:
+def one_off(frame: int = 0, landmark: int = 0, pixel: float | tuple[float, ...] = 1.0) -> Observations:
     return Observations(np.array([frame]), np.array([landmark]), np.full((1, 4), pixel))
 
 
@@ -46,6 +47,9 @@ WRONG: dict[str, Callable[[], Sequence]] = {
         GOOD, camera=StereoCamera(500.0, 500.0, 320.0, 240.0, -0.5)
     ),
     "features: row 0 is not finite": lambda: replace(GOOD, observations=one_off(pixel=np.nan)),
+    r"features: uR and vR must be NaN for one camera, but row 0 is \[1.0, 1.0, 1.0, nan\]": lambda: replace(
+        GOOD, camera=left_of(GOOD.camera), observations=one_off(pixel=(1.0, 1.0, 1.0, np.nan))
+    ),
     "names a frame or landmark that the sequence does not have": lambda: replace(GOOD, observations=one_off(frame=6)),
     "an observation names a frame or landmark": lambda: replace(GOOD, observations=one_off(landmark=12)),
     "features: an observation names a frame": lambda: replace(GOOD, observations=one_off(frame=-1)),

@@ -140,8 +140,8 @@ def test_a_recording_is_the_trajectory_of_its_truth(tmp_path):
 
 GOOD = "1000000000,0,0,0,1,0,0,0"
 BAD_TEXT = {
-    "seven words": ("1 2 3 4 5 6 7\n", "line 1: it has 7 words"),
-    "three between commas": ("1,2,3\n", "line 1: it has 3 words"),
+    "seven fields": ("1 2 3 4 5 6 7\n", "line 1: it has 7 fields"),
+    "three between commas": ("1,2,3\n", "line 1: it has 3 fields"),
     "word": (f"#h\n{GOOD}\n2000000000,0,0,x,1,0,0,0\n", "line 3: 'x' is no finite number"),
     "NaN stamp": (f"#h\n{GOOD}\nnan,0,0,1,1,0,0,0\n", "line 3: the time stamp is NaN"),
     "infinite": (f"#h\n{GOOD}\n2000000000,0,0,inf,1,0,0,0\n", "line 3: 'inf' is no finite number"),

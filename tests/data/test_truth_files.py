@@ -85,7 +85,7 @@ def test_truth_that_does_not_belong_to_the_recording(tmp_path, recorded):
     with pytest.raises(InputError, match=r"truth\) has no pose for frame 0"):
         attach_truth(sequence, tmp_path / "truth", "imu")
     (tmp_path / "truth").write_text("1 2 3\n")
-    with pytest.raises(InputError, match=r"line 1: it has 3 words"):
+    with pytest.raises(InputError, match=r"line 1: it has 3 fields"):
         attach_truth(sequence, tmp_path / "truth", "imu")
     with pytest.raises(InputError, match="there is no such file"):
         attach_truth(sequence, tmp_path / "missing", "imu")

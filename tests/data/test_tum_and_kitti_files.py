@@ -80,14 +80,14 @@ BAD_TUM = {
     "infinite": ([GOOD, "inf 0 0 0 0 0 0 1"], "line 2: 'inf' is no finite number"),
     "overflow": ([GOOD, "2 1e999 0 0 0 0 0 1"], "line 2: '1e999' is no finite number"),
     "short": ([GOOD, "", "2 0 0 0 0 0 1"], "line 3: expected 8 numbers, got 7: '2 0 0 0 0 0 1'"),
-    "short from the start": (["1 2 3"], "line 1: it has 3 words"),
+    "short from the start": (["1 2 3"], "line 1: it has 3 fields"),
     "long quaternion": ([GOOD, "2 0 0 0 0 0 0 1.002"], r"line 2: the quaternion .* has length 1.002"),
     "no quaternion": ([GOOD, "2 0 0 0 0 0 0 0"], "line 2: the quaternion .* has length 0"),
     "huge quaternion": ([GOOD, "2 0 0 0 1e300 1e300 0 0"], "line 2: the quaternion .* has length"),
     "unsorted": (["2 0 0 0 0 0 0 1", GOOD], r"line 2: the time stamp 1 is not after 2 \(line 1\)"),
     "later unsorted": (["2.5 0 0 0 0 0 0 1", GOOD], r"line 2: the time stamp 1.0 is not after 2.5 \(line 1\)"),
     "nothing": (["# only words", ""], "the file has no poses"),
-    "commas": (["1,2,3,4,5,6,7,8"], "line 1: expected 8"),
+    "commas": (["1,2,3,4,5,6,7,8"], "line 1: expected a TUM line"),
 }
 
 

@@ -17,10 +17,12 @@ from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis.conventions.rate_units import DEGREE
 from fgbaseline.diagnosis.inertial.sensor_findings import sensor_findings
 from fgbaseline.diagnosis.inertial.spikes import without_spikes
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
 from ..builders import inertial_paths
 from ..builders.commands import fgbaseline
+from ..builders.inertial import simulated_problem
 from ..builders.inertial_paths import PIXEL, inertial_recording, trembling, turn, upside_down
 
 
@@ -257,6 +259,34 @@ def test_as_recorded_repairs_nothing(recording: data.Sequence) -> None:
     assert not found.diagnosed
     assert found.repairs == ()
     assert found.start is not None
+
+
+def test_a_diagnosis_that_is_given_is_the_one_that_is_used(recording: data.Sequence, problem: Problem) -> None:
+    found = diagnosis.diagnose_inertial(recording)
+    given = diagnosis.calibrated(recording, diagnosis=found)
+    np.testing.assert_array_equal(given.excluded, problem.excluded)
+    assert given.pixel_variance == problem.pixel_variance
+    other = replace(found, fit=None)  # without an estimate of the noise, which is then assumed
+    assert diagnosis.calibrated(recording, diagnosis=other).pixel_variance == diagnosis.NoiseSettings().pixel ** 2
+
+
+def test_no_argument_is_ignored(recording: data.Sequence) -> None:
+    velocities = simulate(Simulation(duration=3.0))
+    of_velocities, of_samples = diagnosis.diagnose(velocities), diagnosis.diagnose_inertial(recording)
+    as_recorded = diagnosis.Calibration()
+    late, masked = replace(as_recorded, shift=-0.5), replace(as_recorded, mask=MaskSettings(min_track=5))
+    one_camera = simulated_problem("drone", 1, seconds=3.0, cameras="left").sequence
+    for sequence, found, settings, sentence in (
+        (recording, of_velocities, None, "diagnosis: it is one of body velocities"),
+        (velocities, of_samples, None, "diagnosis: it is one of raw inertial samples"),
+        (one_camera, of_samples, None, "diagnosis: a recording with one camera has none"),
+        (recording, of_samples, as_recorded, "diagnosis: a recording that is taken as it is has none"),
+        (velocities, of_velocities, as_recorded, "diagnosis: a recording that is taken as it is has none"),
+        (recording, None, late, "settings: a shift is one of body velocities"),
+        (one_camera, None, masked, "settings: the mask predicts by stereo"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            diagnosis.calibrated(sequence, diagnosis=found, settings=settings)
 
 
 def test_a_time_offset_is_found(recording: data.Sequence) -> None:

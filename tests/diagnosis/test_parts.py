@@ -19,7 +19,7 @@ from fgbaseline.diagnosis.conventions.spline import spline_through
 from fgbaseline.diagnosis.conventions.time_delay import timing
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions, split_tracks
 from fgbaseline.diagnosis.windows import bundle_adjustment as adjustment
-from fgbaseline.diagnosis.windows.bundle_adjustment import SHARED_PRIOR, WindowFit, fit_each_window
+from fgbaseline.diagnosis.windows.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
 from fgbaseline.diagnosis.windows.residuals import (
     N_CALIBRATION,
     WindowData,
@@ -60,7 +60,7 @@ def fitted(iterations: int = 12) -> tuple[WindowFit, WindowData]:
 
 
 def test_windows_are_fitted_alike_by_one_process_and_by_three(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adjustment, "TOGETHER", 1)  # every window is a piece of work
+    monkeypatch.setattr(adjustment, "MAX_BATCH_OBSERVATIONS", 1)  # every window is a piece of work
     scenes = [window(seed=seed) for seed in range(5)]
     windows = [(data, poses, points) for _, data, poses, points in scenes]
     sequence, start = scenes[0][0].sequence(), [np.zeros(N_CALIBRATION)] * 5
@@ -85,18 +85,18 @@ def moved(poses: FloatArray, k: int, axis: int, step: float) -> FloatArray:
 def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -> None:
     scene, data, poses, points = window()
     sequence, h = scene.sequence(), 1e-6
-    shared = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
+    calibration = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
     one = concatenate_windows([(data, poses, points)])
-    _, before, after, by_shared = motion_terms(one, poses, SIGMAS, shared[None])
+    _, before, after, J_calibration = motion_terms(one, poses, SIGMAS, calibration[None])
     model = StereoMeasurement(sequence.camera, 0.5**2, KERNEL)
-    terms = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
-    by_point = np.moveaxis(terms.by_point, 2, 0)
+    terms = pixel_terms(model, sequence.imu_T_cam, one, poses, points, calibration[None])
+    by_point = np.moveaxis(terms.J_point, 2, 0)
 
-    def motion(p: FloatArray, s: FloatArray = shared) -> FloatArray:
+    def motion(p: FloatArray, s: FloatArray = calibration) -> FloatArray:
         return motion_terms(one, p, SIGMAS, s[None]).residual
 
     def pixel(p: FloatArray, x: FloatArray) -> FloatArray:
-        return pixel_terms(model, sequence.imu_T_cam, one, p, x, shared[None]).residual.T
+        return pixel_terms(model, sequence.imu_T_cam, one, p, x, calibration[None]).residual.T
 
     k = 3
     for axis in range(6):
@@ -111,8 +111,8 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
         assert np.allclose(difference, (by_point[seen] @ as_if[:, :, None])[:, :, 0], rtol=1e-4, atol=1e-3)
     for i in range(N_CALIBRATION):
         step = h * np.eye(N_CALIBRATION)[i]
-        difference = -(motion(poses, shared + step) - motion(poses, shared - step)) / (2 * h)
-        assert np.allclose(difference, by_shared[:, :, i], atol=2e-2 * np.abs(by_shared).max())
+        difference = -(motion(poses, calibration + step) - motion(poses, calibration - step)) / (2 * h)
+        assert np.allclose(difference, J_calibration[:, :, i], atol=2e-2 * np.abs(J_calibration).max())
     for i in range(3):
         step = h * np.eye(3)[i]
         difference = -(pixel(poses, points + step) - pixel(poses, points - step)) / (2 * h)
@@ -124,19 +124,19 @@ def test_a_window_ends_where_scipy_ends() -> None:
     sequence = window()[0].sequence()
     model = StereoMeasurement(sequence.camera, SIGMAS.pixel**2, KERNEL)
     W, m = len(fit.poses), len(fit.points)
-    root, one = np.sqrt(np.diag(SHARED_PRIOR)), concatenate_windows([(data, fit.poses, fit.points)])
+    root, one = np.sqrt(np.diag(CALIBRATION_PRIOR)), concatenate_windows([(data, fit.poses, fit.points)])
 
     def residual(x: FloatArray) -> FloatArray:
         poses = np.concatenate([fit.poses[:1], fit.poses[1:] @ se3.exp(x[: 6 * (W - 1)].reshape(W - 1, 6))])
         points = fit.points + x[6 * (W - 1) : 6 * (W - 1) + 3 * m].reshape(m, 3)
-        shared = fit.shared + x[-N_CALIBRATION:]
-        pixels = pixel_terms(model, sequence.imu_T_cam, one, poses, points, shared[None])
+        calibration = fit.calibration + x[-N_CALIBRATION:]
+        pixels = pixel_terms(model, sequence.imu_T_cam, one, poses, points, calibration[None])
         r = pixels.residual.T
         norm, k = np.linalg.norm(r, axis=1), KERNEL.threshold
         beyond = np.maximum(norm, k)  # the squared norm becomes Huber's cost
         r = r * np.sqrt(2.0 * k * beyond - k**2)[:, None] / beyond[:, None]
         return np.concatenate(
-            [r.ravel(), motion_terms(one, poses, SIGMAS, shared[None]).residual.ravel(), root * shared]
+            [r.ravel(), motion_terms(one, poses, SIGMAS, calibration[None]).residual.ravel(), root * calibration]
         )
 
     start = np.zeros(6 * (W - 1) + 3 * m + N_CALIBRATION)

@@ -13,7 +13,7 @@ from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
 from fgbaseline.data.registry import Estimator
 from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
-from fgbaseline.ekf.joint.gating import MAX_REJECTED, gate_observations, motion_noise_factor
+from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.landmark_representation import (
     chart,
     coordinates_of,
@@ -22,6 +22,7 @@ from fgbaseline.ekf.joint.landmark_representation import (
     motion_jacobian,
     world_points,
 )
+from fgbaseline.ekf.joint.process_noise import MAX_REJECTED, inflation_factor
 from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
 from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, predict, three_rows
@@ -304,14 +305,14 @@ def disagreeing_frames(estimate: Estimate) -> list[int]:
 @pytest.mark.parametrize(
     "solve", [ekf.joint_ekf, ekf.joint_ekf_ungated, ekf.joint_ekf_bias, ekf.joint_ekf_first_estimate]
 )
-def test_after_two_frames_that_agree_in_themselves_the_motion_is_doubted(solve: Estimator) -> None:
+def test_after_two_frames_that_agree_in_themselves_the_process_noise_is_inflated(solve: Estimator) -> None:
     clean = matched(drive("town", seconds=10.0, features_per_frame=40.0))
     increment = clean.increment.copy()
     increment[49, 5] += 0.05  # rad of yaw to frame 50, with a sigma of 0.001
     estimate = solve(replace(clean, increment=increment))
     assert disagreeing_frames(estimate) == [50]
-    (doubted,) = (event for event in estimate.events if event.kind == EventKind.MOTION_DOUBTED)
-    assert doubted.frame == 51
+    (inflated,) = (event for event in estimate.events if event.kind == EventKind.PROCESS_NOISE_INFLATED)
+    assert inflated.frame == 51
     assert estimate.used[clean.mask][clean.observations().frame == 51].mean() > 0.8
     apart = np.linalg.norm(se3.log(se3.inverse(solve(clean).world_T_imu) @ estimate.world_T_imu)[:, 3:], axis=1)
     assert apart[50] > 0.04
@@ -320,11 +321,11 @@ def test_after_two_frames_that_agree_in_themselves_the_motion_is_doubted(solve: 
 
 
 @pytest.mark.parametrize("n", [2, 5, 9])
-def test_successive_frames_of_wrong_matches_never_make_the_motion_doubtful(n: int) -> None:
+def test_successive_frames_of_wrong_matches_never_inflate_the_process_noise(n: int) -> None:
     problem, _ = garbled(0.9, range(50, 50 + n))
     estimate = ekf.joint_ekf(problem)
     assert disagreeing_frames(estimate) == list(range(50, 50 + n))
-    assert EventKind.MOTION_DOUBTED not in {event.kind for event in estimate.events}
+    assert EventKind.PROCESS_NOISE_INFLATED not in {event.kind for event in estimate.events}
     assert estimate.used[problem.mask][problem.observations().frame >= 50 + n].mean() > 0.9
 
 
@@ -519,19 +520,19 @@ def test_a_frame_is_rejected_where_more_than_half_of_five_or_more_observations_d
     assert (always.weight == 1.0).all()
 
 
-def test_the_motion_noise_factor_is_the_smallest_power_of_two_with_the_median_of_chi_square() -> None:
+def test_the_inflation_factor_is_the_smallest_power_of_two_with_the_median_of_chi_square() -> None:
     random = np.random.default_rng(0)
-    covariance, of_motion = np.tile(np.eye(3), (101, 1, 1)), np.tile(0.1 * np.eye(3), (101, 1, 1))
+    covariance, by_motion = np.tile(np.eye(3), (101, 1, 1)), np.tile(0.1 * np.eye(3), (101, 1, 1))
     residual = random.normal(size=(101, 3)) * np.sqrt(1.0 + 0.1 * 1000.0)
-    factor = motion_noise_factor(residual, covariance, of_motion)
+    factor = inflation_factor(residual, covariance, by_motion)
     assert factor in (512.0, 1024.0, 2048.0)
 
     def median(f: float) -> float:
         return float(np.median((residual**2).sum(axis=1) / (1.0 + 0.1 * f)))
 
     assert median(factor) <= chi2.ppf(0.5, 3) < median(factor / 2.0)
-    assert motion_noise_factor(residual, covariance, np.zeros_like(of_motion)) is None
-    assert motion_noise_factor(np.full_like(residual, np.nan), covariance, of_motion) is None
+    assert inflation_factor(residual, covariance, np.zeros_like(by_motion)) is None
+    assert inflation_factor(np.full_like(residual, np.nan), covariance, by_motion) is None
 
 
 def test_nan_residuals_reject_the_frame() -> None:
@@ -588,6 +589,7 @@ def test_events_of_several_kinds_are_reported_in_turn() -> None:
     full = [event for event in estimate.events if event.kind == "state full"]
     waited = sum(int(event.reason.split(" of ")[0]) for event in full)
     assert estimate.reason == (
-        "at 1 of 100 frames, first at frame 50, most observations disagreed with the prediction, which took no part; "
+        "at 1 of 100 frames, first at frame 50, most observations disagreed with the prediction, and the frame was "
+        "rejected; "
         f"at {len(full)} of 100 frames, first at frame 0, the state was full: {waited} observations were not used"
     )

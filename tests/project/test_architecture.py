@@ -1,7 +1,14 @@
-"""No module imports one that imports it, imports inside functions included; import-linter holds the layers."""
+"""No module imports one that imports it, imports inside functions included; the docs name modules that exist."""
+
+import re
+from pathlib import Path
 
 import grimp
 import pytest
+
+ROOT = Path(__file__).parents[2]
+RECORDS = {"mutants.md"}
+"""pages that keep the names of the revision that they measured"""
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +47,21 @@ def test_no_module_imports_one_that_imports_it(graph: grimp.ImportGraph) -> None
     assert len(graph.modules) > 300
     assert graph.find_modules_directly_imported_by("fgbaseline")  # so a room that imports it would be in a cycle
     assert not cycles(graph)
+
+
+def test_the_modules_that_the_docs_name_exist() -> None:
+    rooms = "geometry|data|diagnosis|ekf|smoother|compare|reports|benchmarks"
+    named = {
+        (page.name, path)
+        for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+        if page.name not in RECORDS
+        for path in re.findall(rf"(?<![\w/])(?:{rooms})/[\w/]+\.py\b", page.read_text(encoding="utf-8"))
+    }
+    table = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    modules = {path.name for room in rooms.split("|") for path in (ROOT / room).rglob("*.py")}
+    assert len(named) > 30
+    assert not {(page, path) for page, path in named if not (ROOT / path).is_file()}
+    assert set(re.findall(r"`(\w+\.py)`", table)) <= modules
 
 
 def test_a_cycle_is_found() -> None:

@@ -355,7 +355,11 @@ BAD: dict[str, Bad] = {
     "up": (("truth.tum", "near.csv"), {"up": (0.0, 0.0, 0.0)}, "up: expected a direction"),
     "delta": (("truth.tum", "near.csv"), {"deltas": ["10"]}, "delta: expected a length above 0 with its unit.*'10'"),
     "zero delta": (("truth.tum", "near.csv"), {"deltas": ["0m"]}, "delta: expected a length above 0.*'0m'"),
-    "insisted": (("truth.tum", "near.csv"), {"form": "kitti"}, r"truth\.tum: line 2: expected 12 numbers \(KITTI\)"),
+    "insisted": (
+        ("truth.tum", "near.csv"),
+        {"form": "kitti"},
+        r"truth\.tum: line 2: expected a KITTI line \(12 numbers\)",
+    ),
     "another time": (("truth.tum", "near.csv"), {"offset": 100.0}, r"no pose of .*near\.csv is within 0\.01 s"),
     "landmarks alone": (("truth.tum", "near.csv"), {"landmarks": ["times.txt"]}, "landmarks: .* add --sequence"),
     "held out of nothing": (("truth.tum", "near.csv"), {"held_out": 0.2}, "held-out: .* give it with --sequence"),

@@ -18,7 +18,7 @@ from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.frame_states import FrameStates
 from fgbaseline.smoother.graph.gtsam_conversions import STATE_ORDER, bias_to_gtsam
-from fgbaseline.smoother.graph.inertial_factors import HELD_SIGMA, InertialFactors
+from fgbaseline.smoother.graph.inertial_factors import FIXED_SIGMA, InertialFactors
 from fgbaseline.smoother.graph.keys import state_keys
 from fgbaseline.smoother.graph.marginal_covariances import marginal_covariances
 from fgbaseline.smoother.initialization.inertial_windows import inertial_states
@@ -57,7 +57,7 @@ def residuals(problem: Problem, states: FrameStates, points: dict[int, FloatArra
     imu, start, model = problem.imu, problem.start, problem.measurement
     assert imu is not None
     assert start is not None
-    held = np.concatenate([np.full(3, 1e-5 * model.camera.baseline), np.full(3, 1e-5), np.full(9, HELD_SIGMA)])
+    held = np.concatenate([np.full(3, 1e-5 * model.camera.baseline), np.full(3, 1e-5), np.full(9, FIXED_SIGMA)])
     first = np.concatenate(
         [
             se3.log(se3.inverse(problem.initial_pose) @ states.world_T_imu[0]),
