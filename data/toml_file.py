@@ -48,13 +48,13 @@ def key_path(place: Place) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
 
 
-def read_toml(path: FilePath, model: type[Content]) -> TomlFile[Content]:
-    """The TOML file `path` as a `model`, which should forbid extra keys.
+def read_toml(path: FilePath, model: type[Content], values: dict[str, Any] | None = None) -> TomlFile[Content]:
+    """The TOML file `path` as a `model`, which should forbid extra keys; `values` are its values, if read already.
 
     TOML has types, so "5" is no number and 1 no truth value; arrays may become tuples, and strings enums and paths.
     Raises InputError naming the file, the key path and the allowed values, for the first fault in the file.
     """
-    values = toml_values(path)
+    values = toml_values(path) if values is None else values
     try:
         content = model.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:

@@ -1,8 +1,9 @@
 """Numbers, counts and names as text: for sentences and tables, and made safe for LaTeX and Markdown."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from math import isfinite
+from typing import TypeVar
 
 from fgbaseline.data.wording import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
 
@@ -34,6 +35,16 @@ _TEX = {
 }
 counted = plural
 """a count and its noun"""
+Key = TypeVar("Key", bound=Hashable)
+Item = TypeVar("Item")
+
+
+def grouped(pairs: Iterable[tuple[Key, Item]]) -> dict[Key, list[Item]]:
+    """The items of each key, in the order of the pairs."""
+    groups: dict[Key, list[Item]] = {}
+    for key, item in pairs:
+        groups.setdefault(key, []).append(item)
+    return groups
 
 
 def interval(value: float, low: float, high: float) -> str:

@@ -10,7 +10,7 @@ from fgbaseline.data.formats.atomic_folder import atomic_folder
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.named_file import FilePath
 
-from .tables import Table, html
+from .tables.table import Table, html
 
 
 class _Result(Protocol):

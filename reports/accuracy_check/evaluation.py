@@ -1,6 +1,7 @@
 """Evaluation: every limit against every estimator that it matches."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -10,9 +11,10 @@ from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import TomlFile
 
 from ..formatting import number
+from ..phrases.check import too_little_data, untrusted_reference
 from ..phrases.evidence import reference_sigma_sentence
 from ..results.check import NEW, Checked, Line, Shortage
-from ..results.json_tree import INFINITE
+from ..results.documents import INFINITE
 from ..results.reader import (
     DIGITS,
     NO_SUCH_METRIC,
@@ -41,15 +43,20 @@ def evaluate(
     lines: list[Line] = []
     for index, limit in enumerate(limits.content.limit):
         _require_baseline(limits, index, limit, given=baseline is not None or updating)
-        for name, estimator, values in matching(limits, index, measured):
-            lines += _lines(limits, index, (name, measured.runs[name]), (estimator, values), baseline, updating)
+        for name, estimator in matching(limits, index, measured):
+            lines += _lines(limits, index, name, measured.runs[name], estimator, baseline, updating)
     needed = limits.content.reference
     several = len(measured.runs) > 1
+    named = [(name if several else "", run.reference) for name, run in measured.runs.items()]
     return Checked(
         lines=tuple(lines),
-        references=tuple(filter(None, (_reference(*run, several=several) for run in measured.runs.items()))),
-        sigmas=tuple(filter(None, (_sigma(*run, several=several) for run in measured.runs.items()))),
-        shortages=_shortages(lines, several=several),
+        references=tuple(untrusted_reference(*each) for each in named if each[1].trust not in (None, "trusted")),
+        sigmas=tuple(
+            f"{f'{name}: ' if name else ''}{reference_sigma_sentence(reference.name, reference.sigma.model_dump())}"
+            for name, reference in named
+            if reference.sigma is not None and reference.name is not None
+        ),
+        shortages=too_little_data([replace(line, run=line.run if several else "") for line in lines]),
         undecided=needed is not Needed.NONE and any(is_undertrusted(run, needed) for run in measured.runs.values()),
         measured=measured,
         limits=shown(limits.path),
@@ -57,8 +64,8 @@ def evaluate(
     )
 
 
-def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tuple[str, str, Mapping[str, Any]]]:
-    """Runs, estimators and values that a limit matches. Raises InputError where one of its patterns matches nothing."""
+def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[tuple[str, str]]:
+    """Runs and estimators that a limit matches, by name. Raises InputError where a pattern of it matches nothing."""
     limit = limits.content.limit[index]
     runs = {name: run for name, run in measured.runs.items() if fnmatchcase(name, limit.runs)}
     if not runs:
@@ -69,17 +76,17 @@ def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[t
         if not any(fnmatchcase(name, pattern) for name in there):
             said = f'estimators = "{pattern}" matches no estimator; there are {", ".join(there)}'
             raise limits.wrong(("limit", index, "estimators"), said)
-    chosen: list[tuple[str, str, Mapping[str, Any]]] = [
-        (name, estimator, values)
+    chosen = {
+        (name, estimator): values
         for name, run in runs.items()
         for estimator, values in run.estimators.items()
         if any(fnmatchcase(estimator, pattern) for pattern in limit.patterns)
-    ]
-    if not any(failure(values) or has_metric(values, limit.metric) for *_, values in chosen):
-        known = sorted({metric for *_, values in chosen for metric in metrics_of(values)})
+    }
+    if not any(failure(values) or has_metric(values, limit.metric) for values in chosen.values()):
+        known = sorted({metric for values in chosen.values() for metric in metrics_of(values)})
         said = f'metric = "{limit.metric}" is not a number of any matching estimator; there are '
         raise limits.wrong(("limit", index, "metric"), said + nearest(limit.metric, known))
-    return chosen
+    return list(chosen)
 
 
 def is_undertrusted(run: MeasuredRun, needed: Needed) -> bool:
@@ -91,14 +98,14 @@ def is_undertrusted(run: MeasuredRun, needed: Needed) -> bool:
 def _lines(
     limits: TomlFile[Limits],
     index: int,
-    named_run: tuple[str, MeasuredRun],
-    named_values: tuple[str, Mapping[str, Any]],
+    name: str,
+    run: MeasuredRun,
+    estimator: str,
     baseline: Measured | None,
     updating: bool,
 ) -> Iterator[Line]:
     """One line for the limit's own bounds, and one for the bounds around the baseline."""
-    limit = limits.content.limit[index]
-    (name, run), (estimator, values) = named_run, named_values
+    limit, values = limits.content.limit[index], run.estimators[estimator]
     value, missing = value_of(values, limit.metric)
     old, unknown = baseline_value(baseline, name, run, estimator, limit.metric)
     shortage = _shortage(limits.content, limit, values)
@@ -170,20 +177,6 @@ def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shorta
     return Shortage(int(sample["n"]), sample.get("coverage"), smallest, coverage)
 
 
-def _shortages(lines: list[Line], *, several: bool) -> tuple[str, ...]:
-    """A sentence for each shortage, with its metrics and estimators."""
-    found: dict[tuple[Shortage, str], tuple[dict[str, None], dict[str, None]]] = {}
-    for line in lines:
-        if line.shortage is not None and line.value is not None:
-            metrics, names = found.setdefault((line.shortage, line.run if several else ""), ({}, {}))
-            metrics[line.metric], names[line.estimator] = None, None
-    return tuple(
-        f"Too little data{f' in {run}' if run else ''} for {', '.join(metrics)} of {', '.join(names)}: "
-        f"{shortage.reason} (smallest_sample, smallest_coverage)."
-        for (shortage, run), (metrics, names) in found.items()
-    )
-
-
 def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, given: bool) -> None:
     if limit.baseline is None:
         return
@@ -192,22 +185,3 @@ def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, giv
         raise limits.wrong(place, f"a baseline has no timings such as {limit.metric}; use at_most")
     if not given:
         raise limits.wrong(place, "this limit needs a baseline; name one with --baseline FILE")
-
-
-def _sigma(name: str, run: MeasuredRun, *, several: bool) -> str:
-    """The sentence on the sigma of a run's reference; empty where it is unknown."""
-    reference = run.reference
-    if reference.sigma is None or reference.name is None:
-        return ""
-    where = f"{name}: " if several else ""
-    return where + reference_sigma_sentence(reference.name, reference.sigma.model_dump())
-
-
-def _reference(name: str, run: MeasuredRun, *, several: bool) -> str:
-    """The sentence on a reference that is not trusted; empty for a trusted one."""
-    reference = run.reference
-    if reference.trust in (None, "trusted"):
-        return ""
-    where = f" of {name}" if several else ""
-    why = f": {reference.reasons[0]}" if reference.reasons else ""
-    return f"The reference{where}{f', {reference.name},' if reference.name else ''} is {reference.trust}{why}."

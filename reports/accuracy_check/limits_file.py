@@ -2,22 +2,19 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.limits import Better, Bounds
 from fgbaseline.data.toml_file import TomlFile, read_toml
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+from ..results.parts import Finite, Part
+
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
 Count = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Needed(StrEnum):
@@ -30,7 +27,7 @@ class Needed(StrEnum):
     """any, for metrics that do not depend on the reference; the others require a doubtful one"""
 
 
-class Tolerance(_Part):
+class Tolerance(Part):
     """Allowed change of a metric for the worse: the larger of the two."""
 
     better: Better
@@ -56,7 +53,7 @@ def _no_blank(text: str) -> str:
 Pattern = Annotated[str, AfterValidator(_no_blank)]
 
 
-class Limit(_Part):
+class Limit(Part):
     """A limit on a metric of every estimator and run that the patterns match."""
 
     metric: Pattern
@@ -81,9 +78,8 @@ class Limit(_Part):
     @property
     def bounds(self) -> Bounds | None:
         """The limit's own bounds; None where it has only a baseline."""
-        if self.at_most is None and self.at_least is None:
-            return None
-        return Bounds(**{side: value for side in ("at_most", "at_least") if (value := getattr(self, side)) is not None})
+        given = {side: value for side in ("at_most", "at_least") if (value := getattr(self, side)) is not None}
+        return Bounds(**given) if given else None
 
     @model_validator(mode="after")
     def _says_something(self) -> "Limit":
@@ -96,7 +92,7 @@ class Limit(_Part):
         return self
 
 
-class Limits(_Part):
+class Limits(Part):
     """The file."""
 
     reference: Needed = Needed.DOUBTFUL
@@ -107,6 +103,9 @@ class Limits(_Part):
     limit: Annotated[tuple[Limit, ...], Field(min_length=1)]
 
 
-def read_limits(path: Path) -> TomlFile[Limits]:
-    """Reads a limits file. Raises InputError with the file, the key path and the allowed values."""
-    return read_toml(path, Limits)
+def read_limits(path: Path, values: dict[str, Any] | None = None) -> TomlFile[Limits]:
+    """The limits of a file, from its `values` if these are read already.
+
+    Raises InputError with the file, the key path and the allowed values.
+    """
+    return read_toml(path, Limits, values)

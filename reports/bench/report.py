@@ -20,10 +20,10 @@ from ..html.templates import picture
 from ..phrases.bench import FIGURES, NEES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
-from ..results.json_tree import INFINITE, at
+from ..results.documents import INFINITE, at
 from ..results.reader import RunFolder
-from ..tables import latex, markdown
 from ..tables.bench import main_table, ranking_tables, runs_table
+from ..tables.table import latex, markdown
 from .job import Planned
 from .progress import duration
 from .run_cache import RUNS, RunCache
@@ -56,14 +56,12 @@ def write_report(name: str, results: Results, cache: RunCache) -> None:
     for title, frame in same.items():
         if len(frame):
             cache.write(f"tables/{title}.csv", _csv(frame))
-    table = main_table(results, with_costs=False, caption=TABLE)
-    cache.write("tables/table.md", markdown(table).encode())
-    cache.write("tables/table.tex", latex(table).encode())
     cache.write("costs/cases.csv", _csv(statistics.costs(results)))
     cache.write("costs/runs.csv", _csv(results.costs))
-    with_costs = main_table(results, with_costs=True, caption=TABLE)
-    cache.write("costs/table.md", markdown(with_costs).encode())
-    cache.write("costs/table.tex", latex(with_costs).encode())
+    for folder in ("tables", "costs"):
+        table = main_table(results, with_costs=folder == "costs", caption=TABLE)
+        cache.write(f"{folder}/table.md", markdown(table).encode())
+        cache.write(f"{folder}/table.tex", latex(table).encode())
     figures = draw(results, statistics.judge(results), statistics.cases(results), statistics.costs(results))
     for title, figure in figures.items():
         for form in ("png", "svg"):
@@ -145,8 +143,7 @@ def collect_results(planned: Sequence[Planned], cache: RunCache) -> Results:
     summaries, failures = {}, {}
     nees: dict[tuple[str, str], list[FloatArray]] = {}
     for one in planned:
-        failure = cache.failure(one.job.key)
-        if failure:
+        if failure := str(cache.record(one.job.key)["failure"]):
             failures[one.name] = failure
             rows += _failed(one, failure)
             continue
@@ -170,23 +167,15 @@ def collect_results(planned: Sequence[Planned], cache: RunCache) -> Results:
 
 
 def _of_run(one: Planned, summary: Mapping[str, Any]) -> dict[str, Any]:
+    reference, size = summary["reference"], (summary["sequence"]["frames"], summary["problem"]["features"])
     offered = next(iter(summary["estimators"].values()))["observations"]["offered"]
-    values = (
-        one.name,
-        one.case,
-        one.sequence,
-        one.job.seed,
-        summary["reference"]["name"],
-        summary["reference"]["trust"],
-        summary["sequence"]["frames"],
-        summary["problem"]["features"],
-        offered,
-    )
-    return {**dict(zip(OF_THE_RUN, values, strict=True)), **_settings(one)}
+    return _planned(one, reference["name"], reference["trust"], *size, offered)
 
 
-def _settings(one: Planned) -> dict[str, str]:
-    return {f"{name}_asked": words for name, words in one.settings.items()}
+def _planned(one: Planned, *found: object) -> dict[str, Any]:
+    """The first columns of a run: its names, what was `found`, and the settings that vary."""
+    names = zip(OF_THE_RUN, (one.name, one.case, one.sequence, one.job.seed, *found), strict=False)
+    return {**dict(names), **{f"{name}_asked": words for name, words in one.settings.items()}}
 
 
 def _row(name: str, estimator: Mapping[str, Any]) -> dict[str, Any]:
@@ -195,12 +184,8 @@ def _row(name: str, estimator: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _failed(one: Planned, failure: str) -> list[dict[str, Any]]:
-    of_run = dict(zip(OF_THE_RUN, (one.name, one.case, one.sequence, one.job.seed), strict=False))
-    nothing = {metric.name: np.nan for metric in METRICS}
-    return [
-        {**of_run, **_settings(one), "estimator": name, "status": "failed", "reason": failure, **nothing}
-        for name in one.job.estimators
-    ]
+    nothing = {"status": "failed", "reason": failure, **{metric.name: np.nan for metric in METRICS}}
+    return [{**_planned(one), "estimator": name, **nothing} for name in one.job.estimators]
 
 
 def _at(estimator: Mapping[str, Any], path: tuple[str, ...]) -> float:

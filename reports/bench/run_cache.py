@@ -36,12 +36,8 @@ class RunCache:
         """Whether the outcome of a job is stored."""
         return (self.run(key) / JOB).is_file()
 
-    def failure(self, key: str) -> str:
-        """Why a finished job has no run; empty where it has one."""
-        return str(self.record(key)["failure"])
-
     def record(self, key: str) -> dict[str, Any]:
-        """Failure and seconds of a finished job."""
+        """Failure (empty where there is a run) and seconds of a finished job."""
         record: dict[str, Any] = json.loads((self.run(key) / JOB).read_text(encoding="utf-8"))
         return record
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.simulate import Simulation
@@ -15,6 +15,7 @@ from fgbaseline.data.toml_file import TomlFile, read_toml
 from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 from fgbaseline.geometry import InputError
 
+from ..results.parts import Finite, Part
 from ..run.problem import RunSettings
 
 Page: TypeAlias = Literal["none", "tables", "figures"]
@@ -23,17 +24,10 @@ Features: TypeAlias = Annotated[int, Field(ge=1)] | Literal["all"]
 Noise: TypeAlias = Literal["estimated", "assumed"] | SigmaOverrides
 Share: TypeAlias = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Seed: TypeAlias = Annotated[int, Field(ge=0)]
-MOST_SEEDS = 10_000
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-MOST_STEPS = 1000
-MOST_DRIVES = 10_000
+MOST_SEEDS, MOST_STEPS, MOST_DRIVES = 10_000, 1000, 10_000
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Range(_Part):
+class Range(Part):
     """Evenly spaced numbers."""
 
     start: Annotated[Finite, Field(alias="from")]
@@ -59,7 +53,7 @@ Interval: TypeAlias = Literal["after", "before", "mean"]
 Vector: TypeAlias = tuple[Finite, Finite, Finite]
 
 
-class Drives(_Part):
+class Drives(Part):
     """Options of `fgbaseline simulate`; None for its defaults."""
 
     path: Shape | tuple[Shape, ...] | None = None
@@ -97,14 +91,14 @@ def _name(text: str) -> str:
 Name: TypeAlias = Annotated[str, AfterValidator(_name)]
 
 
-class Seeds(_Part):
+class Seeds(Part):
     """Consecutive seeds."""
 
     count: Annotated[int, Field(ge=1, le=MOST_SEEDS)]
     first: Seed = 0
 
 
-class Entry(_Part):
+class Entry(Part):
     """One or more recordings, or simulated drives."""
 
     name: Name | None = None
@@ -150,7 +144,7 @@ class Entry(_Part):
         return (0,) if self.seeds is None else self.seeds
 
 
-class Sweep(_Part):
+class Sweep(Part):
     """Settings of the runs; every combination of the listed values is run."""
 
     preset: Preset | Annotated[tuple[Preset, ...], Field(min_length=1)] = "calibrated"
@@ -165,7 +159,7 @@ class Sweep(_Part):
     held_out: Share | Annotated[tuple[Share, ...], Field(min_length=1)] = 0.0
 
 
-class Suite(_Part):
+class Suite(Part):
     """A suite of benchmark runs."""
 
     name: Name

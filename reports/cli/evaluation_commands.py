@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .options import BODY, PATH, UNITS, Formats, NamedFile, Numbers, open_page
+from .options import BODY, PATH, UNITS, Formats, NamedFile, Numbers, choice, open_page, seed
 
 XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
 
@@ -31,13 +31,7 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
     type=XYZ,
     help="Up in the reference's world.  [default: 0,-1,0 in KITTI files; else by the run or --sequence, else 0,0,1]",
 )
-@click.option(
-    "--association",
-    type=click.Choice(["nearest", "interpolated"]),
-    default="nearest",
-    show_default=True,
-    help="Association of poses by time, each at most once.",
-)
+@choice("--association", "nearest", "interpolated", what="Association of poses by time, each at most once.")
 @click.option("--tolerance", type=float, metavar="S", help="Largest time difference of a pair.  [default: 0.01]")
 @click.option("--offset", type=float, default=0.0, metavar="S", help="Added to the stamps of the estimates.")
 @click.option("--search-offset", type=float, metavar="S", help="Estimate the time offset, within +-S.")
@@ -110,13 +104,7 @@ XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
 @click.option(
     "--beside", default="all", show_default=True, help="Estimators of the run to compare too: names, all or none."
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of the bootstrap and of the choice of held-out tracks.",
-)
+@seed("the bootstrap and of the choice of held-out tracks")
 def compare(
     reference: str,
     estimates: tuple[str, ...],
@@ -148,7 +136,7 @@ def compare(
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, drawn=out is not None, **options)
     from ..open_page import announce, print_sentences
     from ..phrases.evidence import FIRST
-    from ..tables import print_table
+    from ..tables.table import print_table
 
     page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict
@@ -199,15 +187,18 @@ def check(
     """
     from fgbaseline.data.toml_text import toml_values
 
-    from ..results.documents import measured_file, read_document
+    from ..results.documents import document_in, read_document
 
-    toml_values(limits)  # faults of the files are reported before their models are imported
-    read_document(measured_file(folder))
+    values, summary = toml_values(limits), document_in(folder)
+    document = read_document(summary)  # faults of both files are reported before their models are imported
     from ..accuracy_check.command import Outputs
-    from ..accuracy_check.command import check as check_folder
+    from ..accuracy_check.command import check as check_measured
+    from ..accuracy_check.limits_file import read_limits
+    from ..results.reader import read_measured
 
-    outputs = Outputs(junit=junit, markdown=markdown, json=as_json)
-    return check_folder(folder, limits, baseline, outputs, update=update_baseline, accept_worse=accept_worse)
+    measured, outputs = read_measured(summary, document), Outputs(junit, markdown, as_json)
+    options = {"update": update_baseline, "accept_worse": accept_worse}
+    return check_measured(measured, read_limits(limits, values), baseline, outputs, **options)
 
 
 @click.command(epilog="Example: fgbaseline figures out/drive --format pdf --out paper/figures")
@@ -226,9 +217,9 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     from fgbaseline.data.formats.atomic_folder import atomic_folder
     from fgbaseline.data.wording import plural
 
-    from ..results.documents import COMPARISON, drawn_file, read_document
+    from ..results.documents import COMPARISON, document_in, read_document
 
-    file = drawn_file(folder)
+    file = document_in(folder, "run or compare")
     read_document(file)  # a fault is reported before matplotlib is imported
     from ..figures.comparison import draw_for_paper as draw_comparison
     from ..figures.comparison_data import of_comparison_folder

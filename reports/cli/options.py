@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -11,6 +11,7 @@ from click.shell_completion import CompletionItem
 PATH = click.Path(path_type=Path)
 UNITS = click.Choice(["s", "ms", "us", "ns"])
 BODY = click.Choice(["imu", "camera"])
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class NamedFile(click.ParamType[str]):
@@ -82,13 +83,19 @@ class Formats(click.ParamType[tuple[str, ...]]):
         return wanted
 
 
+def seed(what: str) -> Callable[[Command], Command]:
+    """The seed of a random choice."""
+    return click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help=f"Seed of {what}.")
+
+
+def choice(name: str, *values: str, what: str) -> Callable[[Command], Command]:
+    """An option with the first of its values as default."""
+    return click.option(name, type=click.Choice(values), default=values[0], show_default=True, help=what)
+
+
 open_page = click.option("--open", "opened", is_flag=True, help="Open the page in the browser.")
-preset = click.option(
-    "--preset",
-    type=click.Choice(["calibrated", "documented"]),
-    default="calibrated",
-    show_default=True,
-    help="The problem: diagnosed and repaired, or as the source paper has it.",
+preset = choice(
+    "--preset", "calibrated", "documented", what="The problem: diagnosed and repaired, or as the source paper has it."
 )
 features = click.option(
     "--features",
@@ -157,7 +164,7 @@ _MOTION = (
 )
 
 
-def images(command: Callable[..., Any]) -> Callable[..., Any]:
+def images(command: Command) -> Command:
     """The options of recordings of images, and of motion given beside them."""
     for option in reversed((*_MOTION, *_IMAGES)):
         command = option(command)

@@ -5,8 +5,7 @@ from typing import Any
 
 import click
 
-from ..name_list import names_in
-from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
+from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from . import options
 from .options import PATH, Numbers
 
@@ -48,12 +47,11 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option("--add-time-unit", type=options.UNITS, help="Unit of ambiguous time stamps of --add.")
 @click.option("--add-offset", type=float, default=0.0, metavar="S", help="Added to the stamps of --add.")
 @options.features
-@click.option(
+@options.choice(
     "--landmarks",
-    type=click.Choice(["in-turn", "held"]),
-    default="in-turn",
-    show_default=True,
-    help="With --preset documented: landmarks updated alternately with the pose, or fixed at the result of "
+    "in-turn",
+    "held",
+    what="With --preset documented: landmarks updated alternately with the pose, or fixed at the result of "
     "landmark-mapping.",
 )
 @click.option("--truth", type=PATH, help="Ground truth: a trajectory file.")
@@ -67,13 +65,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.time_unit
 @options.repairs
 @options.held_out
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of the simulated drive and of the choice of held-out tracks.",
-)
+@options.seed("the simulated drive and of the choice of held-out tracks")
 @click.option(
     "--rerun",
     "rerun_file",
@@ -215,9 +207,7 @@ def diagnose(
 @options.as_recorded
 @options.repairs
 @options.held_out
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice of held-out tracks."
-)
+@options.seed("the choice of held-out tracks")
 def export(out: Path, force: bool, topics: str | None, settings: Path | None, **given: Any) -> int:
     """Write the problem that `fgbaseline run` would solve on RECORDING: npz, CSV and JSON.
 

@@ -24,7 +24,7 @@ from fgbaseline.data.formats.trajectory_reader import read_extrinsic
 from fgbaseline.data.formats.trajectory_text import OpenedTrajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ..name_list import names_in
+from ..run.defaults import names_in
 from .opening import split_name
 from .sources import TrajectoryLike, opened
 
@@ -54,18 +54,14 @@ def read_entries(
 ) -> Entries:
     """Reads all inputs. Raises InputError with the file and its fault."""
     run, problem, held = _background(reference, settings)
-    sources: list[Source] = []
-    if run is not None:
-        sources.append(run.files.trajectory(run.reference))
-    else:
-        sources.append(opened(cast("Given", reference), settings.form))
-    sources += [opened(given, settings.form) for given in estimates]
+    own = opened(cast("Given", reference), settings.form) if run is None else run.trajectory(run.reference)
+    sources = [own, *(opened(given, settings.form) for given in estimates)]
     first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
     beside = []
     if run is not None:
-        first = replace(first, landmarks=run.files.landmarks(run.reference), trust=run.trust)
+        first = replace(first, landmarks=run.landmarks(run.reference), trust=run.trust)
         beside = [
-            Entry(run.files.trajectory(name), run.files.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
+            Entry(run.trajectory(name), run.landmarks(name), by_product=name == f"{run.reference}{ONLINE}")
             for name in _beside(run, settings.beside)
         ]
     entries = _named_apart([first, *beside, *others])

@@ -1,6 +1,6 @@
 """The folder of a run as the reference of a comparison, and the problem behind a comparison."""
 
-import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,59 +9,46 @@ from fgbaseline.compare import Criterion, Trust, Verdict
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence, Trajectory, read, read_problem
-from fgbaseline.data.formats.named_file import reading, regular_file
+from fgbaseline.data.formats.named_file import reading
 from fgbaseline.geometry import InputError
 
 from ..results.documents import SUMMARY
 from ..results.reader import RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 
+NO_REFERENCE = "the run has no reference: none of its estimators succeeded; run it again"
+
 
 @dataclass(frozen=True, eq=False, slots=True)
-class RunInMemory:
-    """Trajectories and landmarks of a run that is in memory, as `RunFolder` reads them."""
-
-    run: Run
-
-    @property
-    def folder(self) -> str:
-        """Name of it in messages."""
-        return self.run.problem.sequence.name
-
-    def trajectory(self, name: str) -> Trajectory:
-        """The path of an estimator."""
-        return Trajectory.of_frames(self.run.problem.sequence.t, self.run.results[name].estimate.world_T_imu, name)
-
-    def landmarks(self, name: str) -> Landmarks:
-        """The landmarks of an estimator."""
-        return self.run.results[name].estimate.landmarks
-
-
-@dataclass(frozen=True, slots=True)
 class ReferenceRun:
-    """A run whose reference others are compared with."""
+    """A run whose reference others are compared with, in a folder or in memory."""
 
-    files: RunFolder | RunInMemory
+    name: str
+    """its name in messages"""
     reference: str
     trust: Trust
     names: tuple[str, ...]
     """the estimators that gave an answer"""
-    settings: dict[str, Any]
+    settings: Mapping[str, Any]
     up: tuple[float, ...] | None
     """up in the world of its trajectories; None in the summaries of older versions"""
+    trajectory: Callable[[str], Trajectory]
+    """the path of an estimator"""
+    landmarks: Callable[[str], Landmarks]
+    in_memory: Run | None = None
 
 
 def read_reference_run(folder: Path) -> ReferenceRun:
     """Reads the summary. Raises InputError with the file where the folder is not that of a run with a reference."""
-    path = folder / SUMMARY
+    files, path = RunFolder(folder), folder / SUMMARY
     if not path.is_file():
         raise InputError(
             f"{folder}: this folder has no {SUMMARY}, so it is not that of a run; give a trajectory file, or a folder "
             "that fgbaseline run wrote"
         )
+    summary = files.summary
     with reading(path):
         try:
-            summary = json.loads(regular_file(path).read_text(encoding="utf-8"))
             reference, estimators = summary["reference"], summary["estimators"]
             chosen = str(reference["name"])
             criteria = tuple(map(_criterion, reference.get("criteria", ())))
@@ -70,11 +57,11 @@ def read_reference_run(folder: Path) -> ReferenceRun:
             settings = dict(summary["settings"])
             up = summary["sequence"].get("up")
             up = None if up is None else tuple(map(float, up))
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         if chosen not in names:
-            raise InputError("the run has no reference: none of its estimators succeeded; run it again")
-    return ReferenceRun(RunFolder(folder), chosen, trust, names, settings, up)
+            raise InputError(NO_REFERENCE)
+    return ReferenceRun(str(folder), chosen, trust, names, settings, up, files.trajectory, files.landmarks)
 
 
 def _criterion(found: dict[str, Any]) -> Criterion:
@@ -85,10 +72,19 @@ def _criterion(found: dict[str, Any]) -> Criterion:
 def reference_in_memory(run: Run) -> ReferenceRun:
     """Reference of a run in memory. Raises InputError where it has none."""
     if run.reference is None:
-        raise InputError("the run has no reference: none of its estimators succeeded; run it again")
-    names = tuple(result.name for result in run.answered)
-    up = tuple(map(float, run.problem.sequence.up))
-    return ReferenceRun(RunInMemory(run), run.reference, run.trust, names, dict(run.settings), up)
+        raise InputError(NO_REFERENCE)
+    sequence, estimates = run.problem.sequence, {result.name: result.estimate for result in run.answered}
+    return ReferenceRun(
+        name=sequence.name,
+        reference=run.reference,
+        trust=run.trust,
+        names=tuple(estimates),
+        settings=run.settings,
+        up=tuple(map(float, sequence.up)),
+        trajectory=lambda name: Trajectory.of_frames(sequence.t, estimates[name].world_T_imu, name),
+        landmarks=lambda name: estimates[name].landmarks,
+        in_memory=run,
+    )
 
 
 def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem | None, HeldOut | None]:
@@ -103,10 +99,8 @@ def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem 
     if settings.held_out and (sequence is None or is_posed):
         raise InputError("held-out: the tracks come from a recording; give it with --sequence, not an exported folder")
     if sequence is None:
-        if run is None or not isinstance(run.files, RunInMemory):
-            return None, None
-        of = run.files.run
-        return of.problem, None if of.held_out is None else of.held_out.held
+        of = None if run is None else run.in_memory
+        return (None, None) if of is None else (of.problem, None if of.held_out is None else of.held_out.held)
     if isinstance(sequence, Problem):
         return sequence, None
     if isinstance(sequence, Path) and is_posed:
@@ -118,7 +112,7 @@ def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem 
         wanted = _settings_of(run, sequence)
         if settings.held_out not in (0.0, wanted.held_out):
             raise InputError(
-                f"held-out: {run.files.folder} was run with {wanted.held_out:g}; leave out --held-out, or run it again"
+                f"held-out: {run.name} was run with {wanted.held_out:g}; leave out --held-out, or run it again"
             )
     kept, held = hold_out_tracks(recorded, wanted)
     return build_problem(kept, wanted), held
@@ -140,6 +134,6 @@ def _settings_of(run: ReferenceRun, sequence: Path | Sequence) -> RunSettings:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"{run.files.folder}: its summary lacks the settings of its problem ({type(error).__name__}: {error}); "
+            f"{run.name}: its summary lacks the settings of its problem ({type(error).__name__}: {error}); "
             "give --sequence the folder of fgbaseline export"
         ) from error

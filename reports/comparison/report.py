@@ -24,9 +24,9 @@ from ..notebook import NotebookResult, write_report
 from ..phrases import comparison as phrases
 from ..results.comparison_summary import results_by_name, summarize
 from ..results.documents import COMPARISON
-from ..tables import Table, latex, markdown
 from ..tables.comparison import comparison_table, main_columns, main_frame, metrics_columns
 from ..tables.csv_file import write_csv
+from ..tables.table import Table, latex, markdown
 from .inputs import Given, GivenLandmarks, read_entries
 
 if TYPE_CHECKING:
@@ -143,11 +143,10 @@ class ComparisonReport(NotebookResult, Comparison):
             write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
         write_csv(folder / "table.csv", main_columns(self, self.by_name))
         write_csv(folder / "metrics.csv", metrics_columns(self, self.by_name))
-        as_dict = self.summary.model_dump(mode="json", by_alias=True)
         for file, text in {
             "table.md": markdown(self.text_table),
             "table.tex": latex(self.text_table),
-            COMPARISON: json.dumps(as_dict, indent=2, allow_nan=False) + "\n",
+            COMPARISON: json.dumps(self.summary.content, indent=2, allow_nan=False) + "\n",
         }.items():
             (folder / file).write_text(text, encoding="utf-8")
 

@@ -13,7 +13,7 @@ from fgbaseline.data.formats.named_file import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..results.documents import SUMMARY, drawn_file
+from ..results.documents import SUMMARY, document_in
 from ..results.reader import RunFolder
 from .panels import Line
 from .style import SCREEN, Style, colors, line, marked_line
@@ -163,7 +163,7 @@ def _series(result: "Result", n_frames: int) -> "pd.DataFrame":
 def of_folder(folder: Path) -> RunData:
     """Data of the run that left a folder. Raises InputError, naming the file, where it is none or lacks a file."""
     files = RunFolder(folder)
-    drawn_file(folder)
+    document_in(folder, "run or compare")
     summary = files.summary
     with reading(folder / SUMMARY):
         try:

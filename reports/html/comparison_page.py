@@ -12,8 +12,8 @@ from ..figures.saving import EncodedFigure
 from ..formatting import counted, number
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
-from ..tables import Row
 from ..tables.comparison import comparison_table
+from ..tables.table import Row
 from .comparison_plots import comparison_plots
 from .page import Folded, Grid, Live, Page, Section, figure_blocks, render_page, still_figures, trust
 from .templates import picture

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from ..figures.style import TRUTH
 from ..phrases.evidence import FIRST
 from ..results.metric import TERMS
-from ..tables import Table
+from ..tables.table import Table
 from .interactive import line_rules, policy, script
 from .plot_encoding import TRUTH_LINE, embedded_json
 from .templates import NO_SCRIPT, Picture, asset, environment

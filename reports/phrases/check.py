@@ -1,9 +1,12 @@
 """Sentences and texts of a check, for every form of output."""
 
+from collections.abc import Iterable
+
 from fgbaseline.compare.limits import Bounds, Outcome
 from fgbaseline.data.wording import plural
 
-from ..results.check import NEW, Checked, Line
+from ..results.check import NEW, Checked, Line, Shortage
+from ..results.reader import ReferenceRecord
 
 
 def verdict(checked: Checked) -> str:
@@ -22,6 +25,27 @@ def violated_limits(checked: Checked) -> str:
     """Number of violated limits: `1 of 12 limits is violated`."""
     n = checked.count[Outcome.VIOLATED]
     return f"{n} of {plural(len(checked.lines), 'limit')} {'is' if n == 1 else 'are'} violated"
+
+
+def untrusted_reference(run: str, reference: ReferenceRecord) -> str:
+    """Trust in a reference, with its first reason; `run` is empty where there is but one."""
+    name = f", {reference.name}," if reference.name else ""
+    why = f": {reference.reasons[0]}" if reference.reasons else ""
+    return f"The reference{f' of {run}' if run else ''}{name} is {reference.trust}{why}."
+
+
+def too_little_data(lines: Iterable[Line]) -> tuple[str, ...]:
+    """A sentence for each shortage and run, with its metrics and estimators."""
+    found: dict[tuple[Shortage, str], tuple[dict[str, None], dict[str, None]]] = {}
+    for line in lines:
+        if line.shortage is not None and line.value is not None:
+            metrics, names = found.setdefault((line.shortage, line.run), ({}, {}))
+            metrics[line.metric], names[line.estimator] = None, None
+    return tuple(
+        f"Too little data{f' in {run}' if run else ''} for {', '.join(metrics)} of {', '.join(names)}: "
+        f"{shortage.reason} (smallest_sample, smallest_coverage)."
+        for (shortage, run), (metrics, names) in found.items()
+    )
 
 
 def remarks(checked: Checked) -> list[str]:

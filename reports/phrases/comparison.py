@@ -8,7 +8,7 @@ from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 from fgbaseline.compare.trajectory_comparison.samples import samples
 
-from ..formatting import counted, listed, number, per_cent
+from ..formatting import counted, grouped, listed, number, per_cent
 from .evidence import (
     DEGREES_OF_FREEDOM,
     held_out_sentences,
@@ -21,9 +21,7 @@ from .position_errors import error_decompositions, file_resolution, maximum_erro
 
 def caption(comparison: Comparison) -> str:
     """Association, alignment, up and the kind of interval: stands under every table."""
-    names: dict[str, list[str]] = {}
-    for result in comparison.results.values():
-        names.setdefault(result.matched.caption, []).append(result.name)
+    names = grouped((result.matched.caption, result.name) for result in comparison.results.values())
     parts = [text if len(names) == 1 else f"{listed(those)}: {text}" for text, those in names.items()]
     up = ", ".join(f"{x:.3g}" for x in (np.round(comparison.up, 6) + 0.0))
     name = comparison.reference.name
@@ -107,10 +105,8 @@ def _time_offsets(comparison: Comparison) -> list[str]:
 
 
 def _unpaired_poses(comparison: Comparison) -> list[str]:
-    same: dict[tuple[int, int], list[str]] = {}
-    for result in comparison.results.values():
-        counts = (result.matched.left_out_estimate, result.matched.left_out_reference)
-        same.setdefault(counts, []).append(result.name)
+    paired = {result.name: result.matched for result in comparison.results.values()}
+    same = grouped(((m.left_out_estimate, m.left_out_reference), name) for name, m in paired.items())
     return [
         f"Not paired: {counted(here, 'pose')} of {listed(names)}, {number(there)} of {comparison.reference.name}."
         for (here, there), names in same.items()
@@ -137,8 +133,7 @@ def _rough_intervals(comparison: Comparison) -> list[str]:
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
     """Consistency of the covariances in the files of estimates, the overconfident ones first."""
-    sentences, measured, bad = [], dict[str, float](), []
-    remarks = dict[str, str]()
+    sentences, measured, remarks, bad = [], dict[str, float](), dict[str, str](), []
     for result in comparison.results.values():
         reported = result.reported_covariance
         if reported is None:
@@ -148,26 +143,19 @@ def _reported_covariances(comparison: Comparison) -> list[str]:
         known = reported.nees[~np.isnan(reported.nees)]
         if len(known):
             measured[result.name] = float(np.mean(known))
-            remarks[result.name] = (
-                f"over {counted(len(known), 'pose')}{'; ' if reported.remark else ''}{reported.remark}"
-            )
+            remark = f"; {reported.remark}" if reported.remark else ""
+            remarks[result.name] = f"over {counted(len(known), 'pose')}{remark}"
         if reported.not_positive_definite:
             n = number(reported.not_positive_definite)
             bad.append(f"{n} of the {counted(len(reported.nees), 'covariance')} of {result.name}")
-    for word, those in (
-        ("Overconfident", [name for name, mean in measured.items() if mean > overconfidence_bound()]),
-        ("Not overconfident", [name for name, mean in measured.items() if mean <= overconfidence_bound()]),
-    ):
-        each = listed(
-            f"{name} {number(float(np.sqrt(measured[name] / DEGREES_OF_FREEDOM)))} (NEES {number(measured[name])} "
-            f"{remarks[name]})"
-            for name in those
-        )
-        if those:
-            sentences.append(
-                f"{word}, by the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): "
-                f"{each}."
-            )
+    each = {
+        name: f"{name} {number(float(np.sqrt(mean / DEGREES_OF_FREEDOM)))} (NEES {number(mean)} {remarks[name]})"
+        for name, mean in measured.items()
+    }
+    for word, is_over in (("Overconfident", True), ("Not overconfident", False)):
+        if those := [each[name] for name, mean in measured.items() if (mean > overconfidence_bound()) is is_over]:
+            by = f"the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1)"
+            sentences.append(f"{word}, by {by}: {listed(those)}.")
     if bad:
         sentences.append(f"Not positive definite, and left out by NEES: {listed(bad)}.")
     return sentences

@@ -8,7 +8,7 @@ from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 from fgbaseline.data.wording import plural
 
-from ..formatting import listed, number, per_cent
+from ..formatting import grouped, listed, number, per_cent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,11 +68,8 @@ def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], on
     `most` has threshold (m) and maximum (with its unit) by name; `onset` has the times of exceedance, where there are
     any.
     """
-    names: dict[str, list[str]] = {}
-    for name, (bound, _) in most.items():
-        names.setdefault(threshold(bound), []).append(name)
     sentences = []
-    for text, those in names.items():
+    for text, those in grouped((threshold(bound), name) for name, (bound, _) in most.items()).items():
         each = listed(f"{name} {most[name][1]}" for name in those)
         beyond = "; ".join(f"{name} {onset[name]}" for name in onset if name in those)
         exceeded = f" Above the threshold: {beyond}." if beyond else ""

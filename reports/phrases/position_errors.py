@@ -8,7 +8,7 @@ from fgbaseline.compare import RmseDifference, distance_traveled
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.samples import coverage
 
-from ..formatting import MINUS, counted, interval, listed, number, per_cent, resolution, resolved
+from ..formatting import MINUS, counted, grouped, interval, listed, number, per_cent, resolution, resolved
 from .evidence import causal_estimate, threshold_sentences
 
 NOTABLE_SHARE = 0.05
@@ -60,15 +60,12 @@ def _order(comparison: Comparison) -> list[str]:
 
 def significance_sentences(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
     """Paired differences from the estimate with the smallest RMSE, `first`: the significant ones, and the others."""
-    groups: dict[bool, list[str]] = {True: [], False: []}
-    for name, d in behind.items():
-        groups[d.settled].append(f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
-    sentences = []
-    if groups[True]:
-        sentences.append(f"Larger position RMSE than {first}, by paired bootstrap: {listed(groups[True])}.")
-    if groups[False]:
-        sentences.append(f"No significant difference from {first}, by paired bootstrap: {listed(groups[False])}.")
-    return sentences
+    titles = {True: f"Larger position RMSE than {first}", False: f"No significant difference from {first}"}
+    groups = grouped(
+        (d.settled, f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
+        for name, d in behind.items()
+    )
+    return [f"{titles[k]}, by paired bootstrap: {listed(groups[k])}." for k in titles if k in groups]
 
 
 def _signed(meters: float) -> str:

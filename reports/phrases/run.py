@@ -25,7 +25,7 @@ from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
 
-from ..formatting import counted, distance, listed, number, per_cent
+from ..formatting import counted, distance, grouped, listed, number, per_cent
 from ..results.evidence import frame_ranges, summarize_sigma
 from .evidence import (
     DEGREES_OF_FREEDOM,
@@ -35,8 +35,7 @@ from .evidence import (
     sample_requirement,
     threshold_sentences,
 )
-from .overconfidence import overconfidence_sentences
-from .run_accuracy import ate_sentences, divergence_sentences
+from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences
 
 SUSPECTED = "wrong matches, moving points or undetermined points"
 """reasons of `WRONG_MATCH`"""
@@ -150,17 +149,13 @@ def _maximum_divergence(run: Run) -> list[str]:
 
 def _with_status(status: Status, run: Run) -> list[str]:
     """Estimators that ended with a status, by reason."""
-    reasons: dict[str, list[str]] = {}
-    for result in run.results.values():
-        if result.estimate.status is status:
-            reasons.setdefault(result.estimate.reason or "no reason was given", []).append(result.name)
+    found = {name: result.estimate for name, result in run.results.items() if result.estimate.status is status}
+    reasons = grouped((estimate.reason or "no reason was given", name) for name, estimate in found.items())
     return [f"{listed(names)} {status.value}: {reason.rstrip('.')}." for reason, names in reasons.items()]
 
 
 def _missing_poses(run: Run) -> list[str]:
-    names: dict[int, list[str]] = {}
-    for result in run.answered:
-        names.setdefault(int(np.isnan(result.estimate.world_T_imu[:, 0, 0]).sum()), []).append(result.name)
+    names = grouped((int(np.isnan(r.estimate.world_T_imu[:, 0, 0]).sum()), r.name) for r in run.answered)
     return [
         f"{listed(those)} {'has' if len(those) == 1 else 'have'} no pose in {missing} of "
         f"{counted(run.problem.n_frames, 'frame')}."
@@ -253,13 +248,12 @@ def _assumed_noise(run: Run) -> list[str]:
     problem = run.problem
     if problem.diagnosed:
         return []
+    pixels = number(float(np.sqrt(problem.pixel_variance)))
     if problem.imu is not None:
         return [
-            f"Not diagnosed: {number(float(np.sqrt(problem.pixel_variance)))} px are assumed as noise (1-sigma), not "
-            "estimated from this recording; the noise of the inertial samples is as given."
+            f"Not diagnosed: {pixels} px are assumed as noise (1-sigma), not estimated from this recording; the noise "
+            "of the inertial samples is as given."
         ]
     sigma = np.sqrt(np.median(np.diagonal(problem.increment_covariance, axis1=1, axis2=2), axis=0))
-    return [
-        f"Not diagnosed: the noise (1-sigma) is assumed, {number(float(np.sqrt(problem.pixel_variance)))} px, "
-        f"{number(float(sigma[:3].max()))} m and {number(float(np.rad2deg(sigma[3:].max())))}° per frame."
-    ]
+    motion = f"{number(float(sigma[:3].max()))} m and {number(float(np.rad2deg(sigma[3:].max())))}° per frame"
+    return [f"Not diagnosed: the noise (1-sigma) is assumed, {pixels} px, {motion}."]

@@ -108,39 +108,22 @@ def missing_claims(studies: Several[Study]) -> list[Claim]:
 
 def _samples(study: Study, paper: PaperRecording) -> Claim:
     sequence = study.subject.recorded
-    seconds = float(sequence.t[-1] - sequence.t[0])
-    return claim_on(
-        study,
-        "samples",
-        f"the data is given over {paper.frames} seconds",
-        Verdict.FALSE,
-        f"{plural(sequence.n_frames, 'frame')} in {seconds:.1f} s",
-        f"{paper.frames} is the number of samples, at {1 / np.median(sequence.dt):.1f} Hz",
-    )
+    claim = f"the data is given over {paper.frames} seconds"
+    found = f"{plural(sequence.n_frames, 'frame')} in {float(sequence.t[-1] - sequence.t[0]):.1f} s"
+    why = f"{paper.frames} is the number of samples, at {1 / np.median(sequence.dt):.1f} Hz"
+    return claim_on(study, "samples", claim, Verdict.FALSE, found, why)
 
 
 def _features(study: Study, paper: PaperRecording) -> Claim:
-    claim = f"it has {paper.tracks} features"
+    claim, recorded = f"it has {paper.tracks} features", study.subject.recorded
     if study.subject.stand_in is not None:
-        return claim_on(
-            study,
-            "features",
-            claim,
-            Verdict.CANNOT_TELL,
-            "the given recording has no features",
-            "this number was simulated in their place",
-        )
-    o = study.subject.recorded.observations
-    tracks = len(np.unique(o.landmark))
-    return claim_on(
-        study,
-        "features",
-        claim,
-        Verdict.HOLDS if tracks == paper.tracks else Verdict.FALSE,
-        f"{plural(tracks, 'track')}, {plural(len(o), 'observation')}",
-        f"on average {len(o) / max(1, tracks):.0f} frames per track and "
-        f"{len(o) / study.subject.recorded.n_frames:.0f} tracks per frame",
-    )
+        found, why = "the given recording has no features", "this number was simulated in their place"
+        return claim_on(study, "features", claim, Verdict.CANNOT_TELL, found, why)
+    n, tracks = len(recorded.observations), len(np.unique(recorded.observations.landmark))
+    verdict = Verdict.HOLDS if tracks == paper.tracks else Verdict.FALSE
+    found = f"{plural(tracks, 'track')}, {plural(n, 'observation')}"
+    why = f"on average {n / max(1, tracks):.0f} frames per track and {n / recorded.n_frames:.0f} tracks per frame"
+    return claim_on(study, "features", claim, verdict, found, why)
 
 
 def _predicted(study: Study) -> Claim:
@@ -178,14 +161,7 @@ def _mapped(study: Study) -> Claim:
 def _works(study: Study) -> Claim:
     now, features = study.recorded, study.recorded.features
     good = not now.breaks and now.reprojection < MAX_REPROJECTION
-    lost = (
-        ""
-        if now.lost == 0
-        else (
-            f", and the printed covariance is not positive definite at {plural(now.lost, 'frame')}, "
-            f"first at {now.first_lost}"
-        )
-    )
+    lost = f", and the printed {_lost(now)}, first at {now.first_lost}" if now.lost else ""
     return claim_on(
         study,
         "works",
@@ -266,8 +242,5 @@ def _correction(outcome: Outcome) -> str:
 
 
 def _lost(outcome: Outcome) -> str:
-    return (
-        "all covariances positive definite"
-        if outcome.lost == 0
-        else f"covariance not positive definite at {plural(outcome.lost, 'frame')}"
-    )
+    frames = plural(outcome.lost, "frame")
+    return f"covariance not positive definite at {frames}" if outcome.lost else "all covariances positive definite"

@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Sequence as Several
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,24 +18,16 @@ from fgbaseline.geometry import InputError
 from ..figures import save
 from ..figures.reproduction import draw
 from ..progress import reporter
-from ..tables import print_table
+from ..tables.table import print_table
 from .claims import Claim, claims_of, missing_claims
 from .page import claims_table, render
 from .recordings import read_subjects
-from .study import Outcome, Study, SweepSettings, stages_of, study_recording
+from .study import Study, SweepSettings, stages_of, study_recording
 
 MARK = "claims.json"
 """the file that marks a reproduction's folder"""
 UNWRAPPED = 150
 """columns of the table where no terminal says how many there are"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Reproduction:
-    """Studies and claims of all recordings."""
-
-    studies: list[Study]
-    claims: list[Claim]
 
 
 def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: bool) -> int:
@@ -60,7 +52,7 @@ def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: b
     claims = [*(claim for one in studies for claim in claims_of(one)), *missing_claims(studies)]
     progress.print_line("writing the report")
     with atomic_folder(out, force=force, mark=MARK) as folder:
-        write(Reproduction(studies, claims), folder)
+        write(studies, claims, folder)
     print_table(claims_table(claims), width=UNWRAPPED, spaced=True)
     click.echo(f"\nThe report is in {out / 'report.html'}")
     return 0
@@ -72,26 +64,22 @@ def _require_distinct(sweep: SweepSettings) -> None:
             raise InputError(f"{name}: a value is given twice in {', '.join(f'{v:g}' for v in values)}; give each once")
 
 
-def write(reproduction: Reproduction, folder: Path) -> None:
-    """Writes all files into an existing, empty folder."""
-    figures = draw(reproduction.studies)
+def write(studies: Several[Study], claims: Several[Claim], folder: Path) -> None:
+    """Writes all files into an existing, empty folder; NaN and infinity are null in `claims.json`."""
+    figures = draw(studies)
     (folder / "figures").mkdir()
     save(figures, folder / "figures", forms=("png", "svg", "pdf"))
-    _tables(reproduction, folder)
-    page = render(reproduction.studies, reproduction.claims, figures)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    text = json.dumps(as_dict(reproduction), indent=2, allow_nan=False, ensure_ascii=False)
-    (folder / MARK).write_text(text + "\n", encoding="utf-8")
-
-
-def as_dict(reproduction: Reproduction) -> dict[str, Any]:
-    """The content of `claims.json`; NaN and infinity are null."""
-    return {
+    _write_csv(folder / "claims.csv", [asdict(claim) for claim in claims])
+    _write_csv(folder / "sweep.csv", [row for study in studies for row in _sweep(study)])
+    (folder / "report.html").write_text(render(studies, claims, figures), encoding="utf-8")
+    document = {
         "schema": "fgbaseline/reproduction/1",
         "version": version("fgbaseline"),
-        "claims": [asdict(claim) for claim in reproduction.claims],
-        "recordings": [_recording(study) for study in reproduction.studies],
+        "claims": [asdict(claim) for claim in claims],
+        "recordings": [_recording(study) for study in studies],
     }
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / MARK).write_text(text + "\n", encoding="utf-8")
 
 
 def _recording(study: Study) -> dict[str, Any]:
@@ -114,18 +102,15 @@ def _recording(study: Study) -> dict[str, Any]:
     }
 
 
-def _tables(reproduction: Reproduction, folder: Path) -> None:
-    claims = [asdict(claim) for claim in reproduction.claims]
-    sweep: list[dict[str, object]] = []
-    for study in reproduction.studies:
-        every: list[tuple[str, list[Outcome]]] = [
-            ("as recorded", [*study.swept, *study.held]),
-            ("repaired", study.swept_repaired),
-        ]
-        name = study.subject.label
-        sweep += [{"recording": name, "state": state, **o.record()} for state, runs in every for o in runs]
-    for name, rows in (("claims", claims), ("sweep", sweep)):
-        with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+def _sweep(study: Study) -> list[dict[str, object]]:
+    """Rows of the outcomes of the sweep, on the recording as it is and repaired."""
+    states = {"as recorded": [*study.swept, *study.held], "repaired": study.swept_repaired}
+    name = study.subject.label
+    return [{"recording": name, "state": state, **o.record()} for state, runs in states.items() for o in runs]
+
+
+def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)

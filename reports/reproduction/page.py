@@ -10,7 +10,7 @@ from fgbaseline.data.wording import plural
 
 from ..formatting import meters, number, per_cent
 from ..html.templates import environment, picture
-from ..tables import Cell, Column, Row, Table
+from ..tables.table import Column, Row, Table, figures, words
 from .claims import Claim, Verdict
 from .study import Outcome, Study
 
@@ -22,15 +22,11 @@ BADGES: Mapping[str, str] = {
 }
 """style of each verdict: good, fair and poor"""
 STAGES = (
-    Column("repaired", words=True),
-    Column("from dead reckoning, RMS"),
-    Column("largest"),
+    *words("repaired"),
+    *figures("from dead reckoning, RMS", "largest"),
     Column("reprojection", unit="px"),
-    Column("cheirality violated"),
-    Column("frames, not positive definite"),
-    Column("correction per update, RMS"),
+    *figures("cheirality violated", "frames, not positive definite", "correction per update, RMS"),
 )
-FROM_TRUTH = Column("from ground truth, RMS")
 SWEEP = (
     "Landmarks updated in turn with the pose, W as in the source paper. Numbers: RMS distance from dead reckoning "
     "(darker: larger), and frames where the printed covariance is not positive definite. Below: the filter of figure 9 "
@@ -61,15 +57,9 @@ def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str
 
 def claims_table(claims: Several[Claim]) -> Table:
     """Table of the claims by recording, for the terminal."""
-    rows = (
-        Row(
-            f"{claim.recording} (simulated)" if claim.simulated else claim.recording,
-            (Cell(claim.claim), Cell(claim.verdict), Cell(claim.measured)),
-        )
-        for claim in claims
-    )
-    columns = tuple(Column(title, words=True) for title in ("claim of the source paper", "verdict", "measured"))
-    return Table(columns, tuple(rows), name="recording")
+    names = (f"{claim.recording} (simulated)" if claim.simulated else claim.recording for claim in claims)
+    rows = (Row.of(name, c.claim, c.verdict, c.measured) for name, c in zip(names, claims, strict=True))
+    return Table(words("claim of the source paper", "verdict", "measured"), tuple(rows), name="recording")
 
 
 def _stages(study: Study) -> Table:
@@ -81,8 +71,8 @@ def _stages(study: Study) -> Table:
         texts = [staged.stage.cause or "–", meters(o.apart_rmse), meters(o.apart_max), number(o.reprojection)]
         texts += [per_cent(o.behind), number(o.lost), meters(o.correction_m)]
         texts += [meters(o.truth_rmse)] if truth else []
-        rows.append(Row(staged.stage.name, tuple(map(Cell, texts))))
-    columns = (*STAGES, FROM_TRUTH) if truth else STAGES
+        rows.append(Row.of(staged.stage.name, *texts))
+    columns = (*STAGES, *(figures("from ground truth, RMS") if truth else ()))
     return Table(columns, tuple(rows), name="stage", title=study.subject.label)
 
 

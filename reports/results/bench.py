@@ -110,28 +110,17 @@ def overall(results: Results) -> pd.DataFrame:
 
     A case counts once, however many seeds it has. An estimator without an answer in a case comes last there.
     """
-    ranked = rankings(results)
-    parts = []
+    ranked, rows = rankings(results), []
     for metric in dict.fromkeys(ranked["metric"]) if len(ranked) else ():
         of_metric = ranked[ranked["metric"] == metric].pivot_table(index="case", columns="estimator", values="rank")
         places = of_metric.reindex(columns=results.estimators).fillna(len(results.estimators))
         if len(places) < 2:
             continue
         means = {name: compare.mean_interval(places[name].to_numpy(dtype=np.float64)) for name in places}
-        rows = [
-            {
-                "metric": metric,
-                "estimator": name,
-                "cases": mean.n,
-                "mean_rank": mean.value,
-                "low": max(mean.low, 1.0),
-                "high": min(mean.high, float(len(means))),
-                "first": int((places[name] == 1).sum()),
-            }
-            for name, mean in sorted(means.items(), key=lambda item: item[1].value)
-        ]
-        parts += rows
-    return pd.DataFrame(parts)
+        for name, mean in sorted(means.items(), key=lambda item: item[1].value):
+            low, high = max(mean.low, 1.0), min(mean.high, float(len(means)))
+            rows.append((metric, name, mean.n, mean.value, low, high, int((places[name] == 1).sum())))
+    return pd.DataFrame(rows, columns=["metric", "estimator", "cases", "mean_rank", "low", "high", "first"])
 
 
 def consistency(results: Results) -> pd.DataFrame:
@@ -149,13 +138,8 @@ def consistency(results: Results) -> pd.DataFrame:
 
 def nees_over_time(results: Results) -> pd.DataFrame:
     """ANEES frame by frame of each case and estimator, with its bounds: see `compare.average_nees`."""
-    parts = []
-    for (case, name), columns in results.nees.items():
-        table = compare.average_nees(columns).reset_index()
-        table.insert(0, "estimator", name)
-        table.insert(0, "case", case)
-        parts.append(table)
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+    tables = {key: compare.average_nees(columns) for key, columns in results.nees.items()}
+    return pd.concat(tables, names=["case", "estimator"]).reset_index() if tables else pd.DataFrame()
 
 
 def costs(results: Results) -> pd.DataFrame:
@@ -163,21 +147,11 @@ def costs(results: Results) -> pd.DataFrame:
     rows = []
     for (case, estimator), group in results.costs.groupby(["case", "estimator"], sort=False):
         seconds = compare.mean_interval(group["seconds"].to_numpy(dtype=np.float64))
-        rows.append(
-            {
-                "case": case,
-                "estimator": estimator,
-                "seconds": seconds.value,
-                "seconds_low": seconds.low,
-                "seconds_high": seconds.high,
-                "ms_per_frame": 1e3 * float((group["seconds"] / group["frames"]).mean()),
-                "memory_mb": float(group["memory_mb"].astype(np.float64).max()),
-            }
-        )
-    return pd.DataFrame(
-        rows,
-        columns=["case", "estimator", "seconds", "seconds_low", "seconds_high", "ms_per_frame", "memory_mb"],
-    )
+        each_frame = 1e3 * float((group["seconds"] / group["frames"]).mean())
+        memory = float(group["memory_mb"].astype(np.float64).max())
+        rows.append((case, estimator, seconds.value, seconds.low, seconds.high, each_frame, memory))
+    columns = ["case", "estimator", "seconds", "seconds_low", "seconds_high", "ms_per_frame", "memory_mb"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def judge(results: Results) -> Metric | None:

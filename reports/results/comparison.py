@@ -1,11 +1,10 @@
 """Model of `comparison.json`; `make schema` writes docs/comparison.schema.json."""
 
-import json
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from fgbaseline.reports.results.statistics import Nees, Number, Part, Reprojection
+from fgbaseline.reports.results.parts import Document, Nees, Number, Part, Reprojection
 
 SCHEMA: Final = "fgbaseline/comparison/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
@@ -237,7 +236,7 @@ class Up(Part):
     source: Annotated[str, Field(description="from where it is known: an option, a format, a run, a recording")]
 
 
-class Summary(Part):
+class Summary(Document):
     """A comparison."""
 
     schema_: Annotated[Literal["fgbaseline/comparison/1"], Field(alias="schema")] = SCHEMA
@@ -256,11 +255,5 @@ class Summary(Part):
         return {name: part.model_dump(mode="json") for name, part in parts.items()}
 
 
-def json_schema() -> str:
-    """JSON schema of `comparison.json`, as text."""
-    schema = Summary.model_json_schema(by_alias=True, mode="serialization")
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
-
-
 if __name__ == "__main__":
-    print(json_schema())
+    print(Summary.json_schema())

@@ -14,7 +14,7 @@ from fgbaseline.compare.statistics.block_bootstrap import Bounded, ErrorStatisti
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
 
-from .json_tree import INFINITE, finite, nulls
+from .documents import INFINITE, finite, nulls
 
 if TYPE_CHECKING:
     import pandas as pd

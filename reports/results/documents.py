@@ -1,9 +1,11 @@
 """JSON files that the commands leave, as they stand: read without the models, whose imports take longer than a fault.
 
-`reader` and the models of the results say what is in them.
+`reader` and the models of the results say what is in them. `at` to `nulls` go through their tree of dicts by paths.
 """
 
 import json
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ SUMMARY = "summary.json"
 """results of `run` and `bench`, and the file that identifies a run's folder"""
 COMPARISON = "comparison.json"
 """results of `compare`, and the file that identifies a comparison's folder"""
+INFINITE = "infinite"
+"""the note of a value that is infinite, which JSON has as null"""
 
 
 def read_document(path: Path) -> dict[str, Any]:
@@ -31,9 +35,9 @@ def read_document(path: Path) -> dict[str, Any]:
         return document
 
 
-def measured_file(folder: Path) -> Path:
-    """The summary.json or comparison.json of a folder. Raises InputError where it has none."""
-    wanted = "give one that fgbaseline run, compare or bench wrote"
+def document_in(folder: Path, writers: str = "run, compare or bench") -> Path:
+    """The summary.json or comparison.json of a folder that `writers` write. Raises InputError where it has none."""
+    wanted = f"give one that fgbaseline {writers} wrote"
     if not folder.is_dir():
         raise InputError(f"{shown(folder)}: there is no such folder; {wanted}")
     found = [folder / name for name in (SUMMARY, COMPARISON) if (folder / name).is_file()]
@@ -42,9 +46,33 @@ def measured_file(folder: Path) -> Path:
     return found[0]
 
 
-def drawn_file(folder: Path) -> Path:
-    """The comparison.json or summary.json of a folder whose figures are drawn. Raises InputError where it has none."""
-    found = [folder / name for name in (COMPARISON, SUMMARY) if (folder / name).is_file()]
-    if not found:
-        raise InputError(f"{folder}: it has no {SUMMARY}; give the folder that fgbaseline run or compare wrote")
-    return found[0]
+def at(tree: Any, *path: str) -> Any:
+    """The value at a path of keys; None where a key on the way is missing."""
+    for key in path:
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return tree
+
+
+def leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """The path (keys joined by dots) and the value of everything that is not itself a mapping."""
+    if isinstance(tree, Mapping):
+        for key, inner in tree.items():
+            yield from leaves(inner, f"{path}.{key}" if path else str(key))
+    else:
+        yield path, tree
+
+
+def finite(tree: Any) -> Any:
+    """The tree with None for every float that is not finite; keys are text, tuples are lists."""
+    if isinstance(tree, Mapping):
+        return {str(key): finite(inner) for key, inner in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [finite(inner) for inner in tree]
+    return None if isinstance(tree, float) and not math.isfinite(tree) else tree
+
+
+def nulls(tree: Any) -> Iterator[tuple[str, bool]]:
+    """The path of every value that is None or not finite, and whether it is infinite."""
+    for path, value in leaves(tree):
+        if value is None or (isinstance(value, float) and not math.isfinite(value)):
+            yield path, value is not None and math.isinf(value)

@@ -14,6 +14,7 @@ from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.sample_sizes import samples
 
+from .documents import INFINITE, nulls
 from .evidence import (
     CovarianceCount,
     HeldOutError,
@@ -28,10 +29,9 @@ from .evidence import (
     summarize_evidence,
 )
 from .inertial import QuantityDivergence, QuantityError, StateNees, inertial_notes, summarize_inertial
-from .json_tree import INFINITE, nulls
 from .metric import TERMS, Metric
 from .metrics import MEASURED, NOT_MEASURED, measured
-from .statistics import Divergence, Number, Part, PoseSigma, Reprojection, Spread
+from .parts import Divergence, Number, Part, PoseSigma, Reprojection, Spread
 
 
 class Component(Part):

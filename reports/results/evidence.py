@@ -14,7 +14,7 @@ from fgbaseline.compare import CovarianceState, share_inside_bounds
 from fgbaseline.compare.estimate_comparison import Evidence, Result, Run
 from fgbaseline.geometry import FloatArray
 
-from .statistics import Nees, Number, Part, PoseSigma
+from .parts import Nees, Number, Part, PoseSigma
 
 
 class NeesInDetail(Nees):

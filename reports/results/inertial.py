@@ -12,7 +12,7 @@ from fgbaseline.compare.estimate_comparison import InertialEvidence, Result, Run
 from fgbaseline.geometry.strapdown import BLOCKS
 
 from .evidence import REFERENCE, statistics_of
-from .statistics import Number, Part, Spread
+from .parts import Number, Part, Spread
 
 
 class QuantityDivergence(Spread):

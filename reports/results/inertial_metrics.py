@@ -1,29 +1,33 @@
-"""Metrics of runs on raw inertial data: velocity, biases and the NEES of the state. Other runs have none of them."""
+"""Metrics of runs on raw inertial data, which other runs do not have: velocity, biases, NEES of the state; and of one
+camera: errors after SE(3) and Sim(3) alignment side by side, and the scale between them.
+"""
 
+from math import nan
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fgbaseline import compare
+from fgbaseline.compare import Align, Alignment
 from fgbaseline.compare.limits import Better
 from fgbaseline.geometry.strapdown import BLOCKS
 
-from .metric import (
-    ACCELEROMETER_BIAS,
-    CONSISTENCY,
-    EVIDENCE,
-    GYROSCOPE_BIAS,
-    MAIN,
-    STATE_NEES,
-    TERMINAL,
-    VELOCITY,
-    Metric,
-)
+from . import metric as group
+from .metric import EVIDENCE, MAIN, TERMINAL, Metric
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Result, Run
 
 LOWER, PERCENT = Better.LOWER, 100.0
-UNITS = {VELOCITY: "m/s", GYROSCOPE_BIAS: "rad/s", ACCELEROMETER_BIAS: "m/s^2"}
+UNITS = {group.VELOCITY: "m/s", group.GYROSCOPE_BIAS: "rad/s", group.ACCELEROMETER_BIAS: "m/s^2"}
 """quantity -> unit; the key of a quantity has _ in place of the space"""
+NO_SCALE = "one camera with ground truth has it"
 
 
 def _of_quantity(quantity: str, unit: str) -> tuple[Metric, ...]:
     key = quantity.replace(" ", "_")
-    aligned = ", aligned" if quantity == VELOCITY else ""
-    unaligned = "velocity_unaligned" if quantity == VELOCITY else key
+    aligned = ", aligned" if quantity == group.VELOCITY else ""
+    unaligned = "velocity_unaligned" if quantity == group.VELOCITY else key
     return (
         Metric((key, "rmse"), quantity, f"RMSE{aligned}", unit, LOWER, MAIN | TERMINAL),
         *([Metric((unaligned, "rmse"), quantity, "RMSE, unaligned", unit, LOWER, EVIDENCE)] if aligned else []),
@@ -33,16 +37,59 @@ def _of_quantity(quantity: str, unit: str) -> tuple[Metric, ...]:
     )
 
 
+def _alignment(run: "Run", result: "Result", kind: Align) -> tuple[Alignment, float] | None:
+    """Alignment to the truth, and the RMSE after it, m; None for a stereo pair or without truth."""
+    sequence, poses = run.problem.sequence, result.estimate.world_T_imu
+    if not sequence.monocular or sequence.truth is None:
+        return None
+    both = sequence.truth.known & np.isfinite(poses).all(axis=(1, 2))
+    if both.sum() < 3:
+        return None
+    found = compare.align(poses[both], sequence.truth.world_T_imu[both], kind)
+    apart = found.apply(poses[both])[:, :3, 3] - sequence.truth.world_T_imu[both, :3, 3]
+    return found, float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def _rmse(kind: Align, name: str) -> Metric:
+    def measure(run: "Run", result: "Result") -> float:
+        found = _alignment(run, result, kind)
+        return nan if found is None else found[1]
+
+    return Metric((f"ate_{kind}",), group.ATE, f"RMSE, {name}", "m", LOWER, MAIN, absent=NO_SCALE, measure=measure)
+
+
+def _scale_error(run: "Run", result: "Result") -> float:
+    found = _alignment(run, result, Align.SIM3)
+    return nan if found is None or not found[0].scale > 0.0 else 1.0 / found[0].scale - 1.0
+
+
 VELOCITY_AND_BIASES = tuple(metric for quantity, unit in UNITS.items() for metric in _of_quantity(quantity, unit))
-MAIN_STATE_NEES = (
-    Metric(
-        ("nees_state", "median"), CONSISTENCY, "NEES of 15", tables=MAIN | TERMINAL, term=STATE_NEES, brief="NEES of 15"
-    ),
+STATE_NEES = Metric(
+    ("nees_state", "median"),
+    group.CONSISTENCY,
+    "NEES of 15",
+    tables=MAIN | TERMINAL,
+    term=group.STATE_NEES,
+    brief="NEES of 15",
 )
 BLOCK_NEES = (
-    Metric(("nees_state", "mean"), STATE_NEES, "mean", tables=EVIDENCE),
+    Metric(("nees_state", "mean"), group.STATE_NEES, "mean", tables=EVIDENCE),
     *(
-        Metric(("nees_state", block, "mean"), STATE_NEES, f"mean, {block.replace('_', ' ')}", tables=EVIDENCE)
+        Metric(("nees_state", block, "mean"), group.STATE_NEES, f"mean, {block.replace('_', ' ')}", tables=EVIDENCE)
         for block in BLOCKS
+    ),
+)
+SCALE = (
+    _rmse(Align.SE3, "SE(3)"),
+    _rmse(Align.SIM3, "Sim(3)"),
+    Metric(
+        ("scale_error",),
+        group.SCALE_ERROR,
+        "by Sim(3)",
+        "%",
+        tables=MAIN | TERMINAL,
+        scale=PERCENT,
+        absent=NO_SCALE,
+        measure=_scale_error,
     ),
 )

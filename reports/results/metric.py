@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fgbaseline.compare.limits import Better
 
 from ..formatting import RESOLUTION, interval, number, resolved
-from .json_tree import at
+from .documents import at
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
@@ -136,10 +136,10 @@ class Metric:
     """whether it stands in a run's table only where it is not 0 for all"""
     count: bool = False
     """whether it is a whole number"""
-    absent: str = ""
-    """why it may be missing, where the results do not say"""
     measure: "Callable[[Run, Result], float] | None" = None
     """its value, where no model of the results has it"""
+    absent: str = ""
+    """why what it measures may be missing"""
 
     @property
     def key(self) -> str:

@@ -16,40 +16,15 @@ from fgbaseline.compare.limits import Better
 from fgbaseline.compare.trajectory_comparison.resolution import truth_resolution
 
 from ..formatting import RESOLUTION
-from .inertial_metrics import BLOCK_NEES, MAIN_STATE_NEES, VELOCITY_AND_BIASES
-from .metric import (
-    ATE,
-    BENCH,
-    COMPARISON,
-    CONSISTENCY,
-    DELTA,
-    DIVERGENCE,
-    EVIDENCE,
-    HELD_OUT,
-    MAIN,
-    MAP,
-    NEES,
-    OBSERVATIONS,
-    REFERENCE_NEES,
-    REPROJECTION,
-    RESIDUALS,
-    RPE,
-    RUNTIME,
-    SEGMENTS,
-    SIGMA,
-    TERMINAL,
-    Metric,
-    Tables,
-)
-from .monocular_metrics import SCALE
+from . import metric as group
+from .inertial_metrics import BLOCK_NEES, SCALE, STATE_NEES, VELOCITY_AND_BIASES
+from .metric import BENCH, COMPARISON, EVIDENCE, MAIN, TERMINAL, Metric, Tables
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
 
 LOWER, HIGHER, PERCENT = Better.LOWER, Better.HIGHER, 100.0
 COMMON = "RMSE over common frames"
-NO_TRUTH = "no frame has both a pose and truth"
-NO_LANDMARK = "no observed landmark was estimated"
 NOT_MEASURED = "not measured"
 
 
@@ -75,20 +50,11 @@ METRICS = (
         uneven_only=True,
         measure=_coverage,
     ),
-    Metric(("ate", "rmse"), ATE, "RMSE, aligned", "m", LOWER, MAIN | TERMINAL, brief="ATE, aligned", absent=NO_TRUTH),
-    Metric(
-        ("ate_unaligned", "rmse"),
-        ATE,
-        "RMSE, unaligned",
-        "m",
-        LOWER,
-        MAIN | TERMINAL,
-        brief="unaligned",
-        absent=NO_TRUTH,
-    ),
+    Metric(("ate", "rmse"), group.ATE, "RMSE, aligned", "m", LOWER, MAIN | TERMINAL, brief="ATE, aligned"),
+    Metric(("ate_unaligned", "rmse"), group.ATE, "RMSE, unaligned", "m", LOWER, MAIN | TERMINAL, brief="unaligned"),
     Metric(
         ("ate_common", "rmse"),
-        ATE,
+        group.ATE,
         COMMON,
         "m",
         LOWER,
@@ -98,21 +64,21 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("ate", "max"), ATE, "max, aligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
-    Metric(("ate_unaligned", "final"), ATE, "final, unaligned", "m", LOWER, EVIDENCE, absent=NO_TRUTH),
-    Metric(("translation", "rmse"), ATE, "RMSE", "m", LOWER, COMPARISON),
-    Metric(("common", "rmse"), ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
-    Metric(("behind",), ATE, "RMSE above the smallest", "m", tables=COMPARISON),
-    Metric(("translation", "mean"), ATE, "mean", "m", LOWER, COMPARISON),
-    Metric(("translation", "median"), ATE, "median", "m", LOWER, COMPARISON),
-    Metric(("translation", "std"), ATE, "standard deviation", "m", tables=COMPARISON),
-    Metric(("translation", "min"), ATE, "min", "m", tables=COMPARISON),
-    Metric(("translation", "max"), ATE, "max", "m", LOWER, COMPARISON),
-    Metric(("rotation_deg", "rmse"), ATE, "rotation RMSE", "°", LOWER, COMPARISON),
-    Metric(("divergence", "rmse"), DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
+    Metric(("ate", "max"), group.ATE, "max, aligned", "m", LOWER, EVIDENCE),
+    Metric(("ate_unaligned", "final"), group.ATE, "final, unaligned", "m", LOWER, EVIDENCE),
+    Metric(("translation", "rmse"), group.ATE, "RMSE", "m", LOWER, COMPARISON),
+    Metric(("common", "rmse"), group.ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
+    Metric(("behind",), group.ATE, "RMSE above the smallest", "m", tables=COMPARISON),
+    Metric(("translation", "mean"), group.ATE, "mean", "m", LOWER, COMPARISON),
+    Metric(("translation", "median"), group.ATE, "median", "m", LOWER, COMPARISON),
+    Metric(("translation", "std"), group.ATE, "standard deviation", "m", tables=COMPARISON),
+    Metric(("translation", "min"), group.ATE, "min", "m", tables=COMPARISON),
+    Metric(("translation", "max"), group.ATE, "max", "m", LOWER, COMPARISON),
+    Metric(("rotation_deg", "rmse"), group.ATE, "rotation RMSE", "°", LOWER, COMPARISON),
+    Metric(("divergence", "rmse"), group.DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
     Metric(
         ("divergence_common", "rmse"),
-        DIVERGENCE,
+        group.DIVERGENCE,
         COMMON,
         "m",
         LOWER,
@@ -121,51 +87,45 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("divergence", "max"), DIVERGENCE, "max", "m", LOWER, MAIN),
-    Metric(("divergence", "final"), DIVERGENCE, "final", "m", LOWER, EVIDENCE),
-    Metric(("divergence", "rotation_rmse_deg"), DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    Metric(("divergence", "max"), group.DIVERGENCE, "max", "m", LOWER, MAIN),
+    Metric(("divergence", "final"), group.DIVERGENCE, "final", "m", LOWER, EVIDENCE),
+    Metric(("divergence", "rotation_rmse_deg"), group.DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
     *SCALE,
     *VELOCITY_AND_BIASES,
-    Metric(("sigma", "position_rmse"), SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed sigma (3D)"),
-    Metric(("sigma", "position_final"), SIGMA, "claimed, final", "m", tables=EVIDENCE),
-    Metric(("sigma_ratio", "position"), CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
     Metric(
-        ("nees", "median"),
-        CONSISTENCY,
-        "NEES, median (5.35 expected)",
-        tables=MAIN,
-        term=NEES,
-        absent="no positive definite covariance",
+        ("sigma", "position_rmse"), group.SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed sigma (3D)"
     ),
-    *MAIN_STATE_NEES,
+    Metric(("sigma", "position_final"), group.SIGMA, "claimed, final", "m", tables=EVIDENCE),
+    Metric(("sigma_ratio", "position"), group.CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
+    Metric(("nees", "median"), group.CONSISTENCY, "NEES, median (5.35 expected)", tables=MAIN, term=group.NEES),
+    STATE_NEES,
     Metric(
         ("nees_reference", "median"),
-        CONSISTENCY,
+        group.CONSISTENCY,
         "reference NEES, median (5.35 expected)",
         tables=MAIN,
-        term=REFERENCE_NEES,
+        term=group.REFERENCE_NEES,
         name="nees_reference",
     ),
-    Metric(("relative", DELTA, "translation", "rmse"), RPE, "RMSE", "m", LOWER, COMPARISON),
-    Metric(("relative", DELTA, "rotation_deg", "rmse"), RPE, "rotation RMSE", "°", LOWER, COMPARISON),
+    Metric(("relative", group.DELTA, "translation", "rmse"), group.RPE, "RMSE", "m", LOWER, COMPARISON),
+    Metric(("relative", group.DELTA, "rotation_deg", "rmse"), group.RPE, "rotation RMSE", "°", LOWER, COMPARISON),
     Metric(("drift", "translation"), "drift", "translation", "%", LOWER, COMPARISON),
     Metric(("drift", "rotation"), "drift", "rotation", "°/m", LOWER, COMPARISON),
-    Metric(("segments", "intervals", "translation_percent"), SEGMENTS, "translation", "%", LOWER, COMPARISON),
-    Metric(("segments", "intervals", "rotation_deg_per_m"), SEGMENTS, "rotation", "°/m", LOWER, COMPARISON),
+    Metric(("segments", "intervals", "translation_percent"), group.SEGMENTS, "translation", "%", LOWER, COMPARISON),
+    Metric(("segments", "intervals", "rotation_deg_per_m"), group.SEGMENTS, "rotation", "°/m", LOWER, COMPARISON),
     Metric(
         ("reprojection", "median"),
-        REPROJECTION,
+        group.REPROJECTION,
         "median",
         "px",
         LOWER,
         MAIN | TERMINAL | BENCH | COMPARISON,
         name="reprojection",
-        absent=NO_LANDMARK,
     ),
-    Metric(("reprojection", "p95"), REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE, absent=NO_LANDMARK),
+    Metric(("reprojection", "p95"), group.REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE),
     Metric(
         ("reprojection", "under_3px"),
-        REPROJECTION,
+        group.REPROJECTION,
         "under 3\N{NO-BREAK SPACE}px",
         "%",
         HIGHER,
@@ -173,11 +133,10 @@ METRICS = (
         scale=PERCENT,
         brief="under 3 px",
         name="under_3px",
-        absent=NO_LANDMARK,
     ),
     Metric(
         ("reprojection_common", "median"),
-        REPROJECTION,
+        group.REPROJECTION,
         "median over common",
         "px",
         LOWER,
@@ -185,11 +144,10 @@ METRICS = (
         brief="reprojection error over common observations",
         name="reprojection_common",
         same_data=True,
-        absent="no observation was used by every estimator with landmark updates",
     ),
     Metric(
         ("reprojection_along", "median"),
-        REPROJECTION,
+        group.REPROJECTION,
         "median, triangulated along the trajectory",
         "px",
         LOWER,
@@ -197,21 +155,18 @@ METRICS = (
     ),
     Metric(
         ("observations", "share"),
-        OBSERVATIONS,
+        group.OBSERVATIONS,
         "used, of unmasked",
         "%",
         tables=MAIN | BENCH,
         scale=PERCENT,
         brief="observations used",
         name="used",
-        absent="there are no observations",
     ),
-    Metric(
-        ("seconds",), RUNTIME, "time", "s", LOWER, MAIN | TERMINAL, brief="time", same_data=True, absent=NOT_MEASURED
-    ),
+    Metric(("seconds",), group.RUNTIME, "time", "s", LOWER, MAIN | TERMINAL, brief="time", same_data=True),
     Metric(
         ("frames_per_second",),
-        RUNTIME,
+        group.RUNTIME,
         "rate",
         "frames/s",
         HIGHER,
@@ -222,7 +177,7 @@ METRICS = (
     ),
     Metric(
         ("held_out", "median"),
-        HELD_OUT,
+        group.HELD_OUT,
         "median",
         "px",
         LOWER,
@@ -231,34 +186,36 @@ METRICS = (
         ranked=True,
         same_data=True,
     ),
-    Metric(("held_out", "behind"), HELD_OUT, "above the best", "px", tables=EVIDENCE),
-    Metric(("held_out", "behind_low"), HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
-    Metric(("nees", "mean"), NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
+    Metric(("held_out", "behind"), group.HELD_OUT, "above the best", "px", tables=EVIDENCE),
+    Metric(("held_out", "behind_low"), group.HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
+    Metric(("nees", "mean"), group.NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
     *BLOCK_NEES,
-    Metric(("nees_reference", "mean"), REFERENCE_NEES, "mean", tables=EVIDENCE),
-    Metric(("nees_reference", "left_out"), REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
+    Metric(("nees_reference", "mean"), group.REFERENCE_NEES, "mean", tables=EVIDENCE),
+    Metric(("nees_reference", "left_out"), group.REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
     Metric(
         ("nis", "per_degree"),
-        CONSISTENCY,
+        group.CONSISTENCY,
         "NIS per degree of freedom",
         tables=EVIDENCE,
         term="NIS per degree of freedom",
     ),
-    Metric(("sigma_ratio", "rotation"), CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"),
+    Metric(
+        ("sigma_ratio", "rotation"), group.CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"
+    ),
     Metric(
         ("covariance", "not_positive_definite"),
-        CONSISTENCY,
+        group.CONSISTENCY,
         "covariances not positive definite",
         tables=EVIDENCE,
-        term=NEES,
+        term=group.NEES,
         nonzero_only=True,
         count=True,
     ),
-    Metric(("whitened", "ratio"), RESIDUALS, "chi-square per degree of freedom", tables=EVIDENCE),
-    Metric(("moved_points", "share"), RESIDUALS, "of dynamic points", "%", tables=EVIDENCE, scale=PERCENT),
-    Metric(("map", "median"), MAP, "median", "m", LOWER, EVIDENCE | COMPARISON),
-    Metric(("map", "median_seen"), MAP, "median in the camera frame", "m", LOWER, EVIDENCE | COMPARISON),
-    Metric(("map", "median_sigmas"), MAP, "median in sigmas", tables=EVIDENCE),
+    Metric(("whitened", "ratio"), group.RESIDUALS, "chi-square per degree of freedom", tables=EVIDENCE),
+    Metric(("moved_points", "share"), group.RESIDUALS, "of dynamic points", "%", tables=EVIDENCE, scale=PERCENT),
+    Metric(("map", "median"), group.MAP, "median", "m", LOWER, EVIDENCE | COMPARISON),
+    Metric(("map", "median_seen"), group.MAP, "median in the camera frame", "m", LOWER, EVIDENCE | COMPARISON),
+    Metric(("map", "median_sigmas"), group.MAP, "median in sigmas", tables=EVIDENCE),
 )
 
 
@@ -270,7 +227,7 @@ def shown_in(tables: Tables) -> list[Metric]:
 def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric]:
     """Metrics with one of each delta in place of those of relative errors."""
     every, expanded = list(metrics), list[Metric]()
-    relative = [metric for metric in every if DELTA in metric.path]
+    relative = [metric for metric in every if group.DELTA in metric.path]
     for metric in every:
         if metric not in relative:
             expanded.append(metric)

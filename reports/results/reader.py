@@ -16,8 +16,7 @@ from fgbaseline.data.formats.named_file import reading, regular_file
 from fgbaseline.data.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
-from .documents import SUMMARY, measured_file, read_document
-from .json_tree import INFINITE, leaves
+from .documents import INFINITE, SUMMARY, document_in, leaves, read_document
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -184,12 +183,15 @@ def _csv(path: Path) -> "pd.DataFrame | None":
 
 def read_folder(folder: Path) -> Measured:
     """The content of a folder's summary.json or comparison.json. Raises InputError."""
-    return read_measured(measured_file(folder))
+    return read_measured(document_in(folder))
 
 
-def read_measured(path: Path) -> Measured:
-    """The content of a summary.json, a comparison.json or a baseline. Raises InputError naming file and place."""
-    document = read_document(path)
+def read_measured(path: Path, document: dict[str, Any] | None = None) -> Measured:
+    """The runs of a summary.json, comparison.json or baseline, from its `document` if that is read already.
+
+    Raises InputError naming file and place.
+    """
+    document = read_document(path) if document is None else document
     with reading(path):
         try:
             if "runs" in document:
@@ -223,11 +225,7 @@ def has_metric(estimator: Mapping[str, Any], metric: str) -> bool:
     What only runs on raw inertial data have is missing in the others.
     """
     found = _at(estimator, metric)
-    return (
-        found is None
-        or is_inertial_in_other_run(estimator, metric)
-        or (isinstance(found, int | float) and not isinstance(found, bool))
-    )
+    return found is None or is_inertial_in_other_run(estimator, metric) or _is_number(found)
 
 
 def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, str]:
@@ -244,8 +242,8 @@ def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, s
     if isinstance(found, float) and math.isinf(found):
         return None, INFINITE
     notes = estimator.get("notes") or {}
-    keys = [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
-    return None, next((str(notes[key]) for key in (*keys, "*") if key in notes), "it is not a finite number")
+    keys = (*_beginnings(metric), "*")
+    return None, next((str(notes[key]) for key in keys if key in notes), "it is not a finite number")
 
 
 def is_inertial_in_other_run(estimator: Mapping[str, Any], metric: str) -> bool:
@@ -266,11 +264,7 @@ def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] 
 
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:
     """The paths of all numbers of an estimator."""
-    return [
-        path
-        for path, value in leaves(estimator)
-        if path.partition(".")[0] not in NO_METRICS and isinstance(value, int | float) and not isinstance(value, bool)
-    ]
+    return [path for path, value in _values(estimator).items() if _is_number(value)]
 
 
 def nearest(metric: str, known: list[str]) -> str:
@@ -285,16 +279,20 @@ _ABSENT = object()
 
 def _at(estimator: Mapping[str, Any], metric: str) -> Any:
     """The value at a path; None where a null stands on the way, _ABSENT where there is nothing."""
-    return _ABSENT if metric.partition(".")[0] in NO_METRICS else _below(estimator, metric)
+    values = _values(estimator)
+    null_above = any(values.get(path, _ABSENT) is None for path in _beginnings(metric))
+    return None if null_above else values.get(metric, _ABSENT)
 
 
-def _below(found: Any, path: str) -> Any:
-    """The value below any node; keys may have dots in them, such as the '0.5 s' of a relative error."""
-    if found is None:
-        return None
-    if not isinstance(found, Mapping):
-        return _ABSENT
-    if path in found:
-        return found[path]
-    inner = (_below(found[key], path[len(key) + 1 :]) for key in found if path.startswith(f"{key}."))
-    return next((each for each in inner if each is not _ABSENT), _ABSENT)
+def _values(estimator: Mapping[str, Any]) -> dict[str, Any]:
+    """All values by path; keys may have dots in them, such as the '0.5 s' of a relative error."""
+    return {path: value for path, value in leaves(estimator) if path.partition(".")[0] not in NO_METRICS}
+
+
+def _beginnings(metric: str) -> list[str]:
+    """The path, and those of what it is in, the longest first."""
+    return [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

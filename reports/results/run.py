@@ -1,6 +1,5 @@
 """Model of `summary.json` and how it is filled; `make schema` writes docs/summary.schema.json."""
 
-import json
 import math
 from dataclasses import asdict
 from typing import Annotated, Any, Final, Literal
@@ -13,11 +12,11 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
+from .documents import finite
 from .estimator import EstimatorSummary, InertialEstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
-from .json_tree import finite
+from .parts import Document, Number, Part, PoseSigma
 from .provenance import machine, versions
-from .statistics import Number, Part, PoseSigma
 
 SCHEMA: Final = "fgbaseline/summary/1"
 """raised when a key is renamed, removed or changes its meaning; new keys do not raise it"""
@@ -105,7 +104,7 @@ class HeldOutSummary(Part):
     judged: Annotated[int, Field(description="observations of the errors, the same for all")]
 
 
-class Summary(Part):
+class Summary(Document):
     """Summary of a run."""
 
     schema_: Annotated[Literal["fgbaseline/summary/1"], Field(alias="schema")] = SCHEMA
@@ -121,11 +120,6 @@ class Summary(Part):
     settings: dict[str, str | int | float | bool | None]
     versions: dict[str, str]
     machine: dict[str, str | int]
-
-
-def as_dict(summary: Summary) -> dict[str, Any]:
-    """The content of `summary.json`."""
-    return summary.model_dump(mode="json", by_alias=True)
 
 
 def summarize(run: Run) -> Summary:
@@ -221,11 +215,5 @@ def _length(poses: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
-def json_schema() -> str:
-    """JSON schema of `summary.json`, as text."""
-    schema = Summary.model_json_schema(by_alias=True, mode="serialization")
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
-
-
 if __name__ == "__main__":
-    print(json_schema())
+    print(Summary.json_schema())

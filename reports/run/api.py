@@ -19,15 +19,14 @@ from fgbaseline.data import (
     find_estimator,
 )
 from fgbaseline.data.formats.named_file import FilePath
-from fgbaseline.data.solving import Watch, no_progress
+from fgbaseline.data.solving import no_progress
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
 from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..keywords import for_python
-from ..name_list import names_in
-from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS
+from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from .problem import (
     RunSettings,
     build_problem,
@@ -40,6 +39,10 @@ from .problem import (
 from .report import RunReport
 from .solution import read_added, solve
 
+AS_GIVEN = ("preset", "features", "truth_frame", "as_recorded", "held_out", "seed", "cameras")
+OF_ADDED = ("add_body", "add_time_unit", "add_offset")
+FILES = ("imu", "imu_calibration", "velocities", "extrinsic", "right", "calibration", "times", "repairs")
+"""keywords that become settings of the same name: as they are, and as paths"""
 Solver: TypeAlias = Callable[..., object]
 """`solve(problem, progress=None) -> Estimate`; another return value becomes a row that failed, with the reason"""
 
@@ -116,37 +119,22 @@ def run(
     Raises InputError, in one sentence, for an invalid recording or keyword. An estimator that raises an exception
     becomes a failed result; the others go on.
     """
+    keywords = locals()
     names, functions = named_estimators(() if estimators is None else estimators)
     is_default = estimators is None or (bool(names) and len(functions) == len(names))
     chosen = RunSettings(
         sequence=as_path(recording),
-        preset=preset,
         estimators=(*DEFAULT_ESTIMATORS, *names) if is_default else names,
         batch_up_to=BATCH_OBSERVATIONS if is_default else 0,
-        features=features,
+        functions=functions,
         landmarks=LandmarkMode(landmarks),
         truth=_truth_source(truth),
-        truth_frame=truth_frame,
-        seed=seed,
-        as_recorded=as_recorded,
         time_unit=None if time_unit is None else TimeUnit(time_unit),
-        held_out=held_out,
-        imu=as_path(imu),
-        imu_calibration=as_path(imu_calibration),
-        velocities=as_path(velocities),
-        extrinsic=as_path(extrinsic),
-        cameras=cameras,
-        right=as_path(right),
-        calibration=as_path(calibration),
-        times=as_path(times),
         topics=names_in(topics) if isinstance(topics, str) else tuple(topics),
         tracker=as_path(settings),
-        repairs=as_path(repairs),
-        functions=functions,
         add=tuple(opened(each, name=name) for name, each in by_name(add)),
-        add_body=add_body,
-        add_time_unit=add_time_unit,
-        add_offset=add_offset,
+        **{name: keywords[name] for name in (*AS_GIVEN, *OF_ADDED)},
+        **{name: as_path(keywords[name]) for name in FILES},
     )
     check_estimators(chosen.estimators, chosen.functions)
     sequence = read_sequence(chosen)
@@ -155,7 +143,12 @@ def run(
     kept, held = hold_out_tracks(sequence, chosen)
     problem = build_problem(kept, chosen, processes)
     import_estimators(chosen.estimators)
-    solved = solve(problem, chosen, _watch() if progress else no_progress, held, processes, added)
+    watch = no_progress
+    if progress:
+        from ..progress import reporter
+
+        watch = reporter().estimator
+    solved = solve(problem, chosen, watch, held, processes, added)
     return RunReport(**{field.name: getattr(solved, field.name) for field in fields(solved)})
 
 
@@ -210,9 +203,3 @@ def _truth_source(
     if isinstance(truth, str | os.PathLike):
         return Path(truth)
     return truth if truth is None or isinstance(truth, Truth) else opened(truth, name="truth")
-
-
-def _watch() -> Watch:
-    from ..progress import reporter
-
-    return reporter().estimator

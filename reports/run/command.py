@@ -12,8 +12,8 @@ from fgbaseline.data.tracking import Pictures
 from fgbaseline.data.wording import plural
 
 from ..open_page import announce, print_sentences
+from ..results.documents import SUMMARY
 from .problem import (
-    MARK,
     TRACKS,
     RunSettings,
     build_problem,
@@ -39,7 +39,7 @@ def run(
     sequence = read_sequence(settings, pictures)
     settings = with_defaults(settings, sequence)
     place = out or Path("out") / sequence.name
-    require_free(place, force=force, mark=MARK)
+    require_free(place, force=force, mark=SUMMARY)
     if rerun_file is not None:
         from .rerun import require_rerun
 
@@ -69,9 +69,8 @@ def run(
         # Two seconds of imports: bad input is reported before, and the diagnosis goes on meanwhile.
         from ..phrases.evidence import FIRST
         from ..phrases.run import verdict
-        from ..results.run import as_dict
-        from ..tables import print_table
         from ..tables.run import terminal_table
+        from ..tables.table import print_table
         from .folder import write_run
         from .solution import solve
 
@@ -89,7 +88,7 @@ def run(
         if not result.answered:
             progress.print_line(f"{name} failed: {result.estimate.reason}")
     progress.print_line("writing the report")
-    with atomic_folder(place, force=force, mark=MARK) as folder:
+    with atomic_folder(place, force=force, mark=SUMMARY) as folder:
         summary = write_run(solved, folder, cores(), pictures)
         if pictures.size is not None:
             write_npz(sequence, folder / TRACKS, tracks=sequence.observations)
@@ -97,7 +96,7 @@ def run(
             from .rerun import write_rerun
 
             write_rerun(solved, rerun_file)
-    print_table(terminal_table(solved, as_dict(summary)["estimators"]), width=UNWRAPPED)
+    print_table(terminal_table(solved, summary.content["estimators"]), width=UNWRAPPED)
     click.echo()
     print_sentences(verdict(solved), FIRST)
     print_sentences([f"{name}: {text}." for name, text in solved.added.items()], mark="")

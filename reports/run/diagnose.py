@@ -6,7 +6,6 @@ from pathlib import Path
 import click
 
 from fgbaseline.data import Sequence
-from fgbaseline.data.finding import Finding
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.formats.atomic_write import atomic_write, require_new
 from fgbaseline.diagnosis import diagnose, repairs_text
@@ -87,7 +86,10 @@ def _require_writable(file: Path, *, force: bool) -> None:
 def _print(found: Found) -> None:
     click.echo(f"{found.sequence.name}: {found.counts}")
     if found.findings:
-        _print_findings(found.findings)
+        from ..tables.run_details import terminal_findings
+        from ..tables.table import print_table
+
+        print_table(terminal_findings(found.findings), width=UNWRAPPED, spaced=True)
     if found.undecided or not found.findings:
         print_sentences(found.verdict[:1], mark="")
     if found.not_identifiable:
@@ -96,21 +98,3 @@ def _print(found: Found) -> None:
     for sentence in found.sentences:
         click.echo()
         print_sentences([sentence], mark="")
-
-
-def _print_findings(findings: tuple[Finding, ...]) -> None:
-    from ..formatting import NO_BREAK, quantity
-    from ..tables import Cell, Column, Row, Table, print_table
-
-    def row(finding: Finding) -> Row:
-        certainty = "" if finding.certainty == "counted" else f" ({finding.certainty})"
-        figures = (quantity(x, finding.unit).replace(NO_BREAK, " ") for x in (finding.before, finding.after))
-        return Row(finding.code, tuple(map(Cell, (f"{finding.sentence}{certainty}", finding.measure, *figures))))
-
-    columns = (
-        Column("description", words=True),
-        Column("measure", words=True),
-        Column("before repair"),
-        Column("after"),
-    )
-    print_table(Table(columns, tuple(map(row, findings)), name="finding"), width=UNWRAPPED, spaced=True)

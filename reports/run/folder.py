@@ -14,14 +14,14 @@ from fgbaseline.compare import CovarianceState, reprojection_by
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.data import Estimate, write_tum
 from fgbaseline.data.tracking import Pictures
-from fgbaseline.reports import figures
-from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results.run import Summary, as_dict, summarize
-from fgbaseline.reports.run.problem import MARK
-from fgbaseline.reports.tables import latex, markdown
-from fgbaseline.reports.tables.run import main_table, main_values, metrics_table
 
-TRUTH_FILE = "truth.tum"
+from .. import figures
+from ..html.run_page import render
+from ..results.documents import SUMMARY
+from ..results.reader import TRUTH
+from ..results.run import Summary, summarize
+from ..tables.run import main_table, main_values, metrics_table
+from ..tables.table import latex, markdown
 
 
 def write_run(run: Run, folder: Path, processes: int = 1, pictures: Pictures | None = None) -> Summary:
@@ -51,17 +51,15 @@ def write_numbers(run: Run, folder: Path) -> Summary:
             _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
     truth = run.problem.sequence.truth
     if truth is not None:
-        write_tum(folder / TRUTH_FILE, run.problem.sequence.t, truth.world_T_imu)
+        write_tum(folder / TRUTH, run.problem.sequence.t, truth.world_T_imu)
     _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
-    document = as_dict(summary)
-    estimators = document["estimators"]
-    main_values(estimators).to_csv(folder / "table.csv")
-    table = main_table(run, estimators).transposed("figure")
+    content = summary.content
+    main_values(content["estimators"]).to_csv(folder / "table.csv")
+    table = main_table(run, content["estimators"]).transposed("figure")
     (folder / "table.md").write_text(markdown(table), encoding="utf-8")
     (folder / "table.tex").write_text(latex(table), encoding="utf-8")
-    text = json.dumps(document, indent=2, allow_nan=False)
-    (folder / MARK).write_text(f"{text}\n", encoding="utf-8")
+    (folder / SUMMARY).write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return summary
 
 
@@ -83,7 +81,7 @@ def write_page(
     pictures: Pictures | None = None,
 ) -> None:
     """Writes `report.html` with the given figures and images."""
-    (folder / "report.html").write_text(render(run, as_dict(summary), drawn, pictures), encoding="utf-8")
+    (folder / "report.html").write_text(render(run, summary.content, drawn, pictures), encoding="utf-8")
 
 
 def _write_landmarks(path: Path, run: Run, estimate: Estimate) -> None:

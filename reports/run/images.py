@@ -4,8 +4,6 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.data import Sequence
-from fgbaseline.data.formats import BodyFrame
 from fgbaseline.data.formats.atomic_write import require_new
 from fgbaseline.data.formats.named_file import shown
 from fgbaseline.data.toml_file import read_toml
@@ -21,7 +19,8 @@ from fgbaseline.data.tracking import (
 from fgbaseline.data.tracking.sources.image_recording import TruthFile
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.progress import reporter
+
+from ..progress import reporter
 
 
 def tracked(
@@ -33,31 +32,15 @@ def tracked(
     truth: TruthFile | None = None,
     pictures: Pictures | None = None,
 ) -> TrackedRecording:
-    """Tracks of a recording of images, with progress on standard error. Raises InputError.
+    """Tracks of a recording of images, whose pairs `pictures` gets, with progress on standard error.
 
-    `truth` is that of the sequence to be made of it, which is checked before the images are read.
+    `truth` is that of the sequence to be made of it, which is checked before the images are read. Raises InputError.
     """
     chosen = TrackerSettings() if settings is None else read_toml(settings, TrackerSettings).content
     # Bad input is refused before progress is printed.
     recording = opened_images(source, options, motion=motion, truth=truth)
     with reporter().estimator("tracking") as progress:
         return track_images(recording, chosen, progress, pictures)
-
-
-def image_sequence(
-    source: Path,
-    options: ImageOptions,
-    settings: Path | None,
-    truth: Path | None,
-    body: BodyFrame | None,
-    pictures: Pictures | None = None,
-) -> Sequence:
-    """Recording of images as a run needs it, with the truth given or its own; `pictures` gets its pairs.
-
-    Raises InputError.
-    """
-    given = None if truth is None or body is None else TruthFile(truth, body)
-    return tracked(source, options, settings, motion=True, truth=given, pictures=pictures).sequence(given)
 
 
 def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path | None, *, force: bool) -> int:

@@ -3,9 +3,9 @@
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from fgbaseline.data import (
     HeldOut,
@@ -36,10 +36,9 @@ MIN_TRUTH_SHARE = 0.5
 BESIDE = ("velocities", "extrinsic")
 IMAGES = ("cameras", "right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
+IF_GIVEN = (*BESIDE, "imu", "imu_calibration", *IMAGES, "topics")
 TRACKS = "tracks.npz"
 """file of the tracks in the folder of a run on images"""
-MARK = "summary.json"
-"""the file that marks a run's folder"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +63,16 @@ class RunSettings:
     """unit of the recording's stamps; None to detect it"""
     held_out: float = 0.0
     """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
-    imu: Path | None = None
-    """CSV of raw inertial samples, in place of the recording's velocities"""
-    imu_calibration: Path | None = None
-    """YAML of their noise"""
+    repairs: Path | None = None
+    """TOML file of user-specified repairs"""
     velocities: Path | None = None
     """CSV of body velocities, in place of the recording's motion"""
     extrinsic: Path | None = None
     """imu_T_cam of the left camera, in place of the recording's"""
+    imu: Path | None = None
+    """CSV of raw inertial samples, in place of the recording's velocities"""
+    imu_calibration: Path | None = None
+    """YAML of their noise"""
     cameras: Cameras | None = None
     """cameras of a recording of images: a pair, or the left one alone; None for a pair where there is one"""
     right: Path | None = None
@@ -80,12 +81,10 @@ class RunSettings:
     """YAML of the cameras of two folders or a bag"""
     times: Path | None = None
     """stamps of the images of two folders"""
-    topics: tuple[str, ...] = ()
-    """topics of a bag: left, right and, if any, the IMU"""
     tracker: Path | None = None
     """TOML file of the settings of the tracker"""
-    repairs: Path | None = None
-    """TOML file of user-specified repairs"""
+    topics: tuple[str, ...] = ()
+    """topics of a bag: left, right and, if any, the IMU"""
     functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
     """estimators among the names that are not installed, such as those of the user's files"""
     add: tuple[str | ParsedTrajectory | Trajectory, ...] = ()
@@ -104,32 +103,10 @@ class RunSettings:
             raise InputError(f"seed: expected a whole number from 0 on, got {self.seed}")
 
     def record(self) -> dict[str, str | int | float | bool | None]:
-        """The settings as `summary.json` has them."""
-        return {
-            "sequence": _source_of(self.sequence),
-            "preset": self.preset,
-            "estimators": ",".join(self.estimators),
-            "features": self.features or (DEFAULT_FEATURES if self.preset == "documented" else "all"),
-            "landmarks": str(self.landmarks),
-            "truth": _source_of(self.truth),
-            "truth_frame": self.truth_frame,
-            "seed": self.seed,
-            "as_recorded": self.as_recorded,
-            "time_unit": None if self.time_unit is None else str(self.time_unit),
-            "held_out": self.held_out,
-            "repairs": None if self.repairs is None else str(self.repairs),
-            **{
-                name: str(getattr(self, name))
-                for name in (*BESIDE, "imu", "imu_calibration", *IMAGES)
-                if getattr(self, name) is not None
-            },
-            **({"topics": ",".join(self.topics)} if self.topics else {}),
-            "functions": ",".join(f"{name}={_source(function)}" for name, function in self.functions.items()) or None,
-            "add": ",".join(t if isinstance(t, str) else t.name for t in self.add) or None,
-            "add_body": self.add_body,
-            "add_time_unit": self.add_time_unit,
-            "add_offset": self.add_offset,
-        }
+        """The settings as `summary.json` has them, those of motion and images only where they are given."""
+        given = {f.name: _recorded(getattr(self, f.name)) for f in fields(self) if f.name != "batch_up_to"}
+        given["features"] = self.features or (DEFAULT_FEATURES if self.preset == "documented" else "all")
+        return {name: value for name, value in given.items() if value is not None or name not in IF_GIVEN}
 
 
 POSED = {
@@ -139,13 +116,19 @@ POSED = {
 """settings that a problem decides: name -> the value that leaves it alone"""
 
 
-def _source_of(given: Path | Sequence | Problem | ParsedTrajectory | Trajectory | Truth | None) -> str | None:
-    """A path as it is; the source or name of what is in memory."""
-    if given is None or isinstance(given, Path):
-        return None if given is None else str(given)
-    if isinstance(given, Problem):
-        return _source_of(given.sequence)
-    return given.source if isinstance(given, Truth) else given.source or given.name
+def _recorded(value: Any) -> str | int | float | bool | None:
+    """A setting as text or number: a path as it is, the source or name of what is in memory, names with commas."""
+    if value is None or isinstance(value, int | float):
+        return value
+    if isinstance(value, Mapping):
+        return ",".join(f"{name}={_source(function)}" for name, function in value.items()) or None
+    if isinstance(value, tuple):
+        return ",".join(each if isinstance(each, str) else each.name for each in value) or None
+    if isinstance(value, str | Path):
+        return str(value)
+    if isinstance(value, Problem):
+        return _recorded(value.sequence)
+    return str(value.source if isinstance(value, Truth) else value.source or value.name)
 
 
 def _source(function: Callable[..., object]) -> str:
@@ -253,15 +236,17 @@ def _in_memory(given: Sequence | Problem, settings: RunSettings) -> Sequence:
 
 
 def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
-    from .images import image_sequence  # OpenCV is imported where there are images
+    from .images import TruthFile, tracked  # OpenCV is imported where there are images
 
     if settings.time_unit is not None:
         raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
     assert isinstance(settings.sequence, Path)
     names = ("cameras", "right", "calibration", "times", "topics", "imu", "imu_calibration", "velocities", "extrinsic")
     options = ImageOptions(**{name: getattr(settings, name) for name in names})
-    truth = settings.truth if isinstance(settings.truth, Path) else None
-    return image_sequence(settings.sequence, options, settings.tracker, truth, settings.truth_frame, pictures)
+    truth, body = settings.truth, settings.truth_frame
+    given = TruthFile(truth, body) if isinstance(truth, Path) and body is not None else None
+    found = tracked(settings.sequence, options, settings.tracker, motion=True, truth=given, pictures=pictures)
+    return found.sequence(given)
 
 
 def _require_none(settings: RunSettings, names: tuple[str, ...], advice: str) -> None:

@@ -1,10 +1,9 @@
 """A run with its tables, sentences and figures, and the page or folder that it writes."""
 
 import os
-from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -14,10 +13,10 @@ from fgbaseline.data.dataframes import as_cell_value
 from ..keywords import for_python
 from ..notebook import NotebookResult, write_report
 from ..phrases.run import verdict
-from ..results.run import Summary, as_dict, summarize
-from ..tables import Table
+from ..results.documents import SUMMARY
+from ..results.run import Summary, summarize
 from ..tables.run import main_frame, main_table, metrics_table
-from .problem import MARK
+from ..tables.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,12 +33,12 @@ class RunReport(NotebookResult, Run):
     @property
     def table(self) -> pd.DataFrame:
         """One row per main metric, one column per estimator."""
-        return main_frame(self, self._estimators)
+        return main_frame(self, self.summary.content["estimators"])
 
     @property
     def text_table(self) -> Table:
         """The main metrics as text, for `tables.markdown`, `latex` and `print_table`."""
-        return main_table(self, self._estimators).transposed()
+        return main_table(self, self.summary.content["estimators"]).transposed()
 
     @property
     def metrics(self) -> pd.DataFrame:
@@ -83,17 +82,8 @@ class RunReport(NotebookResult, Run):
 
         return write_report(
             path,
-            lambda: render(self, self._document, self.figures()),
+            lambda: render(self, self.summary.content, self.figures()),
             lambda folder: write_run(self, folder, processes),
             force=force,
-            mark=MARK,
+            mark=SUMMARY,
         )
-
-    @cached_property
-    def _document(self) -> Mapping[str, Any]:
-        return as_dict(self.summary)
-
-    @property
-    def _estimators(self) -> Mapping[str, Any]:
-        estimators: Mapping[str, Any] = self._document["estimators"]
-        return estimators

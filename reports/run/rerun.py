@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.compare.estimate_comparison import Result, Run
-from fgbaseline.data import Truth
 from fgbaseline.geometry import FloatArray, InputError, so3
-from fgbaseline.reports.figures.style import TRUTH, colors, on_dark
+
+from ..figures.style import TRUTH, colors, on_dark
 
 
 def require_rerun(file: Path) -> None:
@@ -41,14 +41,13 @@ def write_rerun(run: Run, file: Path) -> None:
 
 
 def _world(rr: Any, recording: Any, run: Run) -> None:
-    up = np.abs(run.problem.sequence.up)
-    axis = int(np.argmax(up))
-    sign = run.problem.sequence.up[axis]
-    name = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if sign > 0 else 'DOWN'}"
+    up = run.problem.sequence.up
+    axis = int(np.argmax(np.abs(up)))
+    name = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if up[axis] > 0 else 'DOWN'}"
     recording.log("world", getattr(rr.ViewCoordinates, name), static=True)
     truth = run.problem.sequence.truth
     if truth is not None:
-        recording.log("world/truth", _strip(rr, _known(truth), rgb(TRUTH)), static=True)
+        recording.log("world/truth", _strip(rr, truth.world_T_imu[truth.known, :3, 3], rgb(TRUTH)), static=True)
 
 
 def _estimator(rr: Any, recording: Any, run: Run, result: Result) -> None:
@@ -120,10 +119,6 @@ def _times(rr: Any, run: Run, frames: Any) -> list[Any]:
 
 def _strip(rr: Any, points: FloatArray, color: tuple[int, ...]) -> Any:
     return rr.LineStrips3D([points], radii=0.15, colors=color)
-
-
-def _known(truth: Truth) -> FloatArray:
-    return truth.world_T_imu[truth.known, :3, 3]
 
 
 def _safe(name: str) -> str:

@@ -12,7 +12,7 @@ from ..formatting import counted, interval, number
 from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
 from ..results.metric import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value
 from ..results.metrics import shown_in
-from .table import Cell, Column, Row, Table, mark_best
+from .table import Cell, Column, Row, Table, figures, mark_best, words
 
 Key: TypeAlias = tuple[str, str]
 """case and estimator"""
@@ -85,20 +85,14 @@ def ranking_tables(results: Results) -> Iterator[Table]:
     """A ranking for each metric of accuracy, and the mean ranks over all cases."""
     ranked = records(rankings(results))
     for metric in METRICS:
-        columns = (
-            Column("rank"),
-            Column("estimator", words=True),
-            Column("runs"),
-            Column.flat(metric),
-            Column("above the first"),
-            Column("", words=True),
-        )
         rows = tuple(_ranked(row) for row in ranked if row["metric"] == metric.name)
         if rows:
+            names = (*figures("rank"), *words("estimator"), *figures("runs"))
+            columns = (*names, Column.flat(metric), *figures("above the first"), *words(""))
             yield Table(columns, rows, name="case", title=f"Ranked by {metric.heading}")
     headings = {metric.name: metric.heading for metric in METRICS}
     rows = tuple(
-        _row(
+        Row.of(
             row["estimator"],
             headings[row["metric"]],
             str(row["cases"]),
@@ -108,21 +102,15 @@ def ranking_tables(results: Results) -> Iterator[Table]:
         for row in records(overall(results))
     )
     if rows:
-        means = (Column("by", words=True), Column("cases"), Column("mean rank"), Column("first in"))
-        yield Table(means, rows, title="Over all cases")
+        yield Table((*words("by"), *figures("cases", "mean rank", "first in")), rows, title="Over all cases")
 
 
 def _ranked(row: Mapping[str, Any]) -> Row:
     first = row["rank"] == 1
-    return _row(
-        row["case"],
-        str(row["rank"]),
-        row["estimator"],
-        str(row["runs"]),
-        interval(row["mean"], row["low"], row["high"]),
-        "" if first else interval(row["behind"], row["behind_low"], row["behind_high"]),
-        "not separated from it" if row["tied"] and not first else "",
-    )
+    behind = "" if first else interval(row["behind"], row["behind_low"], row["behind_high"])
+    tied = "not separated from it" if row["tied"] and not first else ""
+    mean = interval(row["mean"], row["low"], row["high"])
+    return Row.of(row["case"], str(row["rank"]), row["estimator"], str(row["runs"]), mean, behind, tied)
 
 
 def runs_table(results: Results, pages: str) -> Table:
@@ -133,19 +121,15 @@ def runs_table(results: Results, pages: str) -> Table:
         frame = by_run[one.name]
         first, failure = frame.iloc[0], results.failures.get(one.name, "")
         if failure:
-            rows.append(_row(one.name, "", "", failure))
+            rows.append(Row.of(one.name, "", "", failure))
             continue
         failed = records(frame[frame["status"] == "failed"])
         size = f"{counted(int(first['frames']), 'frame')}, {counted(int(first['observations']), 'observation')}"
         reasons = "; ".join(f"{row['estimator']} failed: {row['reason']}" for row in failed)
         link = "" if one.job.page == "none" else f"{pages}/{one.job.key}/report.html"
-        rows.append(_row(one.name, size, f"{first['reference']} {first['trust']}", reasons, link=link))
-    columns = (Column("size"), Column("reference", words=True), Column("failures", words=True))
+        rows.append(Row.of(one.name, size, f"{first['reference']} {first['trust']}", reasons, link=link))
+    columns = (*figures("size"), *words("reference", "failures"))
     return Table(columns, tuple(rows), name="run", title=counted(len(rows), "run"))
-
-
-def _row(name: str, *texts: str, link: str = "") -> Row:
-    return Row(name, tuple(map(Cell, texts)), link=link)
 
 
 def _by_key(table: pd.DataFrame) -> dict[Key, dict[str, Any]]:

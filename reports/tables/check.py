@@ -7,17 +7,9 @@ from fgbaseline.compare.limits import Outcome
 from ..phrases.check import bound, change, number
 from ..results.check import Checked, Line
 from ..results.metrics import METRICS
-from .table import Cell, Column, Row, Table
+from .table import Row, Table, figures, words
 
-COLUMNS = (
-    Column("estimator", words=True),
-    Column("metric", words=True),
-    Column("value"),
-    Column("bound"),
-    Column("margin"),
-    Column("baseline"),
-    Column("change"),
-)
+FIGURES = ("value", "bound", "margin", "baseline", "change")
 UNITS = {metric.key: metric.unit for metric in METRICS if metric.scale == 1.0 and "°" not in metric.unit}
 _METERS = ("ate", "ate_unaligned", "divergence")
 _PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
@@ -26,15 +18,12 @@ _NO_UNIT = ("behind_camera", "n", "under_3px", "rank", "block", "sse")
 
 def check_table(checked: Checked, signs: Mapping[Outcome, str] | None = None) -> Table:
     """The lines of a check, `signs` before their outcomes; several runs have a column of their names."""
-    several = len(checked.measured.runs) > 1
+    names = ("run", "estimator", "metric") if len(checked.measured.runs) > 1 else ("estimator", "metric")
     rows = []
     for line in checked.lines:
-        texts = cells(line)
-        outcome = f"{signs[line.outcome]} {line.outcome}" if signs else line.outcome.value
-        shown = [text for title, text in texts.items() if title != "limit" and (several or title != "run")]
-        rows.append(Row(outcome, tuple(map(Cell, shown)), status=line.outcome.value))
-    columns = (Column("run", words=True), *COLUMNS) if several else COLUMNS
-    return Table(columns, tuple(rows), name="limit")
+        outcome, texts = f"{signs[line.outcome]} {line.outcome}" if signs else line.outcome.value, cells(line)
+        rows.append(Row.of(outcome, *(texts[title] for title in (*names, *FIGURES)), status=line.outcome.value))
+    return Table((*words(*names), *figures(*FIGURES)), tuple(rows), name="limit")
 
 
 def cells(line: Line) -> dict[str, str]:

@@ -11,7 +11,7 @@ import pandas as pd
 from fgbaseline.compare.estimate_comparison import Run, same_frames
 
 from ..formatting import DASH, INFINITY, RESOLUTION, counted, listed, number
-from ..results.json_tree import INFINITE, at, leaves
+from ..results.documents import INFINITE, at, leaves
 from ..results.metric import ATE, DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import ate_resolution, shown_in
 from ..results.reader import DIVERGENCES
@@ -82,7 +82,7 @@ def terminal_table(run: Run, estimators: Estimators) -> Table:
             "reference" if m.group == DIVERGENCE and name == run.reference else m.text(m.value(e).value, resolutions[m])
             for m in metrics
         ]
-        rows.append(Row(name, tuple(map(Cell, [e["status"], *texts]))))
+        rows.append(Row.of(name, e["status"], *texts))
     return Table((Column("status", words=True), *map(Column.flat, metrics)), tuple(rows))
 
 
@@ -172,8 +172,8 @@ def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:
 
 def _why_absent(estimator: Mapping[str, Any], metric: Metric) -> str:
     """Reason of a missing value in the summary's notes, by its own key or its parent's."""
-    notes: Mapping[str, str] = estimator.get("notes") or {}
-    return notes.get(metric.key) or notes.get(metric.path[0]) or metric.absent or "no such value"
+    notes: Mapping[str, str] = estimator["notes"]
+    return notes.get(metric.key) or notes[metric.path[0]]
 
 
 def _left_out(estimator: Mapping[str, Any], metric: Metric) -> str:

@@ -13,9 +13,9 @@ from fgbaseline.compare.reference_trust import SHARE
 from fgbaseline.data import Estimate, Event
 from fgbaseline.data.finding import Finding
 
-from ..formatting import RESOLUTION, counted, number, per_cent, quantity, resolved
-from ..results.json_tree import at
-from .table import Cell, Column, Row, Table
+from ..formatting import NO_BREAK, RESOLUTION, counted, grouped, number, per_cent, quantity, resolved
+from ..results.documents import at
+from .table import Cell, Column, Row, Table, figures, words
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")
 MAX_DYNAMIC = 100
@@ -36,51 +36,49 @@ REASONS: Mapping[str, str] = {
 
 def trust_table(criteria: Iterable[Criterion]) -> Table:
     """Criteria of the trust in the reference: measured value, limits and verdict."""
-    columns = (
-        Column("measured"),
-        Column("trusted"),
-        Column("doubtful"),
-        Column("verdict", words=True),
-        Column("remark", words=True),
-    )
-    return Table(columns, tuple(map(_criterion, criteria)), name="criterion")
-
-
-def _criterion(c: Criterion) -> Row:
-    sign = "≥" if c.at_least else "≤"
-    text = per_cent if c.unit == SHARE else number
-    limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
-    texts = (text(c.value), *limits, c.verdict.name.lower(), c.remark)
-    return Row(f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name, tuple(map(Cell, texts)))
+    rows = []
+    for c in criteria:
+        text, sign = per_cent if c.unit == SHARE else number, "≥" if c.at_least else "≤"
+        name = f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name
+        limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
+        rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
+    columns = (*figures("measured", "trusted", "doubtful"), *words("verdict", "remark"))
+    return Table(columns, tuple(rows), name="criterion")
 
 
 def findings_table(findings: Iterable[Finding]) -> Table:
     """Findings of the diagnosis with a measure before and after repair; the status is the certainty, if not counted."""
-    rows = tuple(
-        Row(
-            f.sentence,
-            (Cell(f.measure), Cell(quantity(f.before, f.unit)), Cell(quantity(f.after, f.unit))),
-            status="ok" if f.certainty == "counted" else f.certainty,
-        )
-        for f in findings
-    )
-    columns = (Column("measure", words=True), Column("before repair"), Column("after"))
-    return Table(columns, rows, name="finding")
+    rows = []
+    for f in findings:
+        status = "ok" if f.certainty == "counted" else f.certainty
+        rows.append(Row.of(f.sentence, f.measure, quantity(f.before, f.unit), quantity(f.after, f.unit), status=status))
+    return Table((*words("measure"), *figures("before repair", "after")), tuple(rows), name="finding")
+
+
+def terminal_findings(findings: Iterable[Finding]) -> Table:
+    """Findings by code, the sentence with its certainty as a column, without spaces that a terminal does not break."""
+    rows = []
+    for f in findings:
+        certainty = "" if f.certainty == "counted" else f" ({f.certainty})"
+        sizes = (quantity(x, f.unit).replace(NO_BREAK, " ") for x in (f.before, f.after))
+        rows.append(Row.of(f.code, f"{f.sentence}{certainty}", f.measure, *sizes))
+    columns = (*words("description", "measure"), *figures("before repair", "after"))
+    return Table(columns, tuple(rows), name="finding")
 
 
 def _residuals(run: Run) -> Table:
     """Reprojection errors in classes."""
     tables = {r.name: r.evidence.patterns for r in run.answered}
-    figures = {"observations": "n", "median, px": "median", "mean, px": "mean", "95th percentile, px": "p95"}
+    columns = {"observations": "n", "median, px": "median", "mean, px": "mean", "95th percentile, px": "p95"}
     title = "Reprojection errors by distance, track age, place in the image and camera"
-    return _frames(title, tables, {"by": "by", "class": "of"}, figures | {"median u, px": "u", "median v, px": "v"})
+    return _frames(title, tables, {"by": "by", "class": "of"}, columns | {"median u, px": "u", "median v, px": "v"})
 
 
 def _map(run: Run) -> Table:
     """Distances of landmarks from the reference's, by depth."""
     tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
-    figures = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
-    return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, figures)
+    columns = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
+    return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, columns)
 
 
 def _moved(run: Run) -> Table:
@@ -95,8 +93,8 @@ def _moved(run: Run) -> Table:
         Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
         for row in moved.head(MAX_DYNAMIC).to_dict("records")
     )
-    headings = ("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
-    return Table(tuple(map(Column, headings)), rows, name="landmark", title=title)
+    columns = figures("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
+    return Table(columns, rows, name="landmark", title=title)
 
 
 def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
@@ -120,65 +118,51 @@ def exclusions_table(summary: Mapping[str, Any]) -> Table:
     counts: Mapping[str, int] = at(summary, "problem", "excluded") or {}
     n = max(1, int(at(summary, "sequence", "observations") or 0))
     rows = tuple(
-        Row(REASONS.get(reason, reason), (Cell(number(count)), Cell(per_cent(count / n))))
+        Row.of(REASONS.get(reason, reason), number(count), per_cent(count / n))
         for reason, count in sorted(counts.items(), key=lambda item: -item[1])
         if count
     )
-    columns = (Column("observations"), Column("of all"))
     caption = "Decided once for all estimators, before any of them runs."
-    return Table(columns, rows, name="reason for exclusion", caption=caption)
+    return Table(figures("observations", "of all"), rows, name="reason for exclusion", caption=caption)
 
 
 def events_tables(run: Run) -> list[Table]:
     """Events of each estimator by kind and cause; estimators that one run answers for share a table."""
-    names: dict[int, list[str]] = {}
-    estimates: dict[int, Estimate] = {}
-    for name, result in run.results.items():
-        if result.estimate.events:
-            names.setdefault(id(result.estimate.events), []).append(name)
-            estimates.setdefault(id(result.estimate.events), result.estimate)
-    return [_events(names[key], estimate) for key, estimate in estimates.items()]
+    with_events = [r.estimate for r in run.results.values() if r.estimate.events]
+    return [_events(of_one_run) for of_one_run in grouped((id(each.events), each) for each in with_events).values()]
 
 
-def _events(names: list[str], estimate: Estimate) -> Table:
-    kinds = Counter(event.kind for event in estimate.events).most_common()
-    title = f"{', '.join(names)}: " + ", ".join(f"{number(count)} × {kind}" for kind, count in kinds)
-    alike: dict[tuple[str, str], list[Event]] = {}
-    for event in estimate.events:
-        alike.setdefault((event.kind, event.reason), []).append(event)
-    rows = tuple(Row(kind, (*_where(events), Cell(why))) for (kind, why), events in islice(alike.items(), MAX_EVENTS))
+def _events(estimates: list[Estimate]) -> Table:
+    events = estimates[0].events
+    kinds = [f"{number(count)} × {kind}" for kind, count in Counter(event.kind for event in events).most_common()]
+    title = f"{', '.join(estimate.name for estimate in estimates)}: {', '.join(kinds)}"
+    alike = grouped(((event.kind, event.reason), event) for event in events)
+    rows = tuple(Row.of(kind, *_where(events), why) for (kind, why), events in islice(alike.items(), MAX_EVENTS))
     more = len(alike) - MAX_EVENTS
     caption = f"{f'And {number(more)} more. ' if more > 0 else ''}tables/events.csv has every event."
-    columns = (Column("events"), Column("frames"), Column("landmarks"), Column("why", words=True))
+    columns = (*figures("events", "frames", "landmarks"), *words("why"))
     return Table(columns, rows, name="event", title=title, caption=caption)
 
 
-def _where(events: list[Event]) -> tuple[Cell, ...]:
+def _where(events: list[Event]) -> tuple[str, str, str]:
     """Number of events of one kind and cause, first and last frame, and the landmark or how many there are."""
     frames = sorted({event.frame for event in events})
     landmarks = sorted({event.landmark for event in events if event.landmark is not None})
     span = f"{frames[0]}" if len(frames) == 1 else f"{frames[0]}–{frames[-1]}"
     few = ", ".join(map(str, landmarks)) if len(landmarks) <= 3 else f"{number(len(landmarks))} of them"
-    return Cell(number(len(events))), Cell(span), Cell(few)
+    return number(len(events)), span, few
 
 
 def _frames(
-    title: str, tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], figures: Mapping[str, str]
+    title: str, tables: Mapping[str, pd.DataFrame], classes: Mapping[str, str], sizes: Mapping[str, str]
 ) -> Table:
     """A row for each row of each estimator's table; headings -> its columns of words and of values."""
-    rows = tuple(
-        Row(
-            name,
-            (
-                *(Cell(str(row[key])) for key in words.values()),
-                *_numbers(*(int(row[key]) if key == "n" else row[key] for key in figures.values())),
-            ),
-        )
-        for name, table in tables.items()
-        for row in table.to_dict("records")
-    )
-    columns = (*(Column(heading, words=True) for heading in words), *map(Column, figures))
-    return Table(columns, rows, title=title)
+    rows = []
+    for name, table in tables.items():
+        for row in table.to_dict("records"):
+            numbers = _numbers(*(int(row[key]) if key == "n" else row[key] for key in sizes.values()))
+            rows.append(Row(name, (*(Cell(str(row[key])) for key in classes.values()), *numbers)))
+    return Table((*words(*classes), *figures(*sizes)), tuple(rows), title=title)
 
 
 def _numbers(*values: object) -> tuple[Cell, ...]:

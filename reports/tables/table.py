@@ -52,6 +52,16 @@ class Cell(NamedTuple):
     note: str = ""
 
 
+def figures(*titles: str) -> tuple[Column, ...]:
+    """Columns of figures, aligned to the right."""
+    return tuple(map(Column, titles))
+
+
+def words(*titles: str) -> tuple[Column, ...]:
+    """Columns of words, aligned to the left."""
+    return tuple(Column(title, words=True) for title in titles)
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """Name and cells of a row, or in place of cells the reason why there are none."""
@@ -66,6 +76,11 @@ class Row:
     link: str = ""
     term: str = ""
     """term of the glossary"""
+
+    @classmethod
+    def of(cls, name: str, *texts: str, status: str = "ok", link: str = "") -> Self:
+        """Row whose cells are texts alone."""
+        return cls(name, tuple(map(Cell, texts)), status=status, link=link)
 
 
 @dataclass(frozen=True, slots=True)

@@ -202,7 +202,7 @@ def _run_folder(content: bytes, scratch: Path) -> object:
     (scratch / "trajectories").mkdir(exist_ok=True)
     (scratch / "trajectories" / "isam2.tum").write_bytes(TUM)
     run = read_reference_run(scratch)
-    return run.files.trajectory(run.reference)
+    return run.trajectory(run.reference)
 
 
 def _summaries() -> list[bytes]:

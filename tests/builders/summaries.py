@@ -4,6 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.results.reader import read_folder
+
 NULLS = {"rmse": None, "max": None}
 
 
@@ -41,3 +45,10 @@ def write(folder: Path, document: dict[str, Any], limits: str, baseline: dict[st
     (folder / "limits.toml").write_text(limits)
     if baseline is not None:
         (folder / "baseline.json").write_text(json.dumps(baseline))
+
+
+def check_files(
+    folder: Path, limits: Path, baseline: Path | None, outputs: Outputs | None = None, **options: bool
+) -> int:
+    """The exit code of a check of a folder by a limits file."""
+    return check(read_folder(folder), read_limits(limits), baseline, outputs or Outputs(), **options)

@@ -20,8 +20,8 @@ from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.position_errors import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.bench import METRICS
-from fgbaseline.reports.tables import latex, markdown
 from fgbaseline.reports.tables.run import main_table
+from fgbaseline.reports.tables.table import latex, markdown
 
 from ..builders.runs import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem

@@ -8,12 +8,12 @@ import pytest
 from junitparser import Error, Failure, JUnitXml
 
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.accuracy_check.command import Outputs
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.tables.check import unit_of
 
 from ..builders.commands import everything_in, fgbaseline
-from ..builders.summaries import estimator, summary, write
+from ..builders.summaries import check_files, estimator, summary, write
 
 LIMITS = """
 [[limit]]
@@ -35,7 +35,7 @@ UNTRUSTED = {**GOOD, "reference": {"name": "isam2", "trust": "untrusted", "reaso
 def held(folder: Path, **keywords: Any) -> int:
     """The exit code of a check of `out` with every kind of file written."""
     outputs = Outputs(folder / "check.xml", folder / "check.md", folder / "check.json")
-    return check(folder / "out", folder / "limits.toml", folder / "baseline.json", outputs, **keywords)
+    return check_files(folder / "out", folder / "limits.toml", folder / "baseline.json", outputs, **keywords)
 
 
 @pytest.mark.parametrize(("document", "code"), [(GOOD, 0), (BAD, 1), (UNTRUSTED, 2)])
@@ -104,7 +104,10 @@ def test_an_estimator_of_any_name_leaves_xml_and_markdown_whole(tmp_path: Path) 
     name = 'a|b <script> & "c" \x07 `d` *e*'
     document = {**GOOD, "estimators": {**GOOD["estimators"], name: estimator(None, status="failed")}}
     write(tmp_path, document, '[[limit]]\nmetric = "ate.rmse"\nat_most = 1\n')
-    assert check(tmp_path / "out", tmp_path / "limits.toml", None, Outputs(tmp_path / "x.xml", tmp_path / "x.md")) == 1
+    assert (
+        check_files(tmp_path / "out", tmp_path / "limits.toml", None, Outputs(tmp_path / "x.xml", tmp_path / "x.md"))
+        == 1
+    )
     (suite,) = JUnitXml.fromfile(str(tmp_path / "x.xml"))
     assert next(case.classname for case in suite if case.result) == name.replace("\x07", "?")
     table = [row for row in (tmp_path / "x.md").read_text().splitlines() if row.startswith("|")]
@@ -153,7 +156,7 @@ def test_a_reference_that_is_not_trusted_keeps_metrics_within_limits_from_holdin
     document: Any, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path, document, '[[limit]]\nmetric = "ate.rmse"\nestimators = "ekf"\nat_most = 0.5\n')
-    code = check(tmp_path / "out", tmp_path / "limits.toml", None, Outputs(tmp_path / "check.xml"))
+    code = check_files(tmp_path / "out", tmp_path / "limits.toml", None, Outputs(tmp_path / "check.xml"))
     assert said in capsys.readouterr().out
     report = JUnitXml.fromfile(str(tmp_path / "check.xml"))
     assert (code, report.errors) == ((2, 1) if document is UNTRUSTED else (0, 0))
@@ -164,7 +167,7 @@ def test_files_are_written_all_or_none(tmp_path: Path) -> None:
     there = everything_in(tmp_path)
     outputs = Outputs(tmp_path / "check.xml", tmp_path / "check.md", tmp_path / "missing" / "check.json")
     with pytest.raises(InputError, match=r"missing/check\.json"):
-        check(tmp_path / "out", tmp_path / "limits.toml", tmp_path / "baseline.json", outputs)
+        check_files(tmp_path / "out", tmp_path / "limits.toml", tmp_path / "baseline.json", outputs)
     assert everything_in(tmp_path) == there
 
 

@@ -17,11 +17,12 @@ from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
-from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.results.documents import SUMMARY
 from fgbaseline.reports.results.run import summarize
-from fgbaseline.reports.run.problem import MARK, RunSettings, build_problem
+from fgbaseline.reports.run.problem import RunSettings, build_problem
 
 from ..builders.commands import fgbaseline
+from ..builders.summaries import check_files
 
 ROOT = Path(__file__).parents[2]
 SUITES = ROOT / "suites"
@@ -45,8 +46,8 @@ class Quick:
         answers = {**self.answers, **other}
         summary = summarize(compare_all(self.problem, answers, {}))
         text = json.dumps(summary.model_dump(mode="json", by_alias=True))
-        (self.folder / MARK).write_text(text)
-        return check(self.folder, SUITES / "quick-limits.toml", self.folder / BASELINE.name, Outputs())
+        (self.folder / SUMMARY).write_text(text)
+        return check_files(self.folder, SUITES / "quick-limits.toml", self.folder / BASELINE.name)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_the_quick_suite_holds_on_two_seeds_of_four(tmp_path: Path) -> None:
     runs = {name: values for name, values in baseline["runs"].items() if name.endswith(("seed=0", "seed=1"))}
     assert len(runs) == 4
     (tmp_path / BASELINE.name).write_text(json.dumps({**baseline, "runs": runs}))
-    assert check(tmp_path / "out", SUITES / "quick-limits.toml", tmp_path / BASELINE.name, Outputs()) == 0
+    assert check_files(tmp_path / "out", SUITES / "quick-limits.toml", tmp_path / BASELINE.name) == 0
 
 
 def test_one_run_of_it_holds(quick: Quick) -> None:

@@ -13,7 +13,7 @@ from fgbaseline import data
 from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.accuracy_check import assert_accuracy
-from fgbaseline.reports.accuracy_check.command import Outputs, check
+from fgbaseline.reports.accuracy_check.command import Outputs
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits_file import read_limits
 from fgbaseline.reports.comparison import compare
@@ -22,6 +22,7 @@ from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of
 
 from ..builders.commands import fgbaseline
 from ..builders.runs import answer, as_dict, partly_known, run_of, scene, standard_run
+from ..builders.summaries import check_files
 from ..builders.synthetic import plain_problem
 from ..compare.test_common_frames import off, path
 from ..conftest import RECORDINGS
@@ -113,7 +114,7 @@ def test_a_run_with_little_ground_truth_is_undecided_and_reports_it_first(
 def test_too_small_samples_are_reported_first_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert judged(compared(3), tmp_path, LIMIT.format("translation.rmse.value")) == 2
     files = Outputs(tmp_path / "c.xml", tmp_path / "c.md", tmp_path / "c.json")
-    assert check(tmp_path, tmp_path / "limits.toml", None, files) == 2
+    assert check_files(tmp_path, tmp_path / "limits.toml", None, files) == 2
     first = "Too little data for translation.rmse.value of mine: it has a sample of 3 over "
     assert capsys.readouterr().out.startswith(first)
     assert (tmp_path / "c.md").read_text().splitlines()[2].startswith(f"> {first}")
@@ -127,7 +128,7 @@ def test_no_baseline_is_written_from_too_little(tmp_path: Path) -> None:
     limit = LIMIT.format("translation.rmse.value") + 'baseline = { better = "lower" }\n'
     (tmp_path / "comparison.json").write_text(json.dumps(compared(3)))
     (tmp_path / "limits.toml").write_text(limit)
-    code = check(tmp_path, tmp_path / "limits.toml", tmp_path / "baseline.json", Outputs(), update=True)
+    code = check_files(tmp_path, tmp_path / "limits.toml", tmp_path / "baseline.json", Outputs(), update=True)
     assert (code, (tmp_path / "baseline.json").exists()) == (2, False)
 
 

@@ -1,17 +1,35 @@
-"""Models that a run and a comparison share."""
+"""Base of the models of JSON and TOML files, and parts that a run and a comparison share."""
 
-from typing import Annotated
+import json
+from functools import cached_property
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Number = float | None
 """null for what is not a finite number; `notes` then says why"""
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Part(BaseModel):
     """An object of the file; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Document(Part):
+    """A whole file."""
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The file as nested dicts."""
+        return self.model_dump(mode="json", by_alias=True)
+
+    @classmethod
+    def json_schema(cls) -> str:
+        """JSON schema of the file, as text."""
+        schema = cls.model_json_schema(by_alias=True, mode="serialization")
+        return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
 
 
 class Spread(Part):
