@@ -236,7 +236,9 @@ def _in_memory(given: Sequence | Problem, settings: RunSettings) -> Sequence:
 
 
 def _of_images(settings: RunSettings, pictures: Pictures | None) -> Sequence:
-    from .images import TruthFile, tracked  # OpenCV is imported where there are images
+    from fgbaseline.data.tracking.sources.image_recording import TruthFile
+
+    from .images import tracked  # OpenCV is imported where there are images
 
     if settings.time_unit is not None:
         raise InputError("time-unit: the form of these images states the unit of their stamps; leave it out")
