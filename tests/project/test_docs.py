@@ -249,7 +249,7 @@ def test_the_example_on_raw_inertial_data_beats_dead_reckoning_and_shows_its_ove
     mine, reckoned, joint = (table.loc[name] for name in ("my-inertial-filter", "dead-reckoning", "joint-ekf"))  # type: ignore[attr-defined]
     for quantity in ("error to truth RMSE, m", "velocity RMSE, m/s"):
         assert joint[quantity] < mine[quantity] < 0.5 * reckoned[quantity]
-    assert mine["NEES of the 15 states, median"] > 10.0 * joint["NEES of the 15 states, median"]
+    assert mine["NEES of the state, median"] > 10.0 * joint["NEES of the state, median"]
 
 
 def test_a_command_that_does_not_run_is_noticed(place: Place) -> None:
