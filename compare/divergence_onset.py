@@ -66,7 +66,7 @@ class MaskShare(NamedTuple):
 
 def mask_share(problem: Problem) -> MaskShare:
     """Counts of the mask over the observations of the chosen features."""
-    chosen = _chosen(problem)
+    chosen = problem.of_chosen_features
     return MaskShare(int(chosen.sum()), int((chosen & (problem.excluded != Excluded.NO)).sum()))
 
 
@@ -75,8 +75,8 @@ def wrong_share(problem: Problem, frames: BoolArray) -> float | None:
 
     All shares of this module are of the observations of the chosen features.
     """
-    wrong = np.isin(problem.excluded, WRONG_MATCH)
-    there = frames[problem.sequence.observations.frame] & _chosen(problem)
+    wrong = _suspected(problem)
+    there = frames[problem.sequence.observations.frame] & problem.of_chosen_features
     return float(wrong[there].mean()) if wrong.any() and there.any() else None
 
 
@@ -93,16 +93,17 @@ def worst_second(problem: Problem) -> WorstSecond | None:
 
     Only seconds that contain a frame are visited, because stamps in wrong units may span billions of seconds.
     """
-    wrong = np.isin(problem.excluded, WRONG_MATCH)
+    wrong = _suspected(problem)
     if not wrong.any():
         return None
     t, frame = problem.sequence.t, problem.sequence.observations.frame
     seconds, place = np.unique(np.floor(t - t[0]), return_inverse=True)
-    every = np.bincount(place[frame[_chosen(problem)]], minlength=len(seconds))
+    every = np.bincount(place[frame[problem.of_chosen_features]], minlength=len(seconds))
     share = np.bincount(place[frame[wrong]], minlength=len(seconds)) / np.maximum(every, 1)
     worst = int(np.argmax(share))
     return WorstSecond(float(seconds[worst]), float(share[worst]))
 
 
-def _chosen(problem: Problem) -> BoolArray:
-    return np.asarray(problem.excluded != Excluded.FEATURE_NOT_CHOSEN, dtype=np.bool_)
+def _suspected(problem: Problem) -> BoolArray:
+    """Mask (n,) of the observations of chosen features that are excluded as `WRONG_MATCH`."""
+    return np.isin(problem.excluded, WRONG_MATCH) & problem.of_chosen_features

@@ -78,11 +78,11 @@ class InertialEvidence(Displayed):
     values: pd.DataFrame
     """see `compare.velocity_and_biases`"""
     errors: pd.DataFrame | None
-    """from the truth as it is, the world of the sigmas"""
+    """errors from the truth as it is, in the world of the sigmas"""
     aligned: pd.DataFrame | None
-    """from the truth after the alignment of `Result.truth_aligned`"""
+    """errors from the truth after the alignment of `Result.truth_aligned`"""
     divergence: pd.DataFrame | None
-    """from the reference; None for the reference itself"""
+    """differences from the reference; None for the reference itself"""
     nees: pd.DataFrame | None
     """NEES of the 15 and of each block: see `compare.state_nees`"""
 
@@ -120,11 +120,11 @@ class Result(Displayed):
     reprojection: pd.DataFrame
     """one row per observation of its landmarks: see `compare.reprojection`"""
     divergence: pd.DataFrame | None
-    """from the reference, one row per frame: see `compare.pose_errors`; None without a reference"""
+    """differences from the reference, one row per frame: see `compare.pose_errors`; None without a reference"""
     truth: pd.DataFrame | None
-    """from the truth as it is; None without truth"""
+    """errors from the truth as it is; None without truth"""
     truth_aligned: pd.DataFrame | None
-    """from the truth after alignment in yaw and position with raw inertial data, otherwise in SE(3)"""
+    """errors from the truth after alignment in yaw and position with raw inertial data, otherwise in SE(3)"""
     evidence: Evidence
     inertial: InertialEvidence | None = None
     """None for an estimate without velocity and biases"""
@@ -160,7 +160,7 @@ class Run(Displayed):
 
     problem: Problem
     results: Mapping[str, Result]
-    """by estimator name, in the order asked for"""
+    """results by name of the estimator, in the order of the request"""
     reference: str | None
     trust: compare.Trust
     common: BoolArray | None

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data import Estimate, EventKind, Excluded, Problem, Status
+from fgbaseline.data import Estimate, EventKind, Problem, Status
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.wording import distance, per_cent, plural
@@ -147,7 +147,7 @@ def trust(
         if inflated
         else "1 is expected"
     )
-    recorded = "chosen tracks'" if _features_were_chosen(problem) else "recorded ones"
+    recorded = "recorded ones" if problem.of_chosen_features.all() else "chosen tracks'"
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     intervals = max(1, problem.n_frames - 1)
     motion_data = "velocities" if problem.imu is None else "inertial samples"
@@ -222,17 +222,9 @@ def expected_observations(problem: Problem) -> BoolArray:
     FAR_POINT) do not count, as they determine no depth; observations without positive disparity, which are impossible,
     do.
     """
-    observations = problem.sequence.observations
-    d = disparity(observations.pixel)
-    counted = ~((d > 0.0) & (d <= FAR_POINT))
-    if _features_were_chosen(problem):
-        counted &= np.isin(observations.landmark, problem.features)
+    d = disparity(problem.sequence.observations.pixel)
+    counted = problem.of_chosen_features & ~((d > 0.0) & (d <= FAR_POINT))
     return np.asarray(problem.mask | counted, dtype=np.bool_)
-
-
-def _features_were_chosen(problem: Problem) -> bool:
-    """Whether the problem has only some of the landmarks that its mask leaves."""
-    return bool((problem.excluded == Excluded.FEATURE_NOT_CHOSEN).any())
 
 
 def has_positive_disparity(problem: Problem) -> BoolArray:

@@ -15,7 +15,7 @@ from .so3 import FloatArray
 from .stereo import MIN_DEPTH, StereoCamera, StereoRows
 
 UNIT_LENGTH = 0.1
-"""m, that tolerances are multiples of in place of a baseline: that of a small stereo rig"""
+"""m, in place of a baseline, as the unit of tolerances: the baseline of a small stereo rig"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class MonocularCamera:
 
     @property
     def unit_length(self) -> float:
-        """Length (m) that tolerances are multiples of."""
+        """Length (m) of which tolerances are multiples."""
         return UNIT_LENGTH
 
     @property
@@ -71,7 +71,7 @@ def left_of(camera: Camera) -> MonocularCamera:
 
 
 def require_stereo(camera: Camera, what: str) -> StereoCamera:
-    """The stereo camera of a recording. Raises FgbaselineError, naming what needs it, where there is one camera."""
+    """Stereo camera of a recording. Raises FgbaselineError, naming what needs it, where there is one camera."""
     if isinstance(camera, StereoCamera):
         return camera
     raise FgbaselineError(f"{what} needs a stereo camera, and this recording has one camera")

@@ -60,7 +60,7 @@ class StereoCamera:
 
     @property
     def unit_length(self) -> float:
-        """Length (m) that tolerances are multiples of: the baseline."""
+        """Length (m) of which tolerances are multiples: the baseline."""
         return self.baseline
 
     @property

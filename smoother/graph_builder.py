@@ -37,8 +37,8 @@ class GraphBuilder:
         self.landmark_position: dict[int, FloatArray] = {}
         """landmark -> position (3,), m, as estimated at its latest observation"""
         self.current_poses: Callable[[IntArray], FloatArray] | None = None
-        """poses (n, 4, 4) of frames (n,) as the graph has them now: set for one camera, whose landmarks wait for
-        parallax that is small beside what later frames move the path by"""
+        """poses (n, 4, 4) of frames (n,) by the latest solution of the graph. It is set for one camera only: its
+        landmarks are initialized late, and later frames have changed the path by more than their parallax."""
 
     def frame_update(
         self, k: int, observed: range, known: Collection[int], dropped: Collection[int], first_frame: int = 0
@@ -90,7 +90,7 @@ class GraphBuilder:
         return states
 
     def _path(self, candidates: list[int], states: FrameStates) -> FloatArray:
-        """Poses (T, 4, 4) along which candidates are triangulated: those of `states`, or of the graph as it is now."""
+        """Poses (T, 4, 4) along which candidates are triangulated: those of `states`, or of the graph's solution."""
         if self.current_poses is None or states is not self.online or not candidates:
             return states.world_T_imu
         frames, path = self.uninitialized.frames(candidates), states.world_T_imu.copy()

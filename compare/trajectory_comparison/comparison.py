@@ -41,7 +41,7 @@ class Result(Displayed):
     divergence: Columns
     """see `compare.divergence_along_path`: along, across, up and heading over the distance traveled"""
     relative: dict[str, Columns]
-    """by delta, such as `10 m`: see `compare.relative_errors`; without deltas longer than the path"""
+    """relative errors by delta, such as `10 m`, of deltas not longer than the path: see `compare.relative_errors`"""
     segments: SegmentErrors | None
     drift: Mapping[str, Rate] | None
     """see `compare.drift`"""
@@ -83,7 +83,7 @@ class Comparison(Displayed):
     reference: Entry
     reference_pixels: "Pixels | None"
     results: dict[str, Result]
-    """by name, in the order of the input"""
+    """results by name, in the order of the input"""
     up: FloatArray
     """(3,) in the reference's world"""
     up_from: str

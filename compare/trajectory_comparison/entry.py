@@ -18,7 +18,7 @@ class Entry(Displayed):
 
     trajectory: Trajectory
     landmarks: "Landmarks | None" = None
-    """in the trajectory's own world"""
+    """landmarks in the world of the trajectory"""
     covariance: FloatArray | None = None
     """(n, 6, 6) of the right perturbation of each pose"""
     up: FloatArray | None = None

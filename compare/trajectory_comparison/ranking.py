@@ -22,7 +22,7 @@ class Ranking(Displayed):
     """Position errors over the stamps that all ranked estimates have: see `compare.rankable`."""
 
     at: dict[str, IntArray]
-    """by name, nearest first: indices of the pairs of poses at these stamps"""
+    """indices of the pairs of poses at these stamps, by name, nearest first"""
     common: dict[str, ErrorStatistics]
     """statistics over them, in this order"""
     behind: dict[str, RmseDifference]

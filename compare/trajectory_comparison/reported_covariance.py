@@ -26,9 +26,9 @@ class ReportedCovariance(Displayed):
     nees: FloatArray
     """(n,) see `compare.nees`; NaN where the covariance is held at zero, or is not positive definite"""
     not_positive_definite: int
-    """number of covariances that are not"""
+    """number of covariances that are not positive definite"""
     remark: str = ""
-    """how the alignment changed errors and covariances"""
+    """remark on changes of errors and covariances by the alignment"""
 
 
 def reported_covariance(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> ReportedCovariance:

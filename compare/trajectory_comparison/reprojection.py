@@ -22,11 +22,11 @@ class Pixels(Displayed):
     """Reprojection errors of one trajectory: tables of `compare.reprojection`, `used` being the problem's mask."""
 
     own: pd.DataFrame | None
-    """with its own landmarks; None without"""
+    """residuals of its own landmarks; None without"""
     common: pd.DataFrame | None
-    """those over the observations that all trajectories with own landmarks have"""
+    """residuals of its own landmarks over the observations that all trajectories with own landmarks have"""
     along: pd.DataFrame | None
-    """with landmarks triangulated along the trajectory; None where no frame has a pose"""
+    """residuals of landmarks triangulated along the trajectory; None where no frame has a pose"""
     frames: int
     """number of the recording's frames that have a pose"""
     notes: dict[str, str]

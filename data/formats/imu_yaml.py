@@ -18,7 +18,7 @@ KEYS = {
     "accelerometer_density": "accelerometer_noise_density",
     "accelerometer_walk": "accelerometer_random_walk",
 }
-"""those of EuRoC and Kalibr, by the fields of `ImuNoise`"""
+"""keys of EuRoC and Kalibr by the fields of `ImuNoise`"""
 GRAVITY = ("gravity_magnitude", "gravity")
 NOT_APPLIED = "Its pose in the body is not the identity and is not applied: imu_T_cam has to be that of the IMU itself."
 

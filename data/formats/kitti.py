@@ -16,7 +16,7 @@ NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3
 """largest error of orthogonality of the nine numbers: files with four digits are within it"""
 EXACT = 1e-14
-"""up to which they are left as they are"""
+"""error of orthogonality up to which rotations are left unchanged"""
 
 
 def kitti_poses(values: FloatArray, line: IntArray) -> FloatArray:

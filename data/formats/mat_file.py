@@ -24,7 +24,7 @@ from .array_stream import ArrayStream, Readable, Shape, damage_as_input_error, m
 
 HEADER = 128
 STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""how numbers lie in the file, whatever the class of the variable"""
+"""storage types of numbers in the file, whatever the class of the variable"""
 INT8, INT32, UINT32, MATRIX, COMPRESSED = 1, 5, 6, 14, 15
 DENSE_CLASSES = range(6, 16)
 """double, single and the integers; what is below are cells, structures, objects, texts and sparse matrices"""

@@ -166,6 +166,16 @@ class Problem(Displayed):
         mask: BoolArray = self.excluded == Excluded.NO
         return mask
 
+    @property
+    def of_chosen_features(self) -> BoolArray:
+        """Mask (n,) of the sequence's observations of chosen features, excluded ones included; all without a choice.
+
+        An observation that another reason excludes has that reason as its code, whether or not its landmark is chosen.
+        """
+        if not (self.excluded == Excluded.FEATURE_NOT_CHOSEN).any():
+            return np.ones(len(self.excluded), dtype=np.bool_)
+        return np.isin(self.sequence.observations.landmark, self.features)
+
     def _heading(self) -> str:
         return f"Problem {self.preset} of {self.sequence.name}"
 

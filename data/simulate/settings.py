@@ -119,7 +119,7 @@ class Simulation:
     angular_axes: str = IDENTITY
 
     features_per_frame: float = 70.0
-    """how many points are tracked at a time, on average"""
+    """average number of points that are tracked at a time"""
     track_length: float = 14.0
     """median number of frames after which the tracker loses a point that stays in view"""
     nearest: float | None = None
@@ -136,7 +136,7 @@ class Simulation:
     sigma_pixel: float = 0.5
     """px, noise of each of uL, vL, uR, vR"""
     row_correlation: float = 0.0
-    """between the noise of vL and vR; on the real recordings vL - vR has a deviation of only 0.35 to 0.43 px"""
+    """correlation of the noise of vL and vR; on real recordings vL - vR has a deviation of only 0.35 to 0.43 px"""
     wrong_share: float = 0.03
     """share of the observations that are wrong matches; half of them single, half from one frame on to the track's
     end"""

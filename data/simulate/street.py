@@ -43,9 +43,9 @@ class Street:
         bend = np.abs(self._curvature) > _CORNER
         index = np.arange(len(bend))
         self._straight = _next(index, ~bend)
-        """for each meter the next one that is not in a corner"""
+        """next meter, of each meter, that is not in a corner"""
         self._corner = _next(index, bend)
-        """for each meter the next one in a corner"""
+        """next meter, of each meter, that is in a corner"""
 
     def points(self, t: FloatArray, rng: np.random.Generator) -> FloatArray:
         """One point (n, 3) in the path's world, m, for each time (n,): before the car of that time, not always seen."""

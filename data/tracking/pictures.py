@@ -41,7 +41,7 @@ class Pictures:
     size: tuple[int, int] | None = None
     """width and height of the rectified images before downscaling, px"""
     pairs: dict[int, Picture] = field(default_factory=dict)
-    """by the number of the frame"""
+    """pictures by the number of the frame"""
 
     def add(self, frame: int, t: float, *images: Image) -> None:
         """Adds the images of a frame, left and right or left alone, if its turn has come."""

@@ -34,7 +34,7 @@ class TrackedRecording:
     """Tracks of a recording of images, over the frames whose images could be read."""
 
     recording: ImageRecording
-    """with t, velocities and truth of these frames"""
+    """recording of images, with t, velocities and truth of these frames"""
     camera: Camera
     """rectified"""
     imu_T_cam: FloatArray

@@ -14,7 +14,7 @@ from fgbaseline.geometry import FloatArray
 from .axes import LAGS
 
 MIN_CORRELATION = 0.6
-"""from which on the ratio of two signals is known within a factor of 1 / MIN_CORRELATION"""
+"""correlation from which on the ratio of two signals is known within a factor of 1 / MIN_CORRELATION"""
 CHANCE = 4.5
 """standard deviations of the correlation of noise"""
 SURE = 3.0

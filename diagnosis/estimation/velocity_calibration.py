@@ -18,7 +18,7 @@ from .result import Diagnosis
 from .velocity_outliers import VelocityOutliers, velocity_outliers
 
 MIN_INTERVALS = 20
-"""with a motion from odometry"""
+"""number of intervals with a motion from odometry"""
 SURE_SHIFT = 2.0
 """standard errors from a usual shift, beyond which another one is used; STANDARD_ERROR_FACTOR is in them already"""
 SNAP = 0.15

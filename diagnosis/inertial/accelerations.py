@@ -20,7 +20,7 @@ MIN_WINDOWS = 12
 FARTHEST = 30.0
 """m/s^2, changes beyond which are wrong motions of the cameras"""
 MIN_CORRELATION = 0.5
-"""from which on both show the same changes"""
+"""correlation from which on both show the same changes"""
 
 
 class AccelerationChanges(NamedTuple):

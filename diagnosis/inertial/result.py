@@ -26,7 +26,7 @@ class InertialDiagnosis(Displayed):
     """Start, path, noise and faults of a recording with raw inertial samples."""
 
     sequence: Sequence
-    """in rad/s, m/s^2 and m, in the axes of imu_T_cam"""
+    """recording in rad/s, m/s^2 and m, in the axes of imu_T_cam"""
     recorded: Sequence
     cannot_tell: str = ""
     """reason for which no start is found, in a sentence without its full stop; empty otherwise"""

@@ -21,7 +21,7 @@ from .units import mean_rates
 
 MIN_INTERVALS = 20
 LEAD = 0.3
-"""by which the correlation of the best convention with the cameras must exceed that of the axes as recorded"""
+"""lead of the best convention's correlation with the cameras over that of the axes as recorded"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,7 +18,7 @@ MIN_INTERVALS = 20
 PRIOR = np.array([0.2] * 3 + [0.2] * 3 + [0.1, 0.1])
 """rad/s, rad, s and share: wide beside what a recording determines"""
 CORRELATED = 2.0
-"""on standard errors, since errors of neighboring intervals are correlated"""
+"""factor on standard errors, since errors of neighboring intervals are correlated"""
 SYSTEMATIC = 0.02
 """px between frames by which tracks err together: trackers shorten motions of tenths of a pixel"""
 SATURATED = 5

@@ -45,7 +45,7 @@ class MonocularStart(NamedTuple):
     window: Window | None
     """None where no window has a solution"""
     remark: str
-    """how well the scale is determined, a sentence without its full stop"""
+    """sentence on the accuracy of the scale, without its full stop"""
 
     def path(self, n_frames: int) -> FloatArray:
         """Poses (T, 4, 4) of the window and of frame 0, NaN elsewhere."""

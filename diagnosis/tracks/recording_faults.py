@@ -9,7 +9,7 @@ from fgbaseline.geometry import FloatArray, disparity
 SWAPPED = 0.9
 """share of the disparities that are negative"""
 MIN_OBSERVATIONS = 20
-"""from which on a share is meaningful"""
+"""number of observations from which on a share is meaningful"""
 LONGEST_GAP, MANY_INTERVALS = 1000.0, 1e4
 """s, and median intervals: a gap beyond both is bridged by no velocity and no inertial sample"""
 

@@ -21,7 +21,7 @@ from .state import JointState
 KNOWN = 0.3
 """relative sigma below which a landmark's inverse depth is known"""
 MIN_KNOWN = 5
-"""known landmarks that make a scene"""
+"""number of known landmarks from which on the depth of the scene is estimated"""
 UNKNOWN_SCALE = 1.0
 """sigma of c where no landmark is known"""
 
@@ -30,17 +30,17 @@ class SceneDepth(NamedTuple):
     """Inverse depth of a scene, of which the state knows some landmarks."""
 
     mean: float
-    """1/m, exp(c)"""
+    """exp(c), the inverse depth of the scene, 1/m"""
     spread: float
     """sigma of e"""
     covariance: FloatArray
-    """(size,) of the error of c with that of the state"""
+    """(size,) covariance of the error of c with that of the state"""
     variance: float
     """variance of c"""
 
 
 def scene_depth(prior: InverseDepthPrior, state: JointState, cam_T_imu: FloatArray) -> SceneDepth:
-    """The depth of the known landmarks in front of the camera, or else that of the problem."""
+    """Inverse depth of the known landmarks in front of the camera; without enough of them that of the problem."""
     spread = prior.sigma / prior.mean
     rho, H_pose, H_xi = inverse_depths(state.pose, cam_T_imu, state.charts, state.xi)
     sigma = np.sqrt(np.diagonal(state.P)[state.n_body + 2 :: 3])
@@ -62,7 +62,7 @@ def inverse_depths(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Inverse depths (n,), 1/m, of landmarks xi (n, 3) in charts (n, 4, 4), with Jacobians (n, 6) and (n, 3).
 
-    They are by the right perturbation of the pose (4, 4) and by xi.
+    These are w.r.t. the right perturbation of the pose (4, 4) and w.r.t. xi.
     """
     imu_T_world = se3.affine_inverse(pose)
     in_imu = homogeneous(charts, xi) @ imu_T_world.T

@@ -55,7 +55,7 @@ def generators(charts: FloatArray) -> FloatArray:
 
 
 def motion_jacobian(generators: FloatArray, xi: FloatArray) -> FloatArray:
-    """Jacobian (n, 3, 6) of coordinates (n, 3) by a small rigid motion exp(g) of the world, g = [v, w].
+    """Jacobian (n, 3, 6) of coordinates (n, 3) w.r.t. a small rigid motion exp(g) of the world, g = [v, w].
 
     d xi = Y_123 - xi Y_4 with Y = sum of g_i Z_i [xi; 1], Z (n, 6, 4, 4) the `generators` of the charts.
     """

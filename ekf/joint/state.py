@@ -25,9 +25,9 @@ class CommonError(NamedTuple):
     """Error c that n new landmarks have in common."""
 
     jacobian: FloatArray
-    """(n, 3) of their coordinates by c"""
+    """(n, 3) Jacobian of their coordinates w.r.t. c"""
     covariance: FloatArray
-    """(size,) of c with the error state"""
+    """(size,) covariance of c with the error state"""
     variance: float
     """variance of c"""
 

@@ -14,7 +14,7 @@ from ..results.metric import Metric
 from .evidence import MEANING
 
 MOST_CASES = 10
-"""up to which each case has a sentence"""
+"""number of cases up to which each has a sentence"""
 TABLE = (
     "Means over the runs of a case. ATE, divergence and held-out error have 95 % intervals over several runs "
     "(Student's t). ATE: RMSE after SE(3) alignment to the ground truth. Divergence: RMSE from the reference of each "

@@ -1,4 +1,4 @@
-"""States of the frames as a smoother holds them: poses, and with raw inertial data velocities and biases."""
+"""States of the frames in a smoother: poses, and with raw inertial data velocities and biases."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -55,7 +55,7 @@ class FrameStates:
         )
 
     def given_pose(self, k: int) -> FloatArray:
-        """Covariance (9, 9) of velocity and biases of frame k where its pose is known."""
+        """Covariance (9, 9) of velocity and biases of frame k, conditioned on its pose."""
         P = self.covariance[k]
         explained = P[6:, POSE] @ np.linalg.pinv(P[POSE, POSE], rcond=1e-12, hermitian=True) @ P[POSE, 6:]
         return np.asarray(P[6:, 6:] - explained, dtype=np.float64)
@@ -125,7 +125,7 @@ class FrameStates:
             getattr(self, field.name)[:first] = getattr(other, field.name)[:first]
 
     def answer(self, estimate: Estimate) -> Estimate:
-        """The estimate with these states and their covariances."""
+        """Estimate with these states and their covariances."""
         answer = replace(estimate, world_T_imu=self.world_T_imu, covariance=self.covariance[:, POSE, POSE])
         if not self.inertial:
             return answer

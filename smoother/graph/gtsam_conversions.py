@@ -47,7 +47,7 @@ def state_covariances(problem: Problem, covariance: Any, first: int = 0) -> Floa
     """Covariances (n, 6, 6) of the poses of the frames from `first` on, or (n, 15, 15) of their states, from GTSAM's
     order to ours.
 
-    Directions of the first pose that the problem holds have none, and not what stands for zero in the graph.
+    They are zero in the fixed directions of the first pose, where the graph has small sigmas in place of zero.
     """
     matrix = reorder_tangent(covariance)
     if problem.start is not None:
@@ -70,7 +70,7 @@ def reorder_tangent(covariance: Any) -> FloatArray:
 
 
 def bias_to_gtsam(bias: FloatArray) -> gtsam.imuBias.ConstantBias:
-    """Biases (6,), gyroscope first, as GTSAM has them."""
+    """GTSAM's bias of biases (6,), gyroscope first."""
     return gtsam.imuBias.ConstantBias(bias[3:], bias[:3])
 
 
@@ -80,12 +80,12 @@ def bias_from_gtsam(bias: gtsam.imuBias.ConstantBias) -> FloatArray:
 
 
 def poses_from_values(values: gtsam.Values, frames: Iterable[int]) -> FloatArray:
-    """Poses world_T_imu (n, 4, 4) of the frames, renormalized: GTSAM's lose that by rounding in long descents."""
+    """Poses world_T_imu (n, 4, 4) of the frames, renormalized: rounding accumulates over many steps of GTSAM."""
     return rigid_poses(np.array([values.atPose3(pose_key(k)).matrix() for k in frames]).reshape(-1, 4, 4))
 
 
 def rigid_poses(poses: FloatArray) -> FloatArray:
-    """Poses (n, 4, 4), changed in place: the rotations normalized."""
+    """Normalize the rotations of poses (n, 4, 4) in place."""
     poses[:, :3, :3] = so3.rotation_from_quaternion(so3.quaternion_xyzw(poses[:, :3, :3]))
     return poses
 

@@ -13,12 +13,12 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 POSE, VELOCITY, BIAS = "x", "v", "w"
-"""the letters of a frame's variables; b is that of a class of landmarks"""
+"""letters of a frame's variables; b, usual for biases, is that of a class of landmarks"""
 LANDMARK = "l"
 """letter of landmark keys without thresholds"""
 LETTERS = "abcdefghijk"
 NEAREST, RATIO = 10.0, 1.6
-"""nearest class in baselines; each class reaches RATIO times as far as the one before"""
+"""distance of the nearest class, in baselines; that of the next class is RATIO times larger"""
 
 
 _LETTER_AT = 56
@@ -27,11 +27,11 @@ _POSES, _LANDMARKS = ord(POSE) << _LETTER_AT, ord(LANDMARK) << _LETTER_AT
 _VELOCITIES, _BIASES = ord(VELOCITY) << _LETTER_AT, ord(BIAS) << _LETTER_AT
 
 AUXILIARY_POSE = ord("z") << _LETTER_AT
-"""the key of a pose that hangs on the newest one alone and is eliminated after it.
+"""Key of an auxiliary pose, which a factor connects to the newest pose only and which is eliminated last.
 
-It carries no information, but makes a root of two poses, where the covariance of the newest one is at hand. Without it
-GTSAM would find that pose at the end of a clique with all that a frame sees, and invert the whole of it for each frame.
-With raw inertial data it hangs on all variables of the newest frame.
+It adds no information. It makes a root clique of two poses, in which the covariance of the newest one is cheap. Without
+it that pose would be in a clique with all observed landmarks, which GTSAM would invert as a whole for each frame. With
+raw inertial data the auxiliary pose is connected to all variables of the newest frame.
 """
 _FRAME_LETTERS = frozenset([*map(ord, (POSE, VELOCITY, BIAS)), AUXILIARY_POSE >> _LETTER_AT])
 
@@ -42,7 +42,7 @@ def pose_key(frame: int) -> int:
 
 
 def state_keys(frame: int, inertial: bool) -> list[int]:
-    """The keys of a frame's variables: its pose, and with raw inertial data its velocity and its biases."""
+    """Keys of a frame's variables: its pose, and with raw inertial data its velocity and its biases."""
     return [_POSES | frame, _VELOCITIES | frame, _BIASES | frame] if inertial else [_POSES | frame]
 
 
@@ -63,7 +63,7 @@ def distance_key(landmark: int, distance: float) -> int:
 
 
 def landmark_of(key: int) -> int | None:
-    """The landmark that a key stands for; None for a variable of a frame."""
+    """Landmark of a key; None for a variable of a frame."""
     return None if key >> _LETTER_AT in _FRAME_LETTERS else key & ((1 << _LETTER_AT) - 1)
 
 

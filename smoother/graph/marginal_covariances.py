@@ -19,14 +19,14 @@ from fgbaseline.geometry import FloatArray
 
 
 class _Joint(NamedTuple):
-    """Some variables and their joint covariance."""
+    """Joint covariance of some variables."""
 
     columns: dict[int, range]
     """columns of each variable, by its key"""
     covariance: FloatArray
 
     def of(self, keys: list[int]) -> list[int]:
-        """The columns of some of the variables, in the order of their keys."""
+        """Columns of some of the variables, in the order of their keys."""
         return [i for columns in map(self.columns.__getitem__, keys) for i in columns]
 
     def part(self, keys: list[int]) -> FloatArray:
@@ -38,11 +38,11 @@ class _Joint(NamedTuple):
 
 
 class _Conditional(NamedTuple):
-    """p(x_i | x_S)."""
+    """Conditional p(x_i | x_S) of an eliminated variable."""
 
     key: int
     later: list[int]
-    """the keys of S"""
+    """keys of S"""
     inverse: FloatArray
     """(d, d) R_i^-1"""
     density: gtsam.GaussianConditional
@@ -96,7 +96,7 @@ def marginal_covariances(
 
 
 def _chronological(values: gtsam.Values, frames: list[list[int]]) -> gtsam.Ordering:
-    """Landmarks first, then the states of the frames in time.
+    """Elimination order: landmarks first, then the states of the frames in temporal order.
 
     The backward sweep then is a Rauch-Tung-Striebel smoother, which is stable. With raw inertial data COLAMD eliminates
     some states between later and earlier ones; its gains, as large as 1 / dt^2, multiply rounding errors from frame to
@@ -157,7 +157,7 @@ def _leaves(leaves: list[_Conditional], parent: _Joint) -> dict[int, FloatArray]
 
 
 def joint_covariance(tree: gtsam.ISAM2, keys: list[int]) -> FloatArray:
-    """The joint covariance of variables of a tree, in their order, from its linearization point."""
+    """Joint covariance of variables of a tree, in their order, from its linearization point."""
     if len(keys) == 1:
         return np.asarray(tree.marginalCovariance(keys[0]), dtype=np.float64)
     return np.asarray(tree.jointMarginalCovariance(keys).fullMatrix(), dtype=np.float64)

@@ -46,7 +46,7 @@ class EliminationOrdering:
         for key in landmarks:
             seen.pop(key, None)
             seen[key] = frame
-        # COLAMD takes no group beyond the number of variables: the pose, its tail, the one before and what is seen.
+        # COLAMD takes no group above the number of variables: two poses, the auxiliary pose and the landmarks.
         most = len(landmarks) + (frame > 0)
         if len(landmarks) > MANY_LANDMARKS:
             return self._with_states({}, [frame], [1])
@@ -67,10 +67,10 @@ class EliminationOrdering:
         return self._with_states(groups, [*range(oldest, frame), frame], [*of_frame, last])
 
     def _with_states(self, landmarks: dict[int, int], frames: Sequence[int], of_frame: Sequence[int]) -> dict[int, int]:
-        """Groups of landmarks with those of the states of frames in time, of which the newest is in the last group.
+        """Groups of landmarks and of the states of frames, in temporal order, with the newest state in the last group.
 
-        With raw inertial data the newest state comes after all landmarks: else they were one clique with it, and its
-        covariance far away.
+        With raw inertial data the newest state is eliminated after all landmarks. Otherwise they would be in one clique
+        with it, and its covariance would be expensive.
         """
         end = of_frame[-1] + 1
         groups = landmarks | {

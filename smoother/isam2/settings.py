@@ -11,7 +11,7 @@ from ..graph.keys import thresholds
 from ..initialization.landmark_initialization import InitializationCriterion
 
 WILDFIRE_THRESHOLD = 1e-5
-"""rad, and m for a baseline of half a meter or more: smaller changes are not propagated through the Bayes tree. The
+"""Changes below it (rad, and m for baselines from half a meter on) are not propagated through the Bayes tree. The
 default of GTSAM, 1e-3, leaves an error of 0.1 mm in the online estimate and saves no time."""
 
 
@@ -19,7 +19,7 @@ PARALLAX_SUFFICES = 0.2
 """largest deviation of a landmark over its distance, with one camera: a parallax of five of its own sigmas. Depth is
 the inverse of parallax: the second-order term, which a linearized graph loses, is this share of the sigma."""
 ONE_CAMERA_SKIP = 1
-"""updates from one relinearization to the next, with one camera: depths start far off, and the path with them"""
+"""updates from one relinearization to the next, with one camera: initial depths, and with them the path, are far off"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,16 +27,16 @@ class ISAM2Settings:
     """Settings of iSAM2; only `initialization` changes the optimum of the graph."""
 
     relinearize_position: float = 0.04
-    """baselines of the rig, of a pose: what is seen moves by no more than this share of its disparity"""
+    """threshold of a pose's translation, in baselines: points move in the image by at most this share of disparity"""
     relinearize_rotation: float = 0.002
-    """rad, of a pose"""
+    """threshold of a pose's rotation, rad"""
     relinearize_velocity: float = 0.2
-    """m/s, with raw inertial data, as for the biases: the factors are close to linear in these, and a change of one
-    bias moves all of them, so that narrow thresholds relinearize the whole chain at every update"""
+    """threshold of a velocity, m/s. With raw inertial data the factors are close to linear in velocities and biases. A
+    change of one bias changes all of them, so that narrow thresholds relinearize the whole chain at every update."""
     relinearize_gyroscope_bias: float = 0.01
-    """rad/s"""
+    """threshold of a gyroscope bias, rad/s"""
     relinearize_accelerometer_bias: float = 0.2
-    """m/s^2"""
+    """threshold of an accelerometer bias, m/s^2"""
     relinearize_landmark: float = 0.002
     """threshold of a landmark, as a share of its distance"""
     relinearize_skip: int = 3
@@ -47,9 +47,9 @@ class ISAM2Settings:
     recent_frames: int = 10
     initialization: InitializationCriterion = field(default_factory=InitializationCriterion)
     relinearize_at_end: bool = True
-    """Gauss-Newton over the whole graph after the last frame"""
+    """whether Gauss-Newton steps over the whole graph follow the last frame"""
     qr: bool = False
-    """QR in place of Cholesky: three times slower, and robust to pivots of very unequal size"""
+    """whether QR replaces Cholesky: three times slower, and robust to pivots of very unequal size"""
     tree_frames: int = 600
     """frames in the tree at which those before the last `kept_frames` are marginalized into a linear prior; frames of
     tracks that continue are kept"""

@@ -360,7 +360,7 @@ def test_truth_and_samples_are_checked_before_the_images_are_read(
     with pytest.raises(InputError, match=f"^{file}: the file has no {what} in it"):
         track(euroc)
     file.write_text("1,2\n")
-    with pytest.raises(InputError, match=f"^{file}: line 1: (expected|it has 2 words)"):
+    with pytest.raises(InputError, match=f"^{file}: line 1: (expected|it has 2 fields)"):
         track(euroc)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.compare.divergence_onset import divergence_onset, mask_share, worst_second
+from fgbaseline.compare.divergence_onset import divergence_onset, mask_share, worst_second, wrong_share
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, EventKind, Excluded, Observations
 from fgbaseline.reports.formatting import number
@@ -102,8 +102,23 @@ def test_the_mask_sentence_counts_every_reason_and_its_worst_second_is_that_of_t
     marked = [b["frame"] for b in page_data(run)["bookmarks"] if "moving" in b["text"]]
     assert len(marked) == 1
     assert worst.second <= t[marked[0]] - t[0] < worst.second + 1.0
-    unchosen = np.where(frame > 30, excluded, Excluded.FEATURE_NOT_CHOSEN).astype(np.uint8)
-    assert mask_share(replace(problem, excluded=unchosen)).observations == int((frame > 30).sum())
+
+
+def test_with_chosen_features_the_mask_is_counted_over_their_observations() -> None:
+    """Excluded observations of other landmarks keep their reason, and do not count."""
+    problem = plain_problem(scene())
+    frame, landmark = problem.sequence.observations.frame, problem.sequence.observations.landmark
+    features = problem.features[::2]
+    chosen = np.isin(landmark, features)
+    excluded = np.where(frame == 41, np.uint8(Excluded.PREDICTION), problem.excluded)
+    excluded[(excluded == Excluded.NO) & ~chosen] = Excluded.FEATURE_NOT_CHOSEN
+    few = replace(problem, features=features, excluded=excluded)
+    assert mask_share(few) == (int(chosen.sum()), int((chosen & (frame == 41)).sum()))
+    everywhere = np.ones(problem.n_frames, dtype=np.bool_)
+    assert wrong_share(few, everywhere) == float((frame == 41)[chosen].mean())
+    worst = worst_second(few)
+    assert worst is not None
+    assert worst.share <= 1.0
 
 
 def test_a_reference_with_a_larger_error_than_the_filter_is_reported() -> None:
