@@ -18,7 +18,7 @@ from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
-from .monocular.problem import monocular_problem
+from .monocular.problem import as_recorded_monocular, monocular_problem
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
@@ -87,8 +87,8 @@ def _inertial(
         raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
     if sequence.monocular:
         if settings is not None:
-            return monocular_problem(sequence, features, settings.noise.pixel, settings.kernel)
-        return monocular_problem(sequence, features, None, HuberKernel())
+            return as_recorded_monocular(sequence, features, settings.noise.pixel, settings.kernel)
+        return monocular_problem(diagnose_inertial(sequence), features)
     if settings is not None:
         return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
     return inertial_problem(diagnose_inertial(sequence, processes), features)

@@ -5,9 +5,7 @@ from typing import Any
 
 import click
 
-from .options import BODY, PATH, UNITS, Formats, NamedFile, Numbers, open_page
-
-XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
+from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, open_page
 
 
 @click.command(

@@ -58,6 +58,7 @@ def run(
     landmarks: Literal["in-turn", "held"] = "in-turn",
     truth: FilePath | Trajectory | Truth | Array | tuple[Array, Array] | None = None,
     truth_frame: Literal["imu", "camera"] | None = None,
+    truth_up: tuple[float, float, float] | None = None,
     as_recorded: bool = False,
     imu: FilePath | None = None,
     imu_calibration: FilePath | None = None,
@@ -95,6 +96,8 @@ def run(
         landmarks: Landmarks of the documented SLAM: updated in turn with the pose, or held.
         truth: Ground truth: a file, a `Truth`, poses (T, 4, 4) by frame, or stamps (n,), s, with poses (n, 4, 4).
         truth_frame: Body whose poses the ground truth has; a `Truth` has those of the imu.
+        truth_up: Up in the world of the ground truth of raw inertial data; by default its z axis within 0.5° of what
+            the samples measure, and beyond that what they measure.
         as_recorded: No diagnosis and no repairs; the noise is assumed.
         imu: CSV of raw inertial samples, in place of the recording's velocities.
         imu_calibration: YAML of their noise; by default assumed.
@@ -127,6 +130,7 @@ def run(
         landmarks=LandmarkMode(landmarks),
         truth=_truth_source(truth),
         truth_frame=truth_frame,
+        truth_up=truth_up,
         seed=seed,
         as_recorded=as_recorded,
         time_unit=None if time_unit is None else TimeUnit(time_unit),

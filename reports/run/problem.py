@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from fgbaseline.data import (
     HeldOut,
     LandmarkMode,
@@ -57,6 +59,8 @@ class RunSettings:
     landmarks: LandmarkMode = LandmarkMode.UPDATED
     truth: Path | ParsedTrajectory | Trajectory | Truth | None = None
     truth_frame: BodyFrame | None = None
+    truth_up: tuple[float, float, float] | None = None
+    """up in the world of the ground truth; None to find it"""
     seed: int = 0
     as_recorded: bool = False
     """no diagnosis, no repairs, assumed noise"""
@@ -113,6 +117,7 @@ class RunSettings:
             "landmarks": str(self.landmarks),
             "truth": _source_of(self.truth),
             "truth_frame": self.truth_frame,
+            **({} if self.truth_up is None else {"truth_up": ",".join(f"{x:g}" for x in self.truth_up)}),
             "seed": self.seed,
             "as_recorded": self.as_recorded,
             "time_unit": None if self.time_unit is None else str(self.time_unit),
@@ -188,6 +193,18 @@ def import_estimators(names: tuple[str, ...]) -> None:
 
 def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Sequence:
     """Reads or simulates the recording with its ground truth; `pictures` gets its images. Raises InputError."""
+    sequence = _read(settings, pictures)
+    if settings.truth_up is None:
+        return sequence
+    length = float(np.linalg.norm(settings.truth_up))
+    if sequence.truth is None or not (np.isfinite(length) and length > 0.0):
+        given = ",".join(f"{x:g}" for x in settings.truth_up)
+        why = "is no direction" if sequence.truth is not None else "is given without a ground truth; add --truth FILE"
+        raise InputError(f"truth-up: {given} {why}")
+    return replace(sequence, truth=replace(sequence.truth, up=np.array(settings.truth_up) / length))
+
+
+def _read(settings: RunSettings, pictures: Pictures | None) -> Sequence:
     if settings.sequence is None:
         if settings.time_unit is not None:
             raise InputError("time-unit: the simulated drive has stamps in seconds; give a RECORDING with --time-unit")
