@@ -19,7 +19,7 @@ from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
 from .inertial.result import InertialDiagnosis
-from .monocular.problem import monocular_problem
+from .monocular.problem import as_recorded_monocular, monocular_problem
 from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.dropout import averaged_over_dropouts, dropout_intervals
@@ -107,16 +107,16 @@ def _inertial(
         raise InputError("repairs: a recording with raw inertial samples has none that can be set; leave them out")
     if isinstance(diagnosis, Diagnosis):
         raise InputError("diagnosis: it is one of body velocities; raw inertial samples need `diagnose_inertial`")
+    if diagnosis is not None and diagnosis.sequence.monocular != sequence.monocular:
+        raise InputError("diagnosis: it is one of another number of cameras")
     if settings is not None and settings.shift != Shift.AFTER:
         raise InputError("settings: a shift is one of body velocities, and the recording has raw inertial samples")
     if sequence.monocular:
-        if diagnosis is not None:
-            raise InputError("diagnosis: a recording with one camera has none; leave it out")
         if settings is not None:
             if settings.mask != MaskSettings():
                 raise InputError("settings: the mask predicts by stereo, and the recording has one camera")
-            return monocular_problem(sequence, features, settings.noise.pixel, settings.kernel)
-        return monocular_problem(sequence, features, None, HuberKernel())
+            return as_recorded_monocular(sequence, features, settings.noise.pixel, settings.kernel)
+        return monocular_problem(diagnosis or diagnose_inertial(sequence), features)
     if settings is not None:
         return as_recorded_inertial(sequence, features, settings.noise.pixel, settings.mask, settings.kernel)
     return inertial_problem(diagnosis or diagnose_inertial(sequence, processes), features)

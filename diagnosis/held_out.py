@@ -51,7 +51,7 @@ def _pieces(sequence: Sequence, out: Observations) -> tuple[IntArray, int]:
     copied[after] = (out.pixel[before] == out.pixel[after]).all(axis=1)
     error = TrackConsistency(alone, path, 0.0).error(before[~copied[after]], after[~copied[after]])
     settings = MaskSettings(prediction_gate=prediction_gate(error), min_track=MIN_PIECE)
-    split = split_tracks(alone, path, settings, copied)
+    split = split_tracks(alone, TrackConsistency(alone, path, settings.prediction_gate), settings, copied)
     sound = split.excluded == Excluded.NO
     piece = np.full(len(out), -1, dtype=np.int64)
     present, piece[sound] = np.unique(split.landmark[sound], return_inverse=True)

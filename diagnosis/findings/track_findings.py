@@ -27,7 +27,7 @@ def track_findings(sequence: Sequence, repeated: BoolArray, tracks: TrackStatist
         _moving(sequence, tracks),
         _disparities(sequence, tracks),
         _rows(sequence, tracks),
-        _few_features(tracks),
+        _few_features(sequence, tracks),
         _cuts(sequence, tracks),
         _gaps(sequence, tracks),
     )
@@ -36,6 +36,10 @@ def track_findings(sequence: Sequence, repeated: BoolArray, tracks: TrackStatist
 
 def _counted(code: str, sentence: str, before: float, after: float, unit: str) -> Finding:
     return Finding(code, sentence, before, after, unit, "counted")
+
+
+def _measured(sequence: Sequence) -> str:
+    return "velocities" if sequence.imu is None else "inertial samples"
 
 
 def _copies(repeated: BoolArray, tracks: TrackStatistics) -> list[Finding]:
@@ -112,13 +116,13 @@ def _rows(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     return [_counted("row_mismatch", text, tracks.rows, 0, "observations")]
 
 
-def _few_features(tracks: TrackStatistics) -> list[Finding]:
+def _few_features(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     frames = np.flatnonzero(tracks.few)
     if len(frames) == 0:
         return []
     text = (
         f"{plural(len(frames), 'frame')} of {len(tracks.usable):,} have fewer than {MIN_USABLE} usable features "
-        f"({spans(frames)}): there only the velocities determine the motion."
+        f"({spans(frames)}): there only the {_measured(sequence)} determine the motion."
     )
     return [_counted("few_features", text, len(frames), len(frames), "frames")]
 
@@ -132,7 +136,7 @@ def _cuts(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"In {plural(len(cuts), 'interval')} all tracks end at once and others begin (after frames {spans(cuts)}): the "
-        "tracker started anew, or the recording is cut there. Only the velocities determine the motion."
+        f"tracker started anew, or the recording is cut there. Only the {_measured(sequence)} determine the motion."
     )
     return [_counted("cuts", text, len(cuts), len(cuts), "intervals")]
 

@@ -12,6 +12,7 @@ from fgbaseline.data.wording import plural
 from ..estimation.result import Diagnosis
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
+from ..monocular.start import EXCITED, MonocularStart
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
 from ..tracks.image_size import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
@@ -30,7 +31,8 @@ DROPPED = 1.5
 
 def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> tuple[Finding, ...]:
     """Faults of the samples, then of the tracks; none for a clean recording. `tracks` are computed where not given."""
-    units = (*baseline_findings(found.baseline, found.recorded), *imu_unit_findings(found.units))
+    lengths = () if found.recorded.monocular else baseline_findings(found.baseline, found.recorded)
+    units = (*lengths, *imu_unit_findings(found.units))
     meaning = (*units, *axes_findings(found.axes))
     of_file = (*found.sequence.findings, *intrinsics_findings(found.sequence))
     findings = (*of_file, *meaning, *_gaps(found.sequence), *spike_findings(found.spikes))
@@ -40,16 +42,27 @@ def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = 
         findings += sensor_findings(found.sensors, stated)
     if found.odometry is None:
         return findings
+    if found.monocular is not None:
+        findings += scale_findings(found.monocular)
     return findings + track_findings(found.sequence, found.repeated, inertial_track_statistics(found, tracks))
+
+
+def scale_findings(start: MonocularStart) -> tuple[Finding, ...]:
+    """A finding where the motion of one camera does not determine its scale."""
+    if start.excited:
+        return ()
+    share = np.inf if start.window is None else start.window.solution.scale_sigma
+    sentence = start.remark[0].upper() + start.remark[1:] + "."
+    return (Finding("scale_not_excited", sentence, share, share, "1", f"1-sigma, {EXCITED:g} is allowed"),)
 
 
 def inertial_track_statistics(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> TrackStatistics:
     """Statistics of the tracks, before and after the mask."""
     sequence = found.sequence
-    alone = Diagnosis(sequence, odometry=found.odometry, repeated=found.repeated)
-    if found.path is None:
-        return track_statistics(replace(alone, odometry=None))
+    alone, tracks = Diagnosis(sequence, odometry=found.odometry, repeated=found.repeated), tracks or found.tracks
     if tracks is None:
+        if found.path is None:
+            return track_statistics(replace(alone, odometry=None))
         tracks = repaired_tracks(sequence, found.path.states.pose, MaskSettings(), TrackRepairs(), found.pixel)
     masked = replace(sequence, observations=tracks.observations, n_landmarks=tracks.n_landmarks, truth=None)
     return track_statistics(alone, Repaired(masked, tracks.excluded, tracks.gate, tracks.repairs))

@@ -11,6 +11,7 @@ from fgbaseline.data.wording import vector
 from ..findings.json_report import header
 from .findings import inertial_findings
 from .result import InertialDiagnosis
+from .sensors import SensorChecks
 
 
 def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | None = None) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | N
         "findings": [asdict(finding) for finding in findings],
         "start": _start(found),
         "sensors": _sensors(found),
-        "sigma": {"pixel": None if found.fit is None else found.fit.sigmas.pixel},
+        "sigma": {"pixel": found.pixel if found.pixel_found else None},
     }
     return {key: _finite(value) for key, value in report.items()}
 
@@ -71,10 +72,17 @@ def _sensors(found: InertialDiagnosis) -> dict[str, Any] | None:
         "time_offset_std_s": checks.time_offset[1],
         "gyro_scale": checks.gyroscope_scale[0],
         "gyro_scale_std": checks.gyroscope_scale[1],
-        "accelerometer_bias": checks.accelerometer_bias.tolist(),
-        "gravity_measured": checks.gravity[0],
+        "accelerometer_bias": None if checks.accelerometer_bias is None else checks.accelerometer_bias.tolist(),
+        "gravity_measured": None if checks.gravity is None else checks.gravity[0],
         "rest": None if checks.rest is None else checks.rest._asdict(),
     }
+
+
+def _accelerometer(checks: SensorChecks) -> str:
+    if checks.accelerometer_bias is None or checks.gravity is None:
+        return ""
+    bias, gravity = vector(checks.accelerometer_bias, 3), checks.gravity[0]
+    return f"; accelerometer: bias {bias} m/s^2, gravity {gravity:.3f} m/s^2"
 
 
 def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
@@ -91,9 +99,12 @@ def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
         scale, error = checks.gyroscope_scale
         said.append(
             f"Gyroscope against the cameras: bias {vector(checks.gyroscope_bias[0], 4)} rad/s, offset "
-            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (standard error {error:.3f}); "
-            f"accelerometer: bias {vector(checks.accelerometer_bias, 3)} m/s^2, gravity {checks.gravity[0]:.3f} m/s^2."
+            f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (standard error {error:.3f})"
+            f"{_accelerometer(checks)}."
         )
-    if found.fit is not None:
+    if found.monocular is not None:
+        remark = found.monocular.remark
+        said.append(f"{remark[0].upper()}{remark[1:]}.")
+    if found.pixel_found:
         said.append(f"Noise (1-sigma): {found.pixel:.2f} px of a pixel row.")
     return tuple(said)

@@ -8,19 +8,19 @@ from threadpoolctl import threadpool_limits
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
-from fgbaseline.geometry.monocular import require_stereo
 
 from ..conventions.rig import usual_rig
 from ..conventions.units import Units, rescaled
 from ..inertial_initialization.path import InertialPath, inertial_path
 from ..inertial_initialization.start import Start, inertial_start
+from ..monocular.pipeline import diagnose_monocular
 from ..noise.calibration_fit import fit_windows
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.recording_faults import unusable
 from ..tracks.track_segments import repeated
 from .baseline_unit import baseline_unit
 from .result import InertialDiagnosis
-from .sensor_axes import SensorAxes, in_imu_axes, sensor_axes
+from .sensor_axes import in_imu_axes, sensor_axes
 from .sensors import sensor_checks
 from .spikes import without_spikes
 from .units import imu_units, rescaled_samples
@@ -32,14 +32,10 @@ MIN_BEGINNING = 5
 
 
 def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnosis:
-    """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth.
-
-    Raises FgbaselineError for a recording of one camera.
-    """
-    require_stereo(sequence.camera, "the diagnosis")
+    """Estimates units, start, path, pixel noise and sensor errors from the recording alone, without its truth."""
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            return _diagnose(sequence, processes)
+            return diagnose_monocular(sequence) if sequence.monocular else _diagnose(sequence, processes)
     except (np.linalg.LinAlgError, ValueError, FloatingPointError, RuntimeError) as error:
         return InertialDiagnosis(sequence, sequence, f"its computation failed ({type(error).__name__}: {error})")
 
@@ -69,19 +65,21 @@ def no_start(seen: Odometry) -> str:
 
 
 def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
+    reason = unusable(recorded)
+    if reason:
+        return InertialDiagnosis(recorded, recorded, reason)
     usual = usual_rig(recorded)
-    seen = odometry(usual) if len(recorded.observations) else None
+    seen = odometry(usual)
     units = imu_units(recorded, seen)
     sequence, spikes = without_spikes(rescaled_samples(recorded, units))
-    axes = SensorAxes() if seen is None else sensor_axes(sequence, seen)
+    axes = sensor_axes(sequence, seen)
     sequence = in_imu_axes(sequence, axes)
     baseline = baseline_unit(sequence, seen)
     sequence = rescaled(sequence, Units(baseline=baseline.factor, extrinsic=baseline.extrinsic))
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
-    reason = baseline.doubt or unusable(sequence)
-    if reason or seen is None:
-        return InertialDiagnosis(sequence, recorded, reason, units, axes, baseline, imu, spikes=spikes)
+    if baseline.doubt:
+        return InertialDiagnosis(sequence, recorded, baseline.doubt, units, axes, baseline, imu, spikes=spikes)
     if usual is not recorded:  # its camera is at the IMU
         seen = odometry(sequence)
     found = InertialDiagnosis(

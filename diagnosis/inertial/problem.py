@@ -18,6 +18,7 @@ from ..inertial_initialization.start import Start
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, choose_features, exclusions
+from ..tracks.recording_faults import unusable
 from .baseline_unit import BaselineUnit, baseline_findings, baseline_unit
 from .findings import inertial_findings, inertial_repairs
 from .pipeline import found_start
@@ -61,9 +62,12 @@ def as_recorded_inertial(
 
     Raises InputError where no start is found, and for samples and a baseline in other units than rad/s, m/s^2 and m.
     """
+    reason = unusable(sequence)
+    if reason:
+        raise InputError(f"{_source(sequence)}: {reason}")
     usual = usual_rig(sequence)
     with threadpool_limits(limits=1, user_api="blas"):
-        seen = odometry(usual) if len(sequence.observations) else None
+        seen = odometry(usual)
     units = imu_units(sequence, seen)
     baseline = _baseline_unit(rescaled_samples(sequence, units), seen)
     require_si(sequence, (*baseline_findings(baseline, sequence), *imu_unit_findings(units)))
@@ -81,9 +85,9 @@ def as_recorded_inertial(
     return problem_of(sequence, excluded, features, pixel, kernel, start, path.states.pose, remarks)
 
 
-def _baseline_unit(sequence: Sequence, seen: Odometry | None) -> BaselineUnit:
+def _baseline_unit(sequence: Sequence, seen: Odometry) -> BaselineUnit:
     """The unit of the baseline, with the samples (in SI units) turned to the axes that the cameras show."""
-    return baseline_unit(sequence if seen is None else in_imu_axes(sequence, sensor_axes(sequence, seen)), seen)
+    return baseline_unit(in_imu_axes(sequence, sensor_axes(sequence, seen)), seen)
 
 
 def _source(sequence: Sequence) -> str:

@@ -12,8 +12,10 @@ from fgbaseline.data.sequence import Sequence
 
 from ..inertial_initialization.path import InertialPath
 from ..inertial_initialization.start import Start
+from ..monocular.start import MonocularStart
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
+from ..repairs.repaired_sequence import RepairedTracks
 from .baseline_unit import BaselineUnit
 from .sensor_axes import SensorAxes
 from .sensors import SensorChecks
@@ -43,8 +45,19 @@ class InertialDiagnosis(Displayed):
     fit: CalibrationFit | None = None
     sensors: SensorChecks | None = None
     """checks of gyroscope and accelerometer against the cameras"""
+    tracks: RepairedTracks | None = None
+    """with one camera, whose mask needs no path: it comes before the start"""
+    monocular: MonocularStart | None = None
+    """with one camera: what its first seconds of motion determine"""
 
     @property
     def pixel(self) -> float:
-        """px, noise of each of the four rows; assumed where it is not found."""
+        """px, noise of each row; assumed where it is not found."""
+        if self.monocular is not None:
+            return self.monocular.pixel
         return NoiseSettings().pixel if self.fit is None else self.fit.sigmas.pixel
+
+    @property
+    def pixel_found(self) -> bool:
+        """Whether the noise is found in the recording."""
+        return self.fit is not None or (self.monocular is not None and self.monocular.window is not None)

@@ -35,6 +35,8 @@ class SensorAxes:
     """sign of the specific force: -1 where it reads -9.8 upward at rest"""
     correlation: tuple[float, float] = (np.nan, np.nan)
     """correlation of the accelerometer with the cameras, as recorded and in this convention"""
+    misfit: tuple[float, float] | None = None
+    """px, with one camera: residual of the tracks along the closed-form motion, as recorded and in this convention"""
 
     @property
     def accelerometer_matrix(self) -> FloatArray:
@@ -96,6 +98,8 @@ def axes_findings(axes: SensorAxes) -> tuple[Finding, ...]:
         other = f"in other axes: those of imu_T_cam are its ({axes.accelerometer})"
         how = " and ".join(part for part in (sign, other if axes.accelerometer != IDENTITY else "") if part)
         text = f"The accelerometer is recorded {how}."
-        said = "correlation with the accelerations that the cameras see"
-        found.append(Finding("accelerometer_axes", text, *axes.correlation, "correlation", said))
+        said, figures, unit = "correlation with the accelerations that the cameras see", axes.correlation, "correlation"
+        if axes.misfit is not None:
+            said, figures, unit = "residual of tracks along the motion in closed form", axes.misfit, "px"
+        found.append(Finding("accelerometer_axes", text, *figures, unit, said))
     return tuple(found)

@@ -65,11 +65,11 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
 def _accelerometer(checks: SensorChecks) -> list[Finding]:
     found = []
     bias = checks.accelerometer_bias
-    size = float(np.linalg.norm(bias))
-    if size > MIN_ACCELEROMETER_BIAS:
+    size = 0.0 if bias is None else float(np.linalg.norm(bias))
+    if bias is not None and size > MIN_ACCELEROMETER_BIAS:
         text = f"Accelerometer bias {vector(bias, 3)} m/s^2: it is in the state of the estimators."
         found.append(Finding("accelerometer_bias", text, size, size, "m/s^2", "by the whole trajectory"))
-    gravity, given = checks.gravity
+    gravity, given = checks.gravity or (0.0, 0.0)
     if abs(gravity - given) > MIN_GRAVITY:
         text = (
             f"The accelerometer measures a gravity of {gravity:.3f} m/s^2 in place of {given:g}: a bias along the "

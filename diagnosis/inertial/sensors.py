@@ -40,9 +40,9 @@ class SensorChecks:
     """recorded over seen"""
     rate_error: tuple[float, float]
     """rad/s, median against the cameras: as recorded, and without bias, misalignment and offset"""
-    accelerometer_bias: FloatArray
-    """(3,) m/s^2, of the path at its middle"""
-    gravity: tuple[float, float]
+    accelerometer_bias: FloatArray | None
+    """(3,) m/s^2, of the path at its middle; None with one camera, whose recording has no path of its own"""
+    gravity: tuple[float, float] | None
     """m/s^2, as measured along the vertical of the path, and as given"""
     saturated: tuple[tuple[str, float, int], ...]
     """component, value and number of samples at the end of a sensor's range"""
@@ -55,8 +55,10 @@ class SensorChecks:
         return bool(np.isfinite(self.time_offset[1]))
 
 
-def sensor_checks(sequence: Sequence, seen: Odometry, path: InertialPath, start: Start | None) -> SensorChecks:
-    """The checks of a recording in SI units with its path."""
+def sensor_checks(
+    sequence: Sequence, seen: Odometry, path: InertialPath | None = None, start: Start | None = None
+) -> SensorChecks:
+    """The checks of a recording in SI units with its path, where it has one."""
     assert sequence.imu is not None
     known = seen.known
     rate, dt = mean_rates(sequence), sequence.dt
@@ -85,11 +87,10 @@ def sensor_checks(sequence: Sequence, seen: Odometry, path: InertialPath, start:
         scale = 1.0 + float(theta[7]), float(deviation[7])
         before = float(np.median(np.linalg.norm(y, axis=1)))
         after = float(np.median(np.linalg.norm(y - designs[0] @ theta, axis=1)))
-    middle = path.states.accelerometer_bias[len(path.states) // 2]
+    middle = None if path is None else path.states.accelerometer_bias[len(path.states) // 2]
+    gravity = None if path is None else _gravity(sequence, path)
     rest = None if start is None or not start.standing else rest_noise(sequence, start.standing)
-    return SensorChecks(
-        bias, turn, offset, scale, (before, after), middle, _gravity(sequence, path), tuple(_saturated(sequence)), rest
-    )
+    return SensorChecks(bias, turn, offset, scale, (before, after), middle, gravity, tuple(_saturated(sequence)), rest)
 
 
 def _nothing(n: int) -> tuple[FloatArray, FloatArray]:

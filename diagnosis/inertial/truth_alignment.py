@@ -58,7 +58,7 @@ def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:
 def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, str]:
     """(3,) the direction opposite to gravity in the truth's world, and its source."""
     if truth.up is not None:
-        return truth.up, "the up of its file"
+        return truth.up, "the up that is stated"
     measured = np.einsum("nij,nj->ni", truth.world_T_imu[known, :3, :3], path[known, 2, :3]).mean(axis=0)
     measured /= np.linalg.norm(measured)
     z = np.array([0.0, 0.0, 1.0])

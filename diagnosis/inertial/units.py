@@ -12,7 +12,6 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..conventions.rate_units import DEGREE, doubt_of_rate_unit
 from ..conventions.scale_ratio import ScaleRatio, scale_ratio
 from ..odometry.stereo_odometry import Odometry
-from ..tracks.image_size import doubt_of_intrinsics
 
 RATES = {DEGREE: "°/s", 1e-3: "mrad/s", 1e-3 * DEGREE: "m°/s"}
 FORCES = {9.80665: "g", 9.80665e-3: "mg", 1e-3: "mm/s^2"}
@@ -59,10 +58,7 @@ def _means(sequence: Sequence) -> tuple[FloatArray, FloatArray]:
 
 
 def imu_units(sequence: Sequence, seen: Odometry | None) -> ImuUnits:
-    """The units of the samples. Raises InputError where no unit explains them, and for a K of other images."""
-    doubt = doubt_of_intrinsics(sequence)
-    if doubt:
-        raise InputError(doubt)
+    """The units of the samples. Raises InputError where no unit explains them."""
     imu = sequence.imu
     assert imu is not None
     magnitude = float(np.median(np.linalg.norm(imu.specific_force, axis=1)))

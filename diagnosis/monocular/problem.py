@@ -5,66 +5,86 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.finding import Finding
 from fgbaseline.data.problem import Excluded, Problem
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
 from ..conventions.rig import doubt_of_position, is_far
+from ..inertial.findings import inertial_findings, inertial_repairs, scale_findings
 from ..inertial.problem import imu_remarks, problem_of
+from ..inertial.result import InertialDiagnosis
+from ..inertial.units import imu_unit_findings, imu_units, require_si
+from ..odometry.monocular_odometry import monocular_odometry
 from ..tracks.image_size import intrinsics_findings
-from .start import EXCITED, MonocularStart, monocular_start
+from ..tracks.recording_faults import unusable
+from .start import monocular_start
+from .track_mask import repaired
 
 SHORTEST = 3
 """observations of a track that is used: two rays intersect wherever the match is"""
 TRACKS_AS_RECORDED = (
-    "tracks of one camera are taken as recorded, without a mask but for those of fewer than three observations: wrong "
-    "matches are left to kernel and gates"
+    "tracks are taken as recorded, without a mask but for those of fewer than three observations: wrong matches are "
+    "left to kernel and gates"
 )
-SAMPLES_AS_RECORDED = "units and axes of the inertial samples are taken as recorded: one camera does not check them"
 
 
-def monocular_problem(
-    sequence: Sequence, features: int | None, pixel: float | None, kernel: HuberKernel | None
+def monocular_problem(found: InertialDiagnosis, features: int | None) -> Problem:
+    """The problem of a diagnosed recording: tracks split and masked, samples in SI units and the axes of imu_T_cam.
+
+    Raises InputError where no start is found.
+    """
+    sequence, start, tracks = found.sequence, found.monocular, found.tracks
+    if start is None or tracks is None:
+        raise InputError(f"{sequence.source or sequence.name}: {found.cannot_tell or 'no start is found'}")
+    remarks = (
+        f"pixel noise {'found in the recording' if found.pixel_found else 'assumed'}: {found.pixel:.2f} px",
+        *imu_remarks(sequence),
+        f"scale: {start.remark}",
+    )
+    path = start.path(sequence.n_frames)
+    problem = problem_of(
+        repaired(sequence, tracks), tracks.excluded, features, found.pixel, HuberKernel(), start.start, path, remarks
+    )
+    return replace(
+        problem,
+        inverse_depth_prior=start.depths,
+        findings=inertial_findings(found, tracks),
+        repairs=(*inertial_repairs(found), *tracks.repairs),
+        diagnosed=found.pixel_found,
+    )
+
+
+def as_recorded_monocular(
+    sequence: Sequence, features: int | None, pixel: float, kernel: HuberKernel | None
 ) -> Problem:
-    """The problem of a recording with one camera: samples and tracks as recorded, start and pixel noise found.
+    """The problem of a recording taken as it is, with the noise of its calibration and `pixel` px.
 
-    `pixel` (px), where it is given, is taken in place of the noise that is found. Raises InputError where no start is
-    found.
+    Raises InputError where no start is found, and for samples in other units than rad/s and m/s^2.
     """
     assert sequence.imu is not None
-    if is_far(sequence):
-        raise InputError(f"{sequence.source or sequence.name}: {doubt_of_position(sequence)}")
-    imu = imu_intervals(sequence.imu, sequence.t)
+    source = sequence.source or sequence.name
+    reason = unusable(sequence) or (doubt_of_position(sequence) if is_far(sequence) else "")
+    if reason:
+        raise InputError(f"{source}: {reason}")
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            found = monocular_start(sequence, imu)
+            require_si(sequence, imu_unit_findings(imu_units(sequence, monocular_odometry(sequence))))
+            found = monocular_start(sequence, imu_intervals(sequence.imu, sequence.t))
     except ValueError as error:
-        raise InputError(f"{sequence.source or sequence.name}: {error}") from error
+        raise InputError(f"{source}: {error}") from error
     o = sequence.observations
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[o.counts(sequence.n_landmarks)[o.landmark] < SHORTEST] = Excluded.SHORT
-    noise = found.pixel if pixel is None else pixel
-    origin = "estimated from the recording" if pixel is None and found.window is not None else "assumed"
     remarks = (
-        f"pixel noise {origin}: {noise:.2f} px",
+        f"not diagnosed: {pixel:g} px is assumed, not estimated from the recording",
         *imu_remarks(sequence),
         TRACKS_AS_RECORDED,
-        SAMPLES_AS_RECORDED,
         f"scale: {found.remark}",
     )
+    path = found.path(sequence.n_frames)
     return replace(
-        problem_of(sequence, excluded, features, noise, kernel, found.start, found.path(sequence.n_frames), remarks),
+        problem_of(sequence, excluded, features, pixel, kernel, found.start, path, remarks),
         inverse_depth_prior=found.depths,
-        findings=(*sequence.findings, *intrinsics_findings(sequence), *_scale_findings(found)),
-        diagnosed=pixel is None and found.window is not None,
+        findings=(*sequence.findings, *intrinsics_findings(sequence), *scale_findings(found)),
     )
-
-
-def _scale_findings(found: MonocularStart) -> tuple[Finding, ...]:
-    if found.excited:
-        return ()
-    share = np.inf if found.window is None else found.window.solution.scale_sigma
-    sentence = found.remark[0].upper() + found.remark[1:] + "."
-    return (Finding("scale_not_excited", sentence, share, share, "1", f"1-sigma, {EXCITED:g} is allowed"),)

@@ -93,12 +93,12 @@ def _lasting_noise(sequence: Sequence, imu: ImuIntervals, first: int) -> float:
     """Noise of a row, px, over `LASTING` s: tracks drift, so that they fit a short window better; 0 if not found."""
     last = int(np.searchsorted(sequence.t, sequence.t[first] + LASTING, side="right")) - 1
     try:
-        return _solved(sequence, imu, _spread(first, last), None).pixel
+        return _solved(sequence, imu, spread_keyframes(first, last), None).pixel
     except (ValueError, np.linalg.LinAlgError, RuntimeError):
         return 0.0
 
 
-def _spread(first: int, last: int) -> IntArray:
+def spread_keyframes(first: int, last: int) -> IntArray:
     """At most `KEYFRAMES` keyframes of the frames from `first` to `last`, spread evenly."""
     chosen = np.linspace(first, last, min(KEYFRAMES, last - first + 1)).round()
     return np.unique(chosen.astype(np.int64))
@@ -110,7 +110,7 @@ def _windows(sequence: Sequence, first: int) -> list[IntArray]:
     for span in SPANS:
         last = int(np.searchsorted(sequence.t, sequence.t[first] + span, side="right")) - 1
         if last - first >= 4 and (not windows or last > windows[-1][-1]):
-            windows.append(_spread(first, last))
+            windows.append(spread_keyframes(first, last))
     return windows
 
 
@@ -122,7 +122,7 @@ def _solved(sequence: Sequence, imu: ImuIntervals, window: IntArray, rest: Rest 
         raise ValueError("no track is in three keyframes")
     still = NO_POSES if rest is None else rest.still
     with np.errstate(all="ignore"):
-        states = _in_motion(sequence, imu, frames, tracks) if rest is None else _from_rest(imu, frames, rest)
+        states = states_in_motion(sequence, imu, frames, tracks) if rest is None else _from_rest(imu, frames, rest)
         first = solve_least_squares(states, imu, frames, still, tracks)
         pixel = max(_pixel_noise(tracks, first), least)
         tracks = keyframe_tracks(sequence, frames, pixel)
@@ -134,12 +134,24 @@ def _solved(sequence: Sequence, imu: ImuIntervals, window: IntArray, rest: Rest 
     return Window(frames, span, solution, pixel, _depths(tracks, pose))
 
 
-def _in_motion(sequence: Sequence, imu: ImuIntervals, frames: IntArray, tracks: KeyframeTracks) -> States:
+def states_in_motion(sequence: Sequence, imu: ImuIntervals, frames: IntArray, tracks: KeyframeTracks) -> States:
     """States by the closed form. Raises ValueError without parallax or common tracks."""
-    rays, biases = rays_of(tracks), np.zeros((len(frames) - 1, 6))
-    biases[:, :3] = epipolar_bias(rays, motions_between(imu, frames, biases))
+    return states_at(gyroscope_biases(imu, frames, tracks), sequence, imu, frames, tracks)
+
+
+def gyroscope_biases(imu: ImuIntervals, frames: IntArray, tracks: KeyframeTracks) -> FloatArray:
+    """Biases (k-1, 6) of the intervals between keyframes, those of the accelerometer zero."""
+    biases = np.zeros((len(frames) - 1, 6))
+    biases[:, :3] = epipolar_bias(rays_of(tracks), motions_between(imu, frames, biases))
+    return biases
+
+
+def states_at(
+    biases: FloatArray, sequence: Sequence, imu: ImuIntervals, frames: IntArray, tracks: KeyframeTracks
+) -> States:
+    """States by the closed form at known biases (k-1, 6) of the gyroscope."""
     motions = motions_between(imu, frames, biases)
-    return closed_form(imu, rays, motions, sequence.imu_T_cam[:3, 3], FIRST_PIXEL / sequence.camera.fu)
+    return closed_form(imu, rays_of(tracks), motions, sequence.imu_T_cam[:3, 3], FIRST_PIXEL / sequence.camera.fu)
 
 
 def _from_rest(imu: ImuIntervals, frames: IntArray, rest: Rest) -> States:

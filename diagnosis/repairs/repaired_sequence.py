@@ -113,16 +113,9 @@ def repaired_tracks(
     sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs, sigma: float
 ) -> RepairedTracks:
     """Tracks split where they jump, and the mask, along a path (T, 4, 4) that is right locally; `sigma` px of noise."""
-    split, gate = _split(sequence, path, mask, tracks)
-    observations, excluded = _renumbered(sequence, split)
-    pieces = split.n_landmarks - sequence.n_landmarks
-    done: tuple[str, ...] = ()
-    if pieces:
-        n = len(np.unique(sequence.observations.landmark))
-        done = (f"tracks split where they jump to another point: {n + pieces:,} tracks from {n:,}",)
-    tracked = replace(sequence, observations=observations, n_landmarks=split.n_landmarks, truth=None)
-    excluded = exclude_landmarks(tracked, path, excluded, sigma)
-    return RepairedTracks(observations, split.n_landmarks, excluded, gate, done)
+    found = renumbered_tracks(sequence, *_split(sequence, path, mask, tracks))
+    tracked = replace(sequence, observations=found.observations, n_landmarks=found.n_landmarks, truth=None)
+    return found._replace(excluded=exclude_landmarks(tracked, path, found.excluded, sigma))
 
 
 def _estimated_shift(diagnosis: Diagnosis) -> str:
@@ -167,19 +160,23 @@ def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: Tra
         links, usable = TrackConsistency(sequence, path, mask.prediction_gate), is_usable(sequence)
         checked = usable[before] & usable[after] & ~same
         gate = prediction_gate(links.error(before[checked], after[checked]))
-    split = split_tracks(sequence, path, replace(mask, prediction_gate=gate), copied)
+    split = split_tracks(sequence, TrackConsistency(sequence, path, gate), mask, copied)
     if not tracks.split:
         split.excluded[split.landmark != o.landmark] = Excluded.PREDICTION
         split = SplitTracks(o.landmark, sequence.n_landmarks, split.excluded)
     return split, gate
 
 
-def _renumbered(sequence: Sequence, split: SplitTracks) -> tuple[Observations, NDArray[np.uint8]]:
-    """Observations under their new landmarks, in their order, and what excludes them."""
+def renumbered_tracks(sequence: Sequence, split: SplitTracks, gate: float) -> RepairedTracks:
+    """Observations under the landmarks of a split, in their order; `gate` px is the one it was made with."""
     o = sequence.observations
     order = np.lexsort((split.landmark, o.frame))
     moved = Observations(o.frame[order], split.landmark[order], o.pixel[order])
-    return moved, split.excluded[order]
+    pieces, done = split.n_landmarks - sequence.n_landmarks, tuple[str, ...]()
+    if pieces:
+        n = len(np.unique(o.landmark))
+        done = (f"tracks split where they jump to another point: {n + pieces:,} tracks from {n:,}",)
+    return RepairedTracks(moved, split.n_landmarks, split.excluded[order], gate, done)
 
 
 def truth_of_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:

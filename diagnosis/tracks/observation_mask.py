@@ -1,6 +1,7 @@
 """Mask of the observations that are consistent along their tracks, computed once and before any estimator."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,13 @@ class MaskSettings:
     """observations of a track after masking, so that each can be checked against two others"""
 
 
+class LinkTest(Protocol):
+    """Test whether two observations of a track agree on one static point."""
+
+    def agree(self, before: IntArray, after: IntArray) -> BoolArray:
+        """(n,) whether observations `before` and `after` (n,), sorted by track, are of one track and agree."""
+
+
 def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings) -> NDArray[np.uint8]:
     """`Excluded` (n,) of each observation, from the tracks and the dead-reckoned path (T, 4, 4) alone.
 
@@ -40,7 +48,8 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
     run continues. Of each track the longest run is used (ties: the first), since a track that jumps has changed its
     point.
     """
-    runs = _runs(sequence, world_T_imu, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
+    links = TrackConsistency(sequence, world_T_imu, settings.prediction_gate)
+    runs = _runs(sequence, links, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark
     in_longest = _longest_run_of_each_track(landmark[kept], runs.run)
     excluded[kept[~in_longest]] = Excluded.PREDICTION
@@ -74,12 +83,13 @@ class SplitTracks:
     """(n,) an `Excluded` each"""
 
 
-def split_tracks(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
+def split_tracks(sequence: Sequence, links: LinkTest, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
     """Tracks split at jumps: every run of at least `min_track` observations is a landmark of its own.
 
-    `copied` (n,) marks observations that repeat the frame before. The longest run of a track keeps its number.
+    `links` tests two observations of a track; `copied` (n,) marks observations that repeat the frame before. The
+    longest run of a track keeps its number.
     """
-    runs = _runs(sequence, world_T_imu, settings, copied)
+    runs = _runs(sequence, links, settings, copied)
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark.copy()
     length = np.bincount(runs.run)
     long_enough = length >= settings.min_track
@@ -103,7 +113,7 @@ class _Runs:
     """the run of each of these, increasing"""
 
 
-def _runs(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, copied: BoolArray) -> _Runs:
+def _runs(sequence: Sequence, links: LinkTest, settings: MaskSettings, copied: BoolArray) -> _Runs:
     o = sequence.observations
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > settings.max_row_mismatch] = Excluded.ROWS
@@ -111,7 +121,6 @@ def _runs(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings, c
     excluded[copied] = Excluded.COPIED
     order = o.by_track()
     order = order[excluded[order] == Excluded.NO]
-    links = TrackConsistency(sequence, world_T_imu, settings.prediction_gate)
     kept, lone = _without_lone_outliers(links, o.landmark, order)
     excluded[lone] = Excluded.PREDICTION
     run = np.cumsum(np.r_[True, ~links.agree(kept[:-1], kept[1:])]) - 1 if len(kept) else kept
@@ -153,7 +162,7 @@ class TrackConsistency:
         return agree
 
 
-def _without_lone_outliers(links: TrackConsistency, landmark: IntArray, order: IntArray) -> tuple[IntArray, IntArray]:
+def _without_lone_outliers(links: LinkTest, landmark: IntArray, order: IntArray) -> tuple[IntArray, IntArray]:
     """`order` without the observations that disagree with both neighbors while these agree, and those taken out."""
     taken_out: list[IntArray] = []
     while len(order) >= 3:

@@ -6,6 +6,8 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, disparity
 
+from .image_size import doubt_of_intrinsics
+
 SWAPPED = 0.9
 """share of the disparities that are negative"""
 MIN_OBSERVATIONS = 20
@@ -36,7 +38,7 @@ def unusable(sequence: Sequence) -> str:
             f"every landmark is seen in one frame only ({plural(n, 'observation')} of as many landmarks), so that no "
             "track ties one frame to another; give a landmark the same column of features in every frame that sees it"
         )
-    return ""
+    return doubt_of_intrinsics(sequence)
 
 
 def _gap(key: str, what: str, t: FloatArray) -> str:

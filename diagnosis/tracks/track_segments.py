@@ -53,7 +53,9 @@ class TrackSegments:
 
 
 def is_usable(sequence: Sequence) -> BoolArray:
-    """(n,) observations whose disparity and rows allow a triangulation."""
+    """(n,) observations whose disparity and rows allow a triangulation; with one camera, which has neither, all."""
+    if sequence.monocular:
+        return np.ones(len(sequence.observations), dtype=np.bool_)
     pixel = sequence.observations.pixel
     rows = np.abs(pixel[:, 1] - pixel[:, 3]) <= MAX_ROW_MISMATCH
     return np.asarray(rows & (disparity(pixel) > MIN_DISPARITY), dtype=np.bool_)

@@ -5,9 +5,7 @@ from typing import Any
 
 import click
 
-from .options import BODY, PATH, UNITS, Formats, NamedFile, Numbers, choice, open_page, seed
-
-XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
+from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice, open_page, seed
 
 
 @click.command(

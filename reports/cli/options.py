@@ -67,6 +67,9 @@ class Numbers(click.ParamType[tuple[float, ...]]):
         return numbers
 
 
+XYZ = Numbers("X,Y,Z", "three numbers such as 0,0,1")
+
+
 class Formats(click.ParamType[tuple[str, ...]]):
     """File formats, separated by commas."""
 

@@ -58,6 +58,12 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--truth-frame", type=options.BODY, help="Frame of the ground-truth poses: world_T_imu or world_T_camera."
 )
+@click.option(
+    "--truth-up",
+    type=options.XYZ,
+    help="Up in the world of the ground truth of raw inertial data.  [default: its z axis, within 0.5° of the samples' "
+    "up, else theirs]",
+)
 @options.as_recorded
 @options.imu
 @options.imu_calibration

@@ -21,6 +21,12 @@ from fgbaseline.diagnosis import (
     track_statistics,
 )
 
+NOT_BY_ONE_CAMERA = (
+    "The magnitude of gravity, the scale of the accelerometer and the unit of the translation of imu_T_cam: one camera "
+    "measures no length.",
+    "Wrong matches and moving objects within their epipolar planes: they are left to kernel and gates.",
+)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
@@ -80,7 +86,7 @@ def found_of_inertial(sequence: Sequence) -> Found:
         document=inertial_to_json(diagnosis, findings),
         findings=findings,
         undecided=diagnosis.cannot_tell,
-        not_identifiable=(),
+        not_identifiable=NOT_BY_ONE_CAMERA if read.monocular and not diagnosis.cannot_tell else (),
         sentences=(*sequence.remarks, *inertial_sentences(diagnosis)),
     )
 

@@ -39,7 +39,7 @@ from .problem import (
 from .report import RunReport
 from .solution import read_added, solve
 
-AS_GIVEN = ("preset", "features", "truth_frame", "as_recorded", "held_out", "seed", "cameras")
+AS_GIVEN = ("preset", "features", "truth_frame", "truth_up", "as_recorded", "held_out", "seed", "cameras")
 OF_ADDED = ("add_body", "add_time_unit", "add_offset")
 FILES = ("imu", "imu_calibration", "velocities", "extrinsic", "right", "calibration", "times", "repairs")
 """keywords that become settings of the same name: as they are, and as paths"""
@@ -61,6 +61,7 @@ def run(
     landmarks: Literal["in-turn", "held"] = "in-turn",
     truth: FilePath | Trajectory | Truth | Array | tuple[Array, Array] | None = None,
     truth_frame: Literal["imu", "camera"] | None = None,
+    truth_up: tuple[float, float, float] | None = None,
     as_recorded: bool = False,
     imu: FilePath | None = None,
     imu_calibration: FilePath | None = None,
@@ -98,6 +99,8 @@ def run(
         landmarks: Landmarks of the documented SLAM: updated in turn with the pose, or held.
         truth: Ground truth: a file, a `Truth`, poses (T, 4, 4) by frame, or stamps (n,), s, with poses (n, 4, 4).
         truth_frame: Body whose poses the ground truth has; a `Truth` has those of the imu.
+        truth_up: Up in the world of the ground truth of raw inertial data; by default its z axis within 0.5° of what
+            the samples measure, and beyond that what they measure.
         as_recorded: No diagnosis and no repairs; the noise is assumed.
         imu: CSV of raw inertial samples, in place of the recording's velocities.
         imu_calibration: YAML of their noise; by default assumed.

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from fgbaseline.data import (
     HeldOut,
     LandmarkMode,
@@ -36,7 +38,7 @@ MIN_TRUTH_SHARE = 0.5
 BESIDE = ("velocities", "extrinsic")
 IMAGES = ("cameras", "right", "calibration", "times", "tracker")
 """settings that only recordings of images have"""
-IF_GIVEN = (*BESIDE, "imu", "imu_calibration", *IMAGES, "topics")
+IF_GIVEN = (*BESIDE, "imu", "imu_calibration", *IMAGES, "topics", "truth_up")
 TRACKS = "tracks.npz"
 """file of the tracks in the folder of a run on images"""
 
@@ -56,6 +58,8 @@ class RunSettings:
     landmarks: LandmarkMode = LandmarkMode.UPDATED
     truth: Path | ParsedTrajectory | Trajectory | Truth | None = None
     truth_frame: BodyFrame | None = None
+    truth_up: tuple[float, float, float] | None = None
+    """up in the world of the ground truth; None to find it"""
     seed: int = 0
     as_recorded: bool = False
     """no diagnosis, no repairs, assumed noise"""
@@ -123,7 +127,7 @@ def _recorded(value: Any) -> str | int | float | bool | None:
     if isinstance(value, Mapping):
         return ",".join(f"{name}={_source(function)}" for name, function in value.items()) or None
     if isinstance(value, tuple):
-        return ",".join(each if isinstance(each, str) else each.name for each in value) or None
+        return ",".join(str(each) if isinstance(each, str | float) else each.name for each in value) or None
     if isinstance(value, str | Path):
         return str(value)
     if isinstance(value, Problem):
@@ -171,6 +175,18 @@ def import_estimators(names: tuple[str, ...]) -> None:
 
 def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Sequence:
     """Reads or simulates the recording with its ground truth; `pictures` gets its images. Raises InputError."""
+    sequence = _read(settings, pictures)
+    if settings.truth_up is None:
+        return sequence
+    length = float(np.linalg.norm(settings.truth_up))
+    if sequence.truth is None or not (np.isfinite(length) and length > 0.0):
+        given = ",".join(f"{x:g}" for x in settings.truth_up)
+        why = "is no direction" if sequence.truth is not None else "is given without a ground truth; add --truth FILE"
+        raise InputError(f"truth-up: {given} {why}")
+    return replace(sequence, truth=replace(sequence.truth, up=np.array(settings.truth_up) / length))
+
+
+def _read(settings: RunSettings, pictures: Pictures | None) -> Sequence:
     if settings.sequence is None:
         if settings.time_unit is not None:
             raise InputError("time-unit: the simulated drive has stamps in seconds; give a RECORDING with --time-unit")

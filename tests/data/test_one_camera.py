@@ -107,9 +107,14 @@ def test_the_commands_simulate_and_solve_it(tmp_path: Path) -> None:
     assert abs(found["scale_error"]) < 0.05
     assert "scale" in answer.stdout
     assert any("determines the scale to" in remark for remark in summary["problem"]["remarks"])
-    answer = fgbaseline("diagnose", "one.npz", cwd=tmp_path)
-    assert (answer.returncode, answer.stderr.count("\n")) == (2, 1)
-    assert "the diagnosis needs a stereo camera" in answer.stderr
+    answer = fgbaseline("diagnose", "one.npz", "--out", "out/found", cwd=tmp_path, drawing=False)
+    assert answer.returncode == 0, answer.stderr
+    assert "No fault detected" in answer.stdout
+    assert "one camera measures no length" in " ".join(answer.stdout.split())
+    found = json.loads((tmp_path / "out" / "found" / "diagnosis.json").read_text())
+    assert found["start"]["source"]
+    assert abs(found["sensors"]["time_offset_s"]) < 0.02
+    assert found["sigma"]["pixel"] == pytest.approx(0.5, rel=0.15)
     assert '"baseline":null' in (tmp_path / "out" / "one" / "report.html").read_text()
 
 

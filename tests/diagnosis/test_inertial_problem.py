@@ -279,7 +279,7 @@ def test_no_argument_is_ignored(recording: data.Sequence) -> None:
     for sequence, found, settings, sentence in (
         (recording, of_velocities, None, "diagnosis: it is one of body velocities"),
         (velocities, of_samples, None, "diagnosis: it is one of raw inertial samples"),
-        (one_camera, of_samples, None, "diagnosis: a recording with one camera has none"),
+        (one_camera, of_samples, None, "diagnosis: it is one of another number of cameras"),
         (recording, of_samples, as_recorded, "diagnosis: a recording that is taken as it is has none"),
         (velocities, of_velocities, as_recorded, "diagnosis: a recording that is taken as it is has none"),
         (recording, None, late, "settings: a shift is one of body velocities"),

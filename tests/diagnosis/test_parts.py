@@ -17,7 +17,7 @@ from fgbaseline.diagnosis.conventions.axes import linear_axes
 from fgbaseline.diagnosis.conventions.robust_regression import regress
 from fgbaseline.diagnosis.conventions.spline import spline_through
 from fgbaseline.diagnosis.conventions.time_delay import timing
-from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions, split_tracks
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, TrackConsistency, exclusions, split_tracks
 from fgbaseline.diagnosis.windows import bundle_adjustment as adjustment
 from fgbaseline.diagnosis.windows.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
 from fgbaseline.diagnosis.windows.residuals import (
@@ -237,7 +237,8 @@ def test_a_track_that_jumps_is_cut_and_both_segments_are_used() -> None:
     pixel[late] = pixel[other]
     jumped = replace(scene, observations=Observations(o.frame.copy(), o.landmark.copy(), pixel))
     none = np.zeros(len(o), dtype=np.bool_)
-    split = split_tracks(jumped, scene.truth.world_T_imu, MaskSettings(), none)
+    links = TrackConsistency(jumped, scene.truth.world_T_imu, MaskSettings().prediction_gate)
+    split = split_tracks(jumped, links, MaskSettings(), none)
     assert split.n_landmarks == scene.n_landmarks + 1
     assert (split.excluded == Excluded.NO).all()
     assert (split.landmark[late] == scene.n_landmarks).all()

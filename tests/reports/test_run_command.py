@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
+from fgbaseline.geometry import InputError
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.folder import write_run
 from fgbaseline.reports.run.problem import RunSettings, build_problem, read_sequence
@@ -220,6 +221,17 @@ def test_truth_that_ends_early_is_counted(recording: Path, tmp_path: Path) -> No
     assert e.ate_unaligned is not None
     assert e.ate_unaligned.final is None
     assert e.notes["ate_unaligned.final"] == "the last frame has no ground truth"
+
+
+def test_the_stated_up_of_the_truth_is_kept_and_no_direction_is_refused(recording: Path) -> None:
+    truth = read_sequence(RunSettings(sequence=recording, truth_up=(0.0, 0.0, 2.0))).truth
+    assert truth is not None
+    np.testing.assert_allclose(truth.up, [0.0, 0.0, 1.0])
+    with pytest.raises(InputError, match="truth-up: 0,0,0 is no direction"):
+        read_sequence(RunSettings(sequence=recording, truth_up=(0.0, 0.0, 0.0)))
+    without = data.read(recording).with_truth(None)
+    with pytest.raises(InputError, match="truth-up: 0,0,1 is given without a ground truth; add --truth FILE"):
+        read_sequence(RunSettings(sequence=without, truth_up=(0.0, 0.0, 1.0)))
 
 
 OUTSIDE = """

@@ -1,0 +1,68 @@
+"""Mask of the tracks of one camera: what leaves the epipolar planes of the motion that its frame's others show.
+
+A wrong match that stays in its epipolar plane, and an object that moves along it, pass: kernel and gates are for them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.data.problem import Excluded
+from fgbaseline.data.sequence import Sequence
+from fgbaseline.geometry import FloatArray
+
+from ..odometry.monocular_odometry import motions_of_links, track_links
+from ..repairs.repaired_sequence import RepairedTracks, renumbered_tracks, truth_of_landmarks
+from ..tracks.observation_mask import MaskSettings, prediction_gate, split_tracks
+from ..tracks.track_segments import consecutive
+
+STEPS = (1, 2, 3)
+"""frames between the observations that are compared, so that a track is followed over one that is wrong"""
+
+
+class EpipolarConsistency:
+    """Test whether two observations of a track lie in one epipolar plane, by the motion between their frames."""
+
+    def __init__(self, sequence: Sequence) -> None:
+        self._observations = sequence.observations
+        self.error: dict[int, FloatArray] = {}
+        """step -> (n,) px, distance of the rays of an observation and of the one that many frames later from a common
+        plane; NaN where there is none, or no motion is known"""
+        for step in STEPS:
+            before, after = track_links(sequence, step)
+            found = motions_of_links(sequence, before, after)
+            self.error[step] = np.full(len(sequence.observations), np.nan)
+            self.error[step][before] = np.sqrt(found.whitened) * found.sigma * sequence.camera.fu
+        self.gate = prediction_gate(self.error[1][np.isfinite(self.error[1])])
+        """px"""
+
+    def agree(self, before: IntArray, after: IntArray) -> BoolArray:
+        """(n,) whether both are of one track, and nothing is known that contradicts."""
+        o = self._observations
+        apart, agree = o.frame[after] - o.frame[before], o.landmark[after] == o.landmark[before]
+        for step, error in self.error.items():
+            agree &= ~((apart == step) & (error[before] > self.gate))
+        return np.asarray(agree, dtype=np.bool_)
+
+
+def monocular_tracks(sequence: Sequence) -> RepairedTracks:
+    """Tracks split where they jump, and the mask."""
+    o = sequence.observations
+    before, after = consecutive(sequence)
+    copied = np.zeros(len(o), dtype=np.bool_)
+    copied[after[(o.pixel[before, :2] == o.pixel[after, :2]).all(axis=1)]] = True
+    links = EpipolarConsistency(sequence)
+    return renumbered_tracks(sequence, split_tracks(sequence, links, MaskSettings(), copied), links.gate)
+
+
+def used(sequence: Sequence, tracks: RepairedTracks) -> Sequence:
+    """The recording with its tracks as repaired and without what the mask excludes."""
+    found = repaired(sequence, tracks)
+    return replace(found, observations=found.observations.select(tracks.excluded == Excluded.NO))
+
+
+def repaired(sequence: Sequence, tracks: RepairedTracks) -> Sequence:
+    """The recording with its tracks as repaired."""
+    truth = truth_of_landmarks(sequence.truth, tracks.n_landmarks)
+    return replace(sequence, observations=tracks.observations, n_landmarks=tracks.n_landmarks, truth=truth)

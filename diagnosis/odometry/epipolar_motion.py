@@ -1,0 +1,202 @@
+"""Rotation and direction of motion between pairs of views of one camera, robust and vectorized over all pairs.
+
+Rays f of the first view and g of the second one satisfy f . (t x R g) = 0 for the rotation R and the direction t of the
+motion. This residual is divided by sqrt(|t x f|^2 + |t x R g|^2), so that its deviation is that of a ray at any
+parallax. It is minimized over the five degrees of freedom of R and t by iteratively reweighted least squares. Starts
+are the rotation that leaves the smallest flow, no rotation, and the motions of neighboring pairs.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fgbaseline.data.observations import BoolArray, IntArray
+from fgbaseline.geometry import FloatArray, so3
+
+MIN_LINKS = 12
+"""tracks of a pair from which on its motion is determined: twice its degrees of freedom, and some wrong ones"""
+ROUNDS, FLOW_ROUNDS, DIRECTION_ROUNDS = 12, 5, 3
+FREEDOM = 5
+TRUNCATION = 9.0
+"""squared whitened residual of an outlier"""
+CHI_SQUARE_1_MEDIAN = 0.4549
+DAMPING = 1e-6
+"""information of each step for rays of unit noise"""
+SMALLEST_SIGMA = 1e-6
+"""rad, of a ray"""
+
+
+class Links(NamedTuple):
+    """n tracks that two views share, sorted by pair of views."""
+
+    pair: IntArray
+    """(n,)"""
+    first: FloatArray
+    """(n, 3) unit rays of the first view in the axes of the body"""
+    second: FloatArray
+    """(n, 3) of the second one"""
+
+
+class Motion(NamedTuple):
+    """Motions of p pairs."""
+
+    rotation: FloatArray
+    """(p, 3, 3) first_R_second"""
+    direction: FloatArray
+    """(p, 3) unit vector from the first to the second view in the axes of the first; any where nothing is nearer than
+    infinity"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EpipolarMotions:
+    """Motions of p pairs, and how n links fit them."""
+
+    known: BoolArray
+    """(p,)"""
+    motion: Motion
+    covariance: FloatArray
+    """(p, 3, 3) of the right perturbation of the rotation, rad^2; NaN where unknown"""
+    whitened: FloatArray
+    """(n,) squared residual of each link at `sigma`; NaN where the motion is unknown"""
+    sigma: float
+    """rad, of a ray, from the bulk of the residuals"""
+
+
+def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
+    """Motions of all pairs with at least `MIN_LINKS` links."""
+    count = np.bincount(links.pair, minlength=n_pairs)
+    enough = count >= MIN_LINKS
+    chosen = np.flatnonzero(enough[links.pair])
+    used = Links(links.pair[chosen], links.first[chosen], links.second[chosen])
+    still = np.tile(np.eye(3), (n_pairs, 1, 1))
+    best = _refined(used, _along(used, _least_flow(used, still)))
+    best = _better(used, best, _refined(used, _along(used, still)))
+    for shift in (1, -1):
+        best = _better(used, best, _refined(used, Motion(*(np.roll(part, shift, axis=0) for part in best))))
+    squared = _residuals(used, best)[0] ** 2
+    sigma = _bulk_sigma(used, squared, count)
+    inlier = squared < TRUNCATION * sigma**2
+    H, _ = _normal_equations(used, best, inlier.astype(np.float64), n_pairs)
+    known = enough & (np.bincount(used.pair[inlier], minlength=n_pairs) >= MIN_LINKS)
+    known[known] = np.linalg.eigvalsh(H[known])[:, 0] > DAMPING
+    covariance, whitened = np.full((n_pairs, 3, 3), np.nan), np.full(len(links.pair), np.nan)
+    covariance[known] = sigma**2 * np.linalg.inv(H[known])[:, :3, :3]
+    whitened[chosen] = np.where(known[used.pair], squared / sigma**2, np.nan)
+    return EpipolarMotions(known, best, covariance, whitened, sigma)
+
+
+def _least_flow(links: Links, rotation: FloatArray) -> FloatArray:
+    """Rotations (p, 3, 3) that bring the rays of both views nearest to each other, by robust small steps."""
+    for _ in range(FLOW_ROUNDS):
+        moved = _turned(links, rotation)
+        apart = np.cross(moved, links.first)  # the rotation about this axis, in the axes of the first view
+        squared = (apart**2).sum(axis=1)
+        weight = _robust(squared, float(np.median(squared)))
+        across = np.eye(3) - moved[:, :, None] * moved[:, None, :]
+        H = _sums(links, weight[:, None, None] * across, len(rotation)) + DAMPING * np.eye(3)
+        turn = np.linalg.solve(H, _sums(links, weight[:, None] * apart, len(rotation))[:, :, None])[:, :, 0]
+        rotation = so3.exp_so3(turn) @ rotation
+    return rotation
+
+
+def _along(links: Links, rotation: FloatArray) -> Motion:
+    """Motions at given rotations: their direction is in all epipolar planes, and what is passed moves against it."""
+    moved = _turned(links, rotation)
+    normal = np.cross(links.first, moved)
+    weight, axis = np.ones(len(normal)), np.zeros((len(rotation), 3))
+    for _ in range(DIRECTION_ROUNDS):
+        scatter = _sums(links, (weight[:, None] * normal)[:, :, None] * normal[:, None, :], len(rotation))
+        axis = np.linalg.eigh(scatter)[1][:, :, 0]
+        squared = (normal * axis[links.pair]).sum(axis=1) ** 2
+        weight = _robust(squared, float(np.median(squared)) / CHI_SQUARE_1_MEDIAN)
+    ahead = np.sign(((moved - links.first) * axis[links.pair]).sum(axis=1))
+    against = _sums(links, ahead[:, None], len(rotation)) <= 0.0
+    return Motion(rotation, np.where(against, axis, -axis))
+
+
+def _refined(links: Links, motion: Motion) -> Motion:
+    for step in range(ROUNDS):
+        residual, _ = _residuals(links, motion)
+        squared = residual**2
+        # Geman-McClure kernel, with its scale annealed down to that of the noise
+        bulk = float(np.median(squared)) / CHI_SQUARE_1_MEDIAN if len(squared) else 1.0
+        weight = _robust(squared, bulk * max(9.0, 200.0 * 0.5**step))
+        H, g = _normal_equations(links, motion, weight, len(motion.rotation))
+        delta = np.linalg.solve(H + DAMPING * np.eye(FREEDOM), g[:, :, None])[:, :, 0]
+        moved = motion.direction + (_basis(motion.direction) @ delta[:, 3:, None])[:, :, 0]
+        moved /= np.linalg.norm(moved, axis=1, keepdims=True)
+        motion = Motion(motion.rotation @ so3.exp_so3(delta[:, :3]), moved)
+    return motion
+
+
+def _better(links: Links, best: Motion, other: Motion) -> Motion:
+    """For each pair the motion with the smaller truncated cost."""
+    squared = np.stack([_residuals(links, each)[0] ** 2 for each in (best, other)], axis=1)
+    bulk = max(float(np.median(squared[:, 0])) / CHI_SQUARE_1_MEDIAN, SMALLEST_SIGMA**2) if len(squared) else 1.0
+    cost = _sums(links, np.minimum(squared, TRUNCATION * bulk), len(best.rotation))
+    better = cost[:, 1] < cost[:, 0]
+    rotation = np.where(better[:, None, None], other.rotation, best.rotation)
+    return Motion(rotation, np.where(better[:, None], other.direction, best.direction))
+
+
+def _residuals(links: Links, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """(n,) residuals in rad, and (n,) their divisors."""
+    moved, t = _turned(links, motion.rotation), motion.direction[links.pair]
+    plane = np.cross(t, moved)
+    scale = np.sqrt((plane**2).sum(axis=1) + (np.cross(t, links.first) ** 2).sum(axis=1))
+    scale = np.maximum(scale, SMALLEST_SIGMA)
+    return (links.first * plane).sum(axis=1) / scale, scale
+
+
+def _normal_equations(links: Links, motion: Motion, weight: FloatArray, n_pairs: int) -> tuple[FloatArray, FloatArray]:
+    """Information (p, 5, 5) and gradient (p, 5) of the rotation's right perturbation and the direction's tangent."""
+    residual, scale = _residuals(links, motion)
+    R, t = motion.rotation[links.pair], motion.direction[links.pair]
+    f, moved = links.first, _turned(links, motion.rotation)
+    back, along = (np.einsum("nji,nj->ni", R, vector) for vector in (np.cross(f, t), t))
+    # the divisor moves as well: without its derivative the motion is biased, since small parallax is mostly noise
+    near, far = (t * f).sum(axis=1)[:, None], (t * moved).sum(axis=1)[:, None]
+    relative = (residual / scale)[:, None]
+    by_rotation = np.cross(links.second, back + relative * far * along)
+    by_direction = np.cross(moved, f) + relative * (near * f + far * moved)
+    tangent = (by_direction[:, None] @ _basis(motion.direction)[links.pair])[:, 0]
+    J = np.concatenate([by_rotation, tangent], axis=1) / scale[:, None]
+    weighted = weight[:, None] * J
+    H = _sums(links, weighted[:, :, None] * J[:, None, :], n_pairs)
+    return H, _sums(links, -weighted * residual[:, None], n_pairs)
+
+
+def _turned(links: Links, rotation: FloatArray) -> FloatArray:
+    """(n, 3) rays of the second view in the axes of the first."""
+    return np.asarray((rotation[links.pair] @ links.second[:, :, None])[:, :, 0])
+
+
+def _basis(direction: FloatArray) -> FloatArray:
+    """(p, 3, 2) unit vectors across the directions (p, 3)."""
+    least = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
+    first = np.cross(direction, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(direction, first)], axis=2)
+
+
+def _robust(squared: FloatArray, scale: float) -> FloatArray:
+    scale = max(scale, SMALLEST_SIGMA**2)
+    return np.asarray((scale / (scale + squared)) ** 2, dtype=np.float64)
+
+
+def _bulk_sigma(links: Links, squared: FloatArray, count: IntArray) -> float:
+    """rad: the deviation at which the median squared residual is that of chi-square, the fitted freedom counted."""
+    if len(squared) == 0:
+        return 1.0
+    freed = squared / (1.0 - FREEDOM / count[links.pair])
+    return max(SMALLEST_SIGMA, float(np.sqrt(np.median(freed) / CHI_SQUARE_1_MEDIAN)))
+
+
+def _sums(links: Links, values: FloatArray, n_pairs: int) -> FloatArray:
+    """Sums (p, ...) of values (n, ...) over the links of each pair; zero for pairs without any."""
+    total = np.zeros((n_pairs, *values.shape[1:]))
+    if len(links.pair):
+        starts = np.flatnonzero(np.diff(links.pair, prepend=-1))
+        total[links.pair[starts]] = np.add.reduceat(values, starts, axis=0)
+    return total
