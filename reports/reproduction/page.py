@@ -10,7 +10,7 @@ from fgbaseline.data.wording import plural
 
 from ..formatting import meters, number, per_cent
 from ..html.templates import environment, picture
-from ..tables.table import Column, Row, Table, figures, words
+from ..tables.table import Column, Row, Table, numbers, words
 from .claims import Claim, Verdict
 from .study import Outcome, Study
 
@@ -23,9 +23,9 @@ BADGES: Mapping[str, str] = {
 """style of each verdict: good, fair and poor"""
 STAGES = (
     *words("repaired"),
-    *figures("from dead reckoning, RMS", "largest"),
+    *numbers("from dead reckoning, RMS", "largest"),
     Column("reprojection", unit="px"),
-    *figures("cheirality violated", "frames, not positive definite", "correction per update, RMS"),
+    *numbers("cheirality violated", "frames, not positive definite", "correction per update, RMS"),
 )
 SWEEP = (
     "Landmarks updated in turn with the pose, W as in the source paper. Numbers: RMS distance from dead reckoning "
@@ -72,7 +72,7 @@ def _stages(study: Study) -> Table:
         texts += [per_cent(o.behind), number(o.lost), meters(o.correction_m)]
         texts += [meters(o.truth_rmse)] if truth else []
         rows.append(Row.of(staged.stage.name, *texts))
-    columns = (*STAGES, *(figures("from ground truth, RMS") if truth else ()))
+    columns = (*STAGES, *(numbers("from ground truth, RMS") if truth else ()))
     return Table(columns, tuple(rows), name="stage", title=study.subject.label)
 
 
