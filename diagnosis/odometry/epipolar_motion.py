@@ -111,7 +111,8 @@ def beyond_scene(links: Links, motion: Motion) -> FloatArray:
     count = np.bincount(links.pair, minlength=len(motion.rotation))
     place = np.cumsum(count) - count + (0.9 * (count - 1)).astype(np.int64)
     near = (shift / sine)[order][np.clip(place, 0, max(len(order) - 1, 0))] if len(order) else np.zeros(len(count))
-    return np.maximum(0.0, np.maximum(-shift, shift - NEARER * np.maximum(near, 0.0)[links.pair] * sine))
+    beyond = np.maximum(-shift, shift - NEARER * np.maximum(near, 0.0)[links.pair] * sine)
+    return np.asarray(np.maximum(beyond, 0.0), dtype=np.float64)
 
 
 def _least_flow(links: Links, rotation: FloatArray) -> FloatArray:
