@@ -91,9 +91,10 @@ def render(
 def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) -> str:
     length = sequence["path_length_m"]
     spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m"])]
+    kind = "observation" if run.problem.sequence.monocular else "stereo observation"
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
-        f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}"
+        f"{counted(sequence['observations'], kind)} of {counted(sequence['tracks'], 'track')}"
         f"{' (after repair)' if problem['repairs'] else ''}. Problem: {problem['preset']}, "
         f"{number(problem['features'])} of the tracks."
     )

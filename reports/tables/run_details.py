@@ -100,12 +100,13 @@ def _moved(run: Run) -> Table:
 def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, robust, of each that has any."""
     components = {name: e.get("components") or {} for name, e in estimators.items()}
+    seen = [r for r in PIXEL_ROWS if any((of.get(r) or {}).get("bias") is not None for of in components.values())]
     rows = tuple(
-        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in PIXEL_ROWS for key in ("bias", "spread"))))
+        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in seen for key in ("bias", "spread"))))
         for name, of in components.items()
         if any(row.get("bias") is not None for row in of.values())
     )
-    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("median", "1.4826 MAD"))
+    columns = tuple(Column(title, row, "px") for row in seen or PIXEL_ROWS for title in ("median", "1.4826 MAD"))
     caption = (
         "Measured minus predicted, over all observations of the landmarks that an estimator has. 1.4826 times the "
         "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
