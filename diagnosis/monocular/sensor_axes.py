@@ -45,7 +45,7 @@ def monocular_axes(sequence: Sequence, seen: Odometry) -> SensorAxes:
     others = [SensorAxes(accelerometer=name, sign=sign) for name in AXIS_CONVENTIONS for sign in (1.0, -1.0)]
     windows = _windows(turned)
     recorded = [_misfit(turned, window) for window in windows]
-    informative = [i for i, value in enumerate(recorded) if value > LEAD * SMALLEST]
+    informative = [i for i, value in enumerate(recorded) if value > FITTING]
     for candidates in (usual, others):
         found = dict.fromkeys(range(len(candidates)), 0.0)
         for w in informative:
