@@ -167,7 +167,7 @@ def test_bad_input_is_refused_in_one_sentence(folder: Path, tmp_path: Path, caps
     code, said = call(capsys, "figures", tmp_path)
     assert code == 2
     assert re.fullmatch(
-        r"fgbaseline: .*has no summary.json; give the folder that fgbaseline run or compare wrote\n", said
+        r"fgbaseline: .*: it holds no summary.json; give one that fgbaseline run or compare wrote\n", said
     )
     code, said = call(capsys, "figures", folder, "--format", "eps")
     assert code == 2
