@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
@@ -16,7 +17,7 @@ from .over_time import Expected, Panel, time_panels
 from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
 from .reprojection import medians_by_class
 from .run_data import RunData
-from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
+from .style import GRAY, SCREEN, Style, safe_text, title_and_legend
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +76,7 @@ def _innovation_band(label: str, width: float = 0.9) -> Expected:
 
 
 def _one(_: RunData, axes: Axes) -> list[Any]:
-    axes.axhline(1.0, color=GREEN, linewidth=0.9, zorder=1.5)
+    axes.axhline(1.0, color=GRAY, linestyle=":", linewidth=0.9, zorder=1.5)
     return []
 
 
@@ -153,11 +154,18 @@ def _reach(error: FloatArray, sigma: FloatArray) -> float:
 
 
 def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Median distance of landmarks from the reference's by depth; None where none is shared."""
+    """Median distance of landmarks from the reference's by depth; None where none is shared.
+
+    Another solver of the reference's graph has no distance in sigmas: P - P_ref is zero up to rounding.
+    """
     if not run.by_depth:
         return None
     classes = max(map(len, run.by_depth.values()))
-    return maps_by_depth(run.by_depth, run.line(style, classes), run.reference or "", style)
+    tables = {
+        name: table.assign(sigmas=np.nan) if {name, run.reference} <= set(SAME_GRAPH) else table
+        for name, table in run.by_depth.items()
+    }
+    return maps_by_depth(tables, run.line(style, classes), run.reference or "", style)
 
 
 def maps_by_depth(

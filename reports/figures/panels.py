@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
-from .style import BAND, GREEN, Style, note, safe_text
+from .style import BAND, GRAY, Style, note, safe_text
 
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6
 """degrees of freedom of a pose"""
-CONSISTENT = "95 % if consistent"
+CONSISTENT = "95 % if consistent (dotted: median)"
 MEDIANS = 100
 """windows of a running median that a line holds"""
 
@@ -132,7 +132,9 @@ def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray
 def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
     """Median and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
     low, high = (float(limit) / per for limit in compare.chi_square_bounds(degrees))
-    axes.axhline(float(compare.chi_square_quantile(0.5, degrees)) / per, color=GREEN, linewidth=width, zorder=1.5)
+    axes.axhline(
+        float(compare.chi_square_quantile(0.5, degrees)) / per, color=GRAY, linestyle=":", linewidth=width, zorder=1.5
+    )
     bottom, top = axes.get_ylim()
     axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
     return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)

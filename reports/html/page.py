@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 from markupsafe import Markup
 
 from ..figures.style import TRUTH
+from ..formatting import counted
 from ..phrases.evidence import FIRST
-from ..results.metric import TERMS
+from ..results.metric import TERMS, WORDS
 from ..tables.table import Table
 from .interactive import line_rules, policy, script
 from .plot_encoding import TRUTH_LINE, embedded_json
@@ -116,7 +117,7 @@ def render_page(page: Page) -> str:
             most=FIRST,
             sections=sections,
             css=Markup(styles),
-            glossary=TERMS if page.colors else {},
+            glossary={**TERMS, **WORDS} if page.colors else {},
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={title: f"estimator-{key}" for title, key in titles.items()},
             policy=Markup(NO_SCRIPT) if plots is None else policy(),
@@ -127,12 +128,13 @@ def render_page(page: Page) -> str:
 
 
 def _terms(page: Page) -> dict[str, str]:
-    """Terms of the glossary that a table links to or the title of a chart has."""
+    """Terms of the glossary that a table links to or the title of a chart has, and the words of a run's page."""
     tables = list(_tables([page.table, *page.sections]))
     linked = {column.term for table in tables for column in table.columns}
     linked |= {row.term for table in tables for row in table.rows}
     titles = " ".join(chart["title"].lower() for chart in (page.plots or {}).get("charts", ()))
-    return {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
+    terms = {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
+    return terms | WORDS if page.kind == "report" and terms else terms
 
 
 def _tables(holders: "Iterable[Section | Folded]") -> Iterator[Table]:
@@ -171,7 +173,7 @@ def folded(table: Table, most_open: int = 0) -> Folded:
 
 def still_figures(stills: list[Block]) -> Folded:
     """Figures that the interactive plots stand for on the screen."""
-    return Folded(f"{len(stills)} figures as they stand in the folder figures/", stills, "stills")
+    return Folded(f"The other {counted(len(stills), 'figure')} of the folder figures/", stills, "stills")
 
 
 def figure_blocks(pictures: Mapping[str, Picture], names: Iterable[str]) -> list[Block]:

@@ -9,13 +9,14 @@ import numpy as np
 from fgbaseline.compare import chi_square_bounds, chi_square_quantile
 from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold, worst_second
 from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.reference_trust import inflation_remark
 from fgbaseline.data import Estimate, Excluded
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.tracking import Pictures
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import STATE
 from fgbaseline.reports.figures.panels import nees_bounds, nees_median
-from fgbaseline.reports.formatting import distance
+from fgbaseline.reports.formatting import counted, distance, listed
 from fgbaseline.reports.tables.run_details import REASONS
 
 from .plot_encoding import (
@@ -89,7 +90,7 @@ def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
         r.name: median_by_frame(r.reprojection, run.problem.n_frames) for r in run.answered if len(r.reprojection)
     }
     title = "Median reprojection error by frame"
-    hint = "over all observations of the landmarks that an estimator has"
+    hint = "over all observations of an estimator's landmarks, also those that the mask excludes"
     yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, smooth=True, hint=hint)
 
 
@@ -101,7 +102,12 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     yield chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
     beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
     title = f"Reference NEES, to {run.reference}"
-    yield chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
+    left_out = {
+        r.name: int(r.evidence.difference.left_out.sum()) for r in run.answered if r.evidence.difference is not None
+    }
+    none_in = listed(f"{counted(n, 'frame')} of {name}" for name, n in left_out.items() if n)
+    why = f"; no value in {none_in}, where P − P_ref is not positive definite" if none_in else ""
+    yield chart(group, "nees-reference", title, "", _numbered(run, beside), **pose | {"hint": expected + why})
     whole = {
         r.name: r.inertial.nees["state"].to_numpy() for r in run.answered if r.inertial and r.inertial.nees is not None
     }
@@ -112,7 +118,9 @@ def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
     innovations = _innovations(run)
     if innovations is not None:
         nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
-        title, look = "NIS per degree of freedom", {"log": True, "smooth": True, "hint": expected}
+        remark = inflation_remark(run.problem)
+        hint = f"{expected}; {remark}, so that values far below the band are expected" if remark else expected
+        title, look = "NIS per degree of freedom", {"log": True, "smooth": True, "hint": hint}
         yield chart(group, "nis", title, "", _numbered(run, nis), **look, **innovations)
     for part in ("position", "rotation"):
         tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
@@ -136,8 +144,11 @@ def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
     T = run.problem.n_frames
     spent = {r.name: 1e3 * r.estimate.seconds for r in run.answered if len(r.estimate.seconds) == T}
     spent = {name: ms for name, ms in spent.items() if ms.any()}
+    absent = [r.name for r in run.answered if r.name not in spent]
+    without = f"; {listed(absent)} {'has' if len(absent) == 1 else 'have'} no time of each frame" if absent else ""
+    hint = f"below the dotted line an estimator runs in real time{without}"
     interval = 1e3 * float(np.median(run.problem.sequence.dt))
-    look = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
+    look = {"log": True, "smooth": True, "hint": hint}
     yield chart("Runtime", "time", "Time per frame", "ms", _numbered(run, spent), middle=interval, **look)
 
 

@@ -94,8 +94,8 @@ def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) ->
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
         f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}"
-        f"{' (after repair)' if problem['repairs'] else ''}. Problem: {problem['preset']}, "
-        f"{number(problem['features'])} of the tracks."
+        f"{' (after repair)' if problem['repairs'] else ''}. Preset {problem['preset']}: "
+        f"{number(problem['features'])} of the tracks are left to the estimators."
     )
 
 
@@ -117,7 +117,7 @@ def _sections(
     bands = [p for name, p in pictures.items() if name.startswith(BAND_FIGURES)]
     stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
-        Grid(evidence.transposed("figure")),
+        Grid(evidence.transposed("metric")),
         *figure_blocks(pictures, ["held_out"]),
         *([Folded("Errors with ±3-sigma bounds, for each estimator", bands)] if bands else []),
         *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
@@ -130,7 +130,7 @@ def _sections(
         frame.insert(0, Note(f"To keep the page small, one frame in {images.step} has its images."))
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
-        Section("behind", "What stands behind the numbers", _behind(run, plots), "Findings"),
+        Section("behind", "Reference and recording", _behind(run, plots)),
         Section("over-time", "Over time", [Live("charts"), *figure_blocks(pictures, CHART_FIGURES)] if live else []),
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
@@ -155,7 +155,7 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     problem = run.problem
     size = None if plots is None else (plots["camera"]["width"], plots["camera"]["height"])
     if size is not None and (tracks := track_sentences(problem.sequence, size)):
-        blocks += [Note("The recording", is_heading=True), Sentences(tracks, "tracks")]
+        blocks += [Note("Tracks", is_heading=True), Sentences(tracks, "tracks")]
     findings = details.findings_table(problem.findings)
     if not (problem.diagnosed or findings.rows or problem.repairs):
         return blocks

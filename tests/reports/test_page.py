@@ -246,7 +246,7 @@ def test_masked_observations_are_counted_and_events_of_one_kind_and_cause_are_on
     assert html.count("it came to lie behind") == 1
     (table,) = events_tables(run)
     assert [[row.name, *(cell.text for cell in row.cells)] for row in table.rows] == [
-        ["landmark dropped", "250", "0–59", "250 of them", "it came to lie behind"]
+        ["landmark dropped", "250", "0–59", "250 landmarks", "it came to lie behind"]
     ]
     assert "tables/events.csv" in table.caption
     _write_tables(run, tmp_path)
