@@ -134,7 +134,7 @@ def _terms(page: Page) -> dict[str, str]:
     linked |= {row.term for table in tables for row in table.rows}
     titles = " ".join(chart["title"].lower() for chart in (page.plots or {}).get("charts", ()))
     terms = {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
-    return terms | WORDS if page.kind == "report" and terms else terms
+    return {**terms, **WORDS} if page.kind == "report" and terms else terms
 
 
 def _tables(holders: "Iterable[Section | Folded]") -> Iterator[Table]:
