@@ -174,8 +174,8 @@ def _where(events: list[Event]) -> tuple[str, str, str]:
     frames = sorted({event.frame for event in events})
     landmarks = sorted({event.landmark for event in events if event.landmark is not None})
     span = f"{frames[0]}" if len(frames) == 1 else f"{frames[0]}–{frames[-1]}"
-    few = ", ".join(map(str, landmarks)) if len(landmarks) <= 3 else counted(len(landmarks), "landmark")
-    return number(len(events)), span, few
+    few = f"no. {', '.join(map(str, landmarks))}" if landmarks else ""
+    return number(len(events)), span, few if len(landmarks) <= 3 else counted(len(landmarks), "landmark")
 
 
 def _frames(
