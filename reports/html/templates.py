@@ -49,8 +49,8 @@ CAPTIONS: Mapping[str, str] = {
     "image_regions": "Errors that grow towards an edge can indicate distortion or a wrong rectification; near points "
     "at the bottom of the image and wrong matches raise them as well. All panels share "
     "one logarithmic scale.",
-    "map_difference": "Landmarks are matched by index. Distances in the world include the drift of the "
-    "trajectories; those in the camera frames do not.",
+    "map_difference": "Landmarks are matched by the index of their track. Distances in the world include the drift of "
+    "the trajectories; those in the camera frames do not.",
     "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 

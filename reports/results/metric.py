@@ -46,7 +46,7 @@ TERMS: Mapping[str, str] = {
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all start at one pose.",
     RPE: "Error of the motion between two poses a delta apart, m and °.",
     "drift": "Relative error per meter (or second) over a tenth of the path.",
-    SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; shorter where the path is too short.",
+    SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; over shorter segments on a short path.",
     REPROJECTION: "Norm of the pixel residual (uL, vL, uR, vR) of an observation, px; its RMS is twice the pixel "
     "sigma. Over all observations of an estimator's landmarks, also those that the mask excludes. Common observations "
     "are those that every estimator with landmark updates used.",
