@@ -20,6 +20,7 @@ from ..html.run_page import render
 from ..results.documents import SUMMARY
 from ..results.reader import TRUTH
 from ..results.run import Summary, summarize
+from ..tables.csv_file import write_csv
 from ..tables.run import main_table, main_values, metrics_table
 from ..tables.table import latex, markdown
 
@@ -45,7 +46,8 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
-        _nine_digits(_series(run, result)).to_csv(folder / "series" / f"{name}.csv")
+        columns = {str(key): column.to_numpy() for key, column in _series(run, result).items()}
+        write_csv(folder / "series" / f"{name}.csv", {"frame": range(run.problem.n_frames), **columns}, "%.9g")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
             _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
@@ -61,16 +63,6 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     (folder / "table.tex").write_text(latex(table), encoding="utf-8")
     (folder / SUMMARY).write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return summary
-
-
-def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with floats as text of nine digits, empty for NaN; faster than the formatting of pandas."""
-    text = {
-        str(name): [f"{value:.9g}" if value == value else "" for value in column.tolist()]
-        for name, column in table.items()
-        if column.dtype.kind == "f"
-    }
-    return table.assign(**text)
 
 
 def write_page(
