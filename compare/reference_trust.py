@@ -23,6 +23,7 @@ from .statistics.descriptive import rms_norm
 
 FAR_POINT = 1.0
 """px; disparity up to which a point is far"""
+FAR_REMARK = f"far: disparity of 0 to {FAR_POINT:g} px, masked"
 RESOLUTION = 1e-5
 """smallest reported difference from the batch solution: position RMSE in m, cost as a relative difference"""
 NOTABLE_INFLATION = 1.1
@@ -34,15 +35,15 @@ SHARE = "share"
 CRITERIA = {
     "pixel_scale": ("normalized pixel residual RMS", ""),
     "motion_scale": ("normalized motion residual RMS", ""),
-    "used_share": ("observations used, of those recorded that are not too far", SHARE),
-    "weak_frames": ("frames with too few used observations", SHARE),
+    "used_share": ("observations used, of those recorded except far ones", SHARE),
+    "weak_frames": ("frames with fewer than {weak_below} used observations", SHARE),
     "given_up_frames": ("frames whose observations were dropped", SHARE),
-    "impossible_share": ("observations without positive disparity", SHARE),
-    "untied_intervals": ("intervals without a landmark observed on both sides", SHARE),
+    "impossible_share": ("recorded observations, after repair, with a disparity of zero or less", SHARE),
+    "untied_intervals": ("pairs of consecutive frames without a common landmark", SHARE),
     "batch_cost": ("negative log-likelihood above that of the batch solution", SHARE),
     "batch_position": ("position RMSE from the batch solution", "baselines"),
 }
-"""name and unit of each criterion, by the field of `TrustLimits` that has its limits"""
+"""name and unit of each criterion, by the field of `TrustLimits` that has its limits; names may hold such a field"""
 BATCH_CRITERIA = ("batch_cost", "batch_position")
 AT_LEAST = frozenset({"used_share"})
 """criteria whose value must not fall below their limits"""
@@ -143,12 +144,12 @@ def trust(
     given_up = len(lost) / problem.n_frames
     inflated = inflation_remark(problem)
     expected_scale = (
-        f"{1.0 / problem.pixel_inflation:.2g} is expected for white track errors, because the pixel sigma is inflated "
-        f"{problem.pixel_inflation:.2g} times for time-correlated ones"
+        f"{inflated}; errors without correlation would give {1.0 / problem.pixel_inflation:.2g}"
         if inflated
         else "1 is expected"
     )
     recorded = "recorded ones" if problem.of_chosen_features.all() else "chosen tracks'"
+    far = "" if problem.sequence.monocular else f" except far points (disparity of 0 to {FAR_POINT:g} px)"
     untied = int((problem.sequence.observations.select(reference.used).ties(problem.n_frames) == 0).sum())
     intervals = max(1, problem.n_frames - 1)
     motion_data = "velocities" if problem.imu is None else "inertial samples"
@@ -162,9 +163,9 @@ def trust(
             f"normalized motion residual RMS {_rounded(motion)} (limit {limit.motion_scale[0]:g}; up to 1 is expected)",
         ),
         (
-            _criterion(limit, "used_share", share),
-            f"it used {plural(n_used, 'observation')}: {per_cent(share)} of the {recorded} that are not too far, "
-            f"{per_cent(n_used / max(1, int(problem.mask.sum())))} of those that the mask leaves",
+            _criterion(limit, "used_share", share, FAR_REMARK if far else ""),
+            f"it used {plural(n_used, 'observation')}: {per_cent(share)} of the {recorded}{far}, "
+            f"{per_cent(n_used / max(1, int(problem.mask.sum())))} of the unmasked ones",
         ),
         (
             _criterion(limit, "weak_frames", weak),
@@ -182,8 +183,8 @@ def trust(
         ),
         (
             _criterion(limit, "untied_intervals", untied / intervals),
-            f"{untied:,} of {plural(intervals, 'interval')} ({per_cent(untied / intervals)}) have no landmark observed "
-            f"on both sides; there only the {motion_data} constrain the motion, and a jump would go unnoticed"
+            f"{untied:,} of {plural(intervals, 'pair')} of consecutive frames ({per_cent(untied / intervals)}) have no "
+            f"used landmark in common; there only the {motion_data} constrain the motion, and a jump would go unnoticed"
             if untied
             else "",
         ),
@@ -205,12 +206,13 @@ def inflation_remark(problem: Problem) -> str:
     """Clause on the inflation of the pixel noise; empty below `NOTABLE_INFLATION`."""
     if problem.pixel_inflation < NOTABLE_INFLATION:
         return ""
-    return f"the pixel sigma is inflated {problem.pixel_inflation:.2g} times for time-correlated track errors"
+    return f"the pixel sigma is inflated by {problem.pixel_inflation:.3g} for time-correlated track errors"
 
 
 def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -> Criterion:
     doubtful, untrusted = getattr(limits, code)
-    name, unit = CRITERIA[code]
+    title, unit = CRITERIA[code]
+    name = title.format(weak_below=limits.weak_below)
     at_least = code in AT_LEAST
     verdict = (_below if at_least else _above)(value, (doubtful, untrusted))
     return Criterion(code, name, value, unit, doubtful, untrusted, at_least, verdict, remark)
@@ -260,7 +262,8 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = rms_norm(apart)
     baselines = rmse / problem.sequence.camera.unit_length
-    position = _criterion(limit, "batch_position", baselines)
+    remark = "" if problem.sequence.monocular else f"1 baseline: {problem.sequence.camera.unit_length:.3g} m"
+    position = _criterion(limit, "batch_position", baselines, remark)
     lengths = f", {baselines:.2g} baselines"
     if problem.sequence.monocular:  # no baseline, and its stand-in means nothing to a reader
         position, lengths = replace(position, unit=f"{UNIT_LENGTH:g} m"), ""

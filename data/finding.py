@@ -32,8 +32,8 @@ AS_GIVEN = "as given"
 
 
 MEASURES = {
-    "rad/s": "median error of the angular velocity",
-    "m/s": "median error of the linear velocity",
+    "rad/s": "median difference of the angular velocity from visual odometry",
+    "m/s": "median difference of the linear velocity from visual odometry",
     "m/s^2": "acceleration",
     "rad/s/sqrt(Hz)": "noise density of the gyroscope",
     "m/s^2/sqrt(Hz)": "noise density of the accelerometer",
@@ -53,9 +53,9 @@ class Finding:
     sentence: str
     """description with values"""
     before: float
-    """a measure of the fault before repair, in `unit`"""
+    """a measure of the fault without this repair, in `unit`"""
     after: float
-    """the measure after repair and masking; equal to `before` if the fault is not repaired"""
+    """the measure with it, after masking; equal to `before` if the fault is not repaired"""
     unit: str
     certainty: str
     """a standard error, a log-likelihood ratio, or 'counted'"""

@@ -127,9 +127,11 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     mask, tracks = mask_settings(repairs)
     repaired = repair(diagnosis, mask, tracks)
     noise = diagnosis.sigmas or NoiseSettings()
+    inflation = 1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel
+    white = f" ({inflation:.1f} times that from frame to frame)" if inflation > 1.0 else ""
     remarks = (
         *((f"not diagnosed: {found.cannot_tell}",) if found.cannot_tell else ()),
-        f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px, {noise.linear_velocity:.3f} m/s and "
+        f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px{white}, {noise.linear_velocity:.3f} m/s and "
         f"{noise.angular_velocity:.4f} rad/s",
     )
     problem = _velocity_problem(
@@ -137,7 +139,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     )
     return replace(
         inflate_gap_covariance(_with_outlier_noise(_bridged(problem, diagnosis, noise), diagnosis)),
-        pixel_inflation=1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel,
+        pixel_inflation=inflation,
         diagnosed=not found.cannot_tell,
         findings=findings_of(found, track_statistics(found, repaired if repairs == Repairs() else None)),
         repairs=(*override_sentences(repairs), *rescalings(found), *repaired.repairs),

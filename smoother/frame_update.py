@@ -106,7 +106,8 @@ def recovery_reason(events: Iterable[Event]) -> str:
         for kind, n in sorted(count.items())
         if kind != EventKind.SOLVED_BY_QR
     ]
-    return "; ".join([*lost, *([f"{never:,} more never determined"] if never else [])]) if lost else ""
+    others = [f"{plural(never, 'other landmark')} never determined"] if never else []
+    return "; ".join([*lost, *others]) if lost else ""
 
 
 def _recovery(frame: int, dropped: Mapping[int, str]) -> Recovery:

@@ -48,7 +48,8 @@ def _copies(repeated: BoolArray, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"In {n:,} of {plural(len(repeated), 'interval')} nearly all observations are bit-identical copies of the "
-        f"previous frame ({tracks.copied:,}); many of these tracks then continue on a different point."
+        f"previous frame ({plural(tracks.copied, 'observation')}); many of these tracks then continue on a different "
+        "point."
     )
     return [_counted("copied_frames", text, tracks.copied, 0, "observations")]
 

@@ -108,7 +108,8 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
     if loose:
         worst = np.rad2deg(angle.max())
         sentences.append(
-            f"Whether imu_T_cam is turned about {listed(loose)}: the error is known to {worst:.1f}° at best."
+            f"The rotation of imu_T_cam about {listed(loose)}: its standard error is {worst:.1f}°, above the limit of "
+            f"{np.rad2deg(KNOWN_ANGLE):.1f}°."
         )
     return tuple(sentence for sentence in sentences if sentence)
 
@@ -139,7 +140,7 @@ def _axes(which: str, axes: Axes, unit: str) -> Finding:
     if np.abs(np.diag(matrix)).all():
         what = f"Components {listed(f'{letter}_{axis}' for axis in reversed_)} are recorded with the opposite sign"
     else:
-        what = f"The {which} velocity is recorded in other axes: the axes of imu_T_cam are its ({axes.name})"
+        what = f"The {which} velocity is recorded in other axes: the IMU axes of imu_T_cam are its ({axes.name})"
     unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
     part = f"; that of {listed(unseen)} is a guess, the cameras do not determine it" if unseen else ""
     return Finding(
@@ -148,7 +149,7 @@ def _axes(which: str, axes: Axes, unit: str) -> Finding:
         axes.before,
         axes.after,
         unit,
-        f"log-likelihood {number(round(axes.margin))} above the next convention",
+        f"log-likelihood {number(round(axes.margin))} above that of the best other convention",
     )
 
 
@@ -176,8 +177,8 @@ def _time_offset(diagnosis: Diagnosis) -> Finding | None:
     text = f"Velocities describe the interval that begins {when} ({signed(shift, 2)} intervals)"
     if diagnosis.shift == Shift.BEFORE:
         text = (
-            "Velocities describe the interval before their stamp, not the one after it: their estimated shift is "
-            f"{signed(shift, 2)} intervals"
+            "Velocities describe the interval before their stamp, not the one after it. This convention (a shift of "
+            f"{signed(float(Shift.BEFORE), 2)} intervals) is the nearest to the estimated shift of {signed(shift, 2)}"
         )
     bias = significant_bias(diagnosis)
     return Finding(
@@ -267,9 +268,11 @@ def _unseen(what: str, axes: Axes) -> str:
         return f"In which axes the {what} was recorded: the motion excites none of them enough."
     rows = axes.name.split(",")
     determined = listed(
-        f"{rows['xyz'.index(name)]} is along {name} of imu_T_cam" for name in "xyz" if name not in unseen
+        f"{rows['xyz'.index(name)]} is along {name} of the IMU axes of imu_T_cam"
+        for name in "xyz"
+        if name not in unseen
     )
     return (
-        f"All axes of the {what}: the motion shows only that its {determined}, not which of its components are along "
-        f"{listed(unseen)}, or their signs."
+        f"The {listed(unseen)} {noun(len(unseen), 'axis', 'axes')} of the {what}: the motion shows only that its "
+        f"{determined}, not the order or the signs of the other components."
     )

@@ -62,9 +62,9 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     velocity = sequence.linear_velocity @ linear.matrix.T / scale
     rate = (sequence.angular_velocity - bias) @ angular.matrix.T
     if angular.changed:
-        done.append(f"angular velocity rotated from the recorded axes ({angular.name}) to those of imu_T_cam")
+        done.append(f"angular velocity rotated from the recorded axes ({angular.name}) to the IMU axes of imu_T_cam")
     if linear.changed:
-        done.append(f"linear velocity rotated from the recorded axes ({linear.name}) to those of imu_T_cam")
+        done.append(f"linear velocity rotated from the recorded axes ({linear.name}) to the IMU axes of imu_T_cam")
     if bias.any():
         done.append(f"gyroscope bias of {vector(bias, 4)} rad/s subtracted")
     if scale != 1.0:

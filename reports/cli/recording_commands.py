@@ -24,7 +24,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--estimators",
     help=f"Names, separated by commas.  [default: {','.join(DEFAULT_ESTIMATORS)}; up to {BATCH_OBSERVATIONS:,} "
-    "observations also batch, started at the solution of isam2 only]",
+    "unmasked observations also batch, started at the solution of isam2 only]",
 )
 @click.option(
     "--estimator",

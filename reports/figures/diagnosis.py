@@ -60,11 +60,13 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
             lines += axis.plot(t, moving_mean(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
         axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
         before, after = (float(np.median(np.abs(seen[known, i] - r[known, i]))) for r in (recorded, repaired))
-        text = f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else "")
+        text = f"median difference of single intervals {before:.3f} rad/s" + (
+            f", repaired {after:.3f}" if changed else ""
+        )
         axis.set_title(text, loc="right", fontsize=8, color=GRAY, pad=2.0)
         handles = handles or lines
     axes[-1].set(xlabel="time, s", xlim=(0.0, float(t[-1])))
-    title = f"Angular velocity about the axes of imu_T_cam, averaged over {AVERAGED_OVER:g} s"
+    title = f"Angular velocity about the IMU axes, averaged over {AVERAGED_OVER:g} s"
     title_and_legend(figure, title, handles)
     return figure
 
@@ -90,11 +92,12 @@ def conventions(diagnosis: Diagnosis) -> Figure:
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
         unseen = [n for n, s in zip("xyz", axes.seen, strict=True) if not s]
-        remark = f" ({', '.join(unseen)} not identifiable)" if unseen else ""
+        kept = ": as recorded" if axes.name == IDENTITY else ""
+        remark = f" ({', '.join(unseen)} not identifiable{kept})" if unseen else ""
         panel.set(title=f"{which} velocity{remark}", xlabel="behind the best, log-likelihood")
     changed = diagnosis.angular.changed or diagnosis.linear.changed
-    handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
-    handles += [swatch(RECORDED, "as recorded")] if changed else []
+    handles = [swatch(REPAIRED, "used" if changed else "used: as recorded")]
+    handles += [swatch(RECORDED, "as recorded, not used")] if changed else []
     handles.append(swatch(OTHERS, "others"))
     title_and_legend(figure, "Likelihood of the 24 axis conventions, by visual odometry", handles)
     return figure

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
@@ -129,9 +130,13 @@ def _reach(error: FloatArray, sigma: FloatArray) -> float:
 def map_difference(data: RunData | ComparisonData, style: Style = SCREEN) -> Figure | None:
     """Median distance of landmarks from the reference's by depth; None where none is shared.
 
-    In meters and sigmas, on paper only in the camera frame.
+    In meters and sigmas, on paper only in the camera frame. Another solver of the reference's graph has no distance in
+    sigmas: P - P_ref is zero up to rounding.
     """
-    tables = data.by_depth
+    tables = {
+        name: table.assign(sigmas=np.nan) if {name, data.reference} <= set(SAME_GRAPH) else table
+        for name, table in data.by_depth.items()
+    }
     columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
     if not style.titled:
         columns = {"seen": ""}

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 COMPONENTS = {
     "position": "distance, m",
     "rotation_deg": "rotation, °",
-    "along": "along, m",
+    "along": "ahead, m",
     "across": "to the left, m",
-    "up": "up, m",
+    "up": "above, m",
 }
 """columns of `compare.pose_errors`, as the panels have them"""
 SIGNED = ("along", "across", "up")

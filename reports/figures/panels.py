@@ -13,14 +13,14 @@ from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
 from .legend import note
-from .palette import BAND, GREEN
+from .palette import BAND, GRAY
 from .style import Line, Style, safe_text
 
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6.0
 """degrees of freedom of a pose"""
-CONSISTENT = "95 % if consistent"
+CONSISTENT = "95 % if consistent (dotted: median)"
 MEDIANS = 100
 """windows of a running median that a line holds"""
 
@@ -125,7 +125,7 @@ def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray
 def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
     """Median and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
     low, median, high = chi_square_limits(degrees, per)
-    axes.axhline(median, color=GREEN, linewidth=width, zorder=1.5)
+    axes.axhline(median, color=GRAY, linestyle=":", linewidth=width, zorder=1.5)
     bottom, top = axes.get_ylim()
     axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
     return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)

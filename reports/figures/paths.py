@@ -79,7 +79,7 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     handles = [_draw_landmarks(axes, landmarks)] if len(landmarks) else []
     handles += axes.plot(*path.T, **run.line()(name))
     if run.run is not None:
-        _draw_orientation(axes, path, _directions(run.run, name), run.colors[name])
+        handles.append(_draw_orientation(axes, path, _directions(run.run, name), run.colors[name]))
     handles += _draw_ends(axes, path)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, f"{label(name, run.reference)}: trajectory from above and landmarks", handles)
@@ -176,12 +176,13 @@ def _directions(run: "Run", name: str) -> FloatArray:
     return TopView.of(run.problem).plane(run.results[name].estimate.world_T_imu[:, :3, :3] @ optical_axis)
 
 
-def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> None:
-    """Arrows along the optical axis, at some of the frames."""
+def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> Line2D:
+    """Arrows along the optical axis, at some of the frames, and their entry in the legend."""
     there = np.flatnonzero(np.isfinite(path).all(axis=1))
     chosen = there[:: max(1, len(there) // ARROWS)]
     look: dict[str, Any] = {"scale": 32, "width": 0.0028, "headwidth": 5, "headlength": 6, "alpha": 0.75, "zorder": 3}
     axes.quiver(*path[chosen].T, *directions[chosen].T, angles="xy", color=color, **look)
+    return Line2D([], [], color=color, marker="$\\rightarrow$", linestyle="none", markersize=9, label="optical axis")
 
 
 def _draw_ends(axes: Axes, path: FloatArray) -> list[Line2D]:

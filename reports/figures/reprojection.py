@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 SMALL_ERROR = 3.0
 """px, a column of the tables"""
 BANDS: Mapping[str, tuple[str, tuple[Excluded, ...]]] = {
-    "in the problem": ("#b8c4d0", (Excluded.NO,)),
+    "not masked": ("#b8c4d0", (Excluded.NO,)),
     "feature not chosen": ("#eef1f4", (Excluded.FEATURE_NOT_CHOSEN,)),
-    "too far or track too short": ("#e9e4cf", (Excluded.DISPARITY, Excluded.SHORT)),
-    "copied from the frame before": ("#d9b3e0", (Excluded.COPIED,)),
+    "disparity too small, or track too short": ("#e9e4cf", (Excluded.DISPARITY, Excluded.SHORT)),
+    "copied from the previous frame": ("#d9b3e0", (Excluded.COPIED,)),
     "wrong match, moved or undetermined": ("#c0392b", WRONG_MATCH),
 }
 """colors of the observations of a frame, and the reasons for exclusion that each stands for; every reason has one"""
@@ -78,7 +78,7 @@ def reprojection_distribution(run: RunData) -> Figure | None:
         {name: table["error"] for name, table in tables.items()},
         {name: errors for name, errors in used.items() if len(errors)},
         run.line(),
-        ("of its landmarks", "those it used"),
+        ("all observations", "used observations"),
     )
     _mark_small_error(figure.axes[0], vertical=True)
     return figure

@@ -10,9 +10,12 @@ from .page import Grid, Page, Section, Sentences, pictures
 from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
-    "angular_rates": "About each axis of imu_T_cam, moving averages. The repaired rates follow visual odometry.",
-    "conventions": "Each candidate is a convention of axes and signs; the most likely one is chosen.",
-    "time_offset": "Agreement of the recorded rates with the cameras at each time offset; the estimate has the best.",
+    "angular_rates": "About the IMU axes that imu_T_cam assumes, as moving averages. With the repairs the rates "
+    "should follow visual odometry; where only visual odometry jumps, tracks are wrong.",
+    "conventions": "Bars: by how much a convention of axes and signs is less likely than the best one. Differences in "
+    "axes that are not identifiable do not count: of conventions that differ in these alone, the recorded one is kept.",
+    "time_offset": "Agreement of the recorded rates with visual odometry, 1 for equal rates, at each time offset. "
+    "The estimate is at its maximum; dotted lines mark the usual conventions.",
     "velocity_residuals": "Residuals of the velocities over the estimated noise, beside a normal distribution.",
     "tracks": "Features of each frame, and the share of its matches that contradict the motion.",
 }

@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ..figures.saving import EncodedFigure, encoded
+from ..formatting import counted
 from ..tables.table import Table
 
 LARGEST_SVG = 200_000
@@ -156,7 +157,7 @@ def folded(table: Table, most_open: int = 0) -> Folded:
 
 def still_figures(stills: list[Block]) -> Folded:
     """Figures that the interactive plots stand for on the screen."""
-    return Folded(f"{len(stills)} figures as they stand in the folder figures/", stills, "stills")
+    return Folded(f"The other {counted(len(stills), 'figure')} of the folder figures/", stills, "stills")
 
 
 def figure_blocks(pictures: Mapping[str, Picture], names: Iterable[str]) -> list[Block]:

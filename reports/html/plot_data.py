@@ -8,6 +8,7 @@ import numpy as np
 
 from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold, worst_second
 from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.reference_trust import inflation_remark
 from fgbaseline.data import Excluded
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.tracking import Pictures
@@ -15,7 +16,7 @@ from fgbaseline.geometry.strapdown import STATE
 
 from ..figures.panels import DEGREES_OF_FREEDOM
 from ..figures.run_data import RunData, of_run
-from ..formatting import distance
+from ..formatting import counted, distance, listed
 from ..tables.run_details import REASONS
 from .plot_encoding import (
     TRUTH_LINE,
@@ -31,6 +32,7 @@ from .plot_encoding import (
     position_covariances,
 )
 
+ALL_OBSERVATIONS = "over all observations of an estimator's landmarks, also those that the mask excludes"
 EDGE = 8.0
 """px between the outermost observations and the frame drawn around them"""
 
@@ -50,11 +52,18 @@ def charts(run: Run, data: RunData) -> list[Chart]:
     if data.truth is not None:
         heights |= {TRUTH_LINE: data.truth[:, 2]}
     unaligned = "difference from ground truth; all start at the true pose"
-    every = {"log": True, "smooth": True, "hint": "over all observations of the landmarks that an estimator has"}
+    every = {"log": True, "smooth": True, "hint": ALL_OBSERVATIONS}
     pose, rows = expected(DEGREES_OF_FREEDOM, frames), data.nis_rows or 1.0
     ratio = {"log": True, "middle": 1.0, "hint": "expected above 1 for a filter"}
     times, interval = numbered(run.results, data.milliseconds()), 1e3 * float(np.median(run.problem.sequence.dt))
-    real_time = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
+    absent = [r.name for r in run.answered if r.name not in data.milliseconds()]
+    without = f"; {listed(absent)} {'has' if len(absent) == 1 else 'have'} no time of each frame" if absent else ""
+    hint = f"below the dotted line an estimator runs in real time{without}"
+    real_time = {"log": True, "smooth": True, "hint": hint}
+    beside, innovations = dict(pose), expected(rows, frames, per=rows)
+    beside["hint"] += _undefined(run)
+    if remark := inflation_remark(run.problem):
+        innovations["hint"] += f"; {remark}, so that values far below the band are expected"
     groups = {
         "Divergence and errors": [
             of("divergence", f"Divergence from {reference}, unaligned", "m", "divergence_position"),
@@ -74,15 +83,23 @@ def charts(run: Run, data: RunData) -> list[Chart]:
         "Pixels": [of("reprojection", "Median reprojection error by frame", "px", "reprojection_median", **every)],
         "Consistency": [
             of("nees", "NEES", "", "nees", **pose),
-            of("nees-reference", f"Reference NEES, to {reference}", "", "nees_reference", **pose),
+            of("nees-reference", f"Reference NEES, to {reference}", "", "nees_reference", **beside),
             of("nees-state", "NEES of the state", "", "nees_state", **expected(float(STATE), frames)),
-            of("nis", "NIS per degree of freedom", "", "nis_per_row", smooth=True, **expected(rows, frames, per=rows)),
+            of("nis", "NIS per degree of freedom", "", "nis_per_row", smooth=True, **innovations),
             of("sigma-position", f"Sigma ratio of position, to {reference}", "", "sigma_ratio_position", **ratio),
             of("sigma-rotation", f"Sigma ratio of rotation, to {reference}", "", "sigma_ratio_rotation", **ratio),
         ],
         "Runtime": [chart("time", "Time per frame", "ms", times, middle=interval, **real_time)],
     }
     return grouped(groups)
+
+
+def _undefined(run: Run) -> str:
+    """Clause on the frames of each estimator in which the reference NEES is not defined; empty without any."""
+    differences = {r.name: r.evidence.difference for r in run.answered if r.evidence.difference is not None}
+    counts = {name: int(difference.left_out.sum()) for name, difference in differences.items()}
+    each = listed(f"{counted(n, 'frame')} of {name}" for name, n in counts.items() if n)
+    return f"; no value in {each}, where P − P_ref is not positive definite" if each else ""
 
 
 def _biases(run: Run, data: RunData) -> Iterable[Chart | None]:

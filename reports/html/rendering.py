@@ -19,7 +19,7 @@ from markupsafe import Markup
 from ..figures.palette import DASHES, TRUTH, dark_matrix, on_dark
 from ..formatting import unbroken
 from ..phrases.evidence import FIRST
-from ..results.metric import TERMS
+from ..results.metric import TERMS, WORDS
 from ..results.provenance import creation
 from ..tables.table import Table
 from .page import Block, Folded, Grid, Page
@@ -44,7 +44,7 @@ def render_page(page: Page) -> str:
             sections=[section for section in (page.table, *page.sections) if section.blocks],
             css=Markup(asset("report.css") + (asset("explore.css") if page.colors else "")),
             dark_matrix=" ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3])),
-            glossary=TERMS,
+            glossary={**TERMS, **WORDS},
             terms=_terms(page),
             line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
             classes={title: f"estimator-{key}" for title, key in titles.items()},
@@ -92,12 +92,16 @@ def flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]
 
 
 def _terms(page: Page) -> dict[str, str]:
-    """Terms of the page's glossary: its own, those that a table links to, and those in the title of a chart."""
+    """Terms of the page's glossary: its own, those that a table links to, and those in the title of a chart.
+
+    A run's page has its words as well.
+    """
     tables = list(_tables([page.table, *page.sections]))
     linked = {*page.terms, *(column.term for table in tables for column in table.columns)}
     linked |= {row.term for table in tables for row in table.rows}
     titles = " ".join(chart["title"].lower() for chart in (page.plots or {}).get("charts", ()))
-    return {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
+    terms = {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
+    return {**terms, **WORDS} if page.kind == "report" and terms else terms
 
 
 def _tables(holders: Iterable[Any]) -> Iterator[Table]:

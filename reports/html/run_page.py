@@ -37,29 +37,33 @@ from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
     "paths_overlaid": "Seen from above; all start at the same pose. Squares mark the ends.",
-    "paths_side_by_side": "The limits of all panels are equal; landmarks are green. Ground truth is dashed; without "
-    "it the reference is thin.",
+    "paths_side_by_side": "All panels have the same limits. Green dots: landmarks. Dashed: ground truth, where there "
+    "is one; else the thin line is the reference.",
     "divergence": "Position and rotation difference from the reference, without alignment, and the position "
-    "difference along the reference's direction of travel, to its left and up.",
+    "difference ahead of the reference, to its left and above it.",
     "error_to_truth": "Difference from ground truth in the same components, without alignment: all start at the true "
     "pose.",
     "height": "Along the up direction of the recording.",
-    "reprojection_over_time": "Above, the median error over all observations of the landmarks that an estimator has. "
-    "Below, all recorded observations of each frame, and which of them the mask excludes.",
-    "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over "
-    "those it used. Curves farther left are better.",
+    "reprojection_over_time": "Above, the median error over all observations of an estimator's landmarks, also "
+    "those that the mask excludes. Below, all recorded observations of each frame, and which of them the mask "
+    "excludes.",
+    "reprojection_distribution": "Solid over all observations of an estimator's landmarks, also those that the mask "
+    "excludes; dashed over those it used. Curves farther left are better.",
     "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "
     "below it conservative.",
     "held_out": "Each half of a track is predicted from its other half along each trajectory. Trajectories whose "
     "intervals overlap can still be separated: the table has the paired difference from the best.",
     "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
-    "time-correlated. The sigma ratio of a filter is expected above 1.",
+    "time-correlated. Where the pixel noise is inflated, a NIS far below the band is expected. The sigma ratio of a "
+    "filter is expected above 1.",
     "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
-    "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, larger to its right.",
-    "image_regions": "Errors that grow towards an edge indicate distortion or a wrong rectification. All panels share "
+    "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, as with inflated "
+    "pixel noise, larger to its right.",
+    "image_regions": "Errors that grow towards an edge can indicate distortion or a wrong rectification; near points "
+    "at the bottom of the image and wrong matches raise them as well. All panels share "
     "one logarithmic scale.",
-    "map_difference": "Landmarks are matched by index. Distances in the world include the drift of the "
-    "trajectories; those in the camera frames do not.",
+    "map_difference": "Landmarks are matched by the index of their track. Distances in the world include the drift of "
+    "the trajectories; those in the camera frames do not.",
     "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 """captions by the names of figures"""
@@ -126,8 +130,8 @@ def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) ->
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
         f"{counted(sequence['observations'], kind)} of {counted(sequence['tracks'], 'track')}"
-        f"{' (after repair)' if problem['repairs'] else ''}. Problem: {problem['preset']}, "
-        f"{number(problem['features'])} of the tracks."
+        f"{' (after repair)' if problem['repairs'] else ''}. Preset {problem['preset']}: "
+        f"{number(problem['features'])} of the tracks are left to the estimators."
     )
 
 
@@ -145,7 +149,7 @@ def _sections(
     bands = [p for name, p in drawn.items() if name.startswith(BAND_FIGURES)]
     stills = figure_blocks(drawn, [n for n in drawn if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
-        Grid(evidence.transposed("figure")),
+        Grid(evidence.transposed("metric")),
         *figure_blocks(drawn, ["held_out"]),
         *([Folded("Errors with ±3-sigma bounds, for each estimator", bands)] if bands else []),
         *figure_blocks(drawn, ["reprojection_classes", "image_regions", "map_difference"]),
@@ -158,7 +162,7 @@ def _sections(
         frame.insert(0, Note(f"To keep the page small, one frame in {images.step} has its images."))
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
-        Section("behind", "What stands behind the numbers", _behind(run, plots), "Findings"),
+        Section("behind", "Reference and recording", _behind(run, plots)),
         Section("over-time", "Over time", [Live("charts"), *figure_blocks(drawn, CHART_FIGURES)] if live else []),
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
@@ -183,7 +187,7 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     problem = run.problem
     size = None if plots is None else (plots["camera"]["width"], plots["camera"]["height"])
     if size is not None and (tracks := track_sentences(problem.sequence, size)):
-        blocks += [Note("The recording", is_heading=True), Sentences(tracks, "tracks")]
+        blocks += [Note("Tracks", is_heading=True), Sentences(tracks, "tracks")]
     findings = details.findings_table(problem.findings)
     if not (problem.diagnosed or findings.rows or problem.repairs):
         return blocks

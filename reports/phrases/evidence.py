@@ -59,7 +59,9 @@ def sample_requirement() -> str:
 
 def threshold(bound: float) -> str:
     """Threshold on a distance: 5 m, or 1 % of the path length where that is less."""
-    return f"{bound:g} m" if bound >= FAR else f"{per_cent(FAR_SHARE)} of the path length, {number(bound)} m"
+    if bound >= FAR:
+        return f"{bound:g} m (fixed above {FAR / FAR_SHARE:g} m of path length)"
+    return f"{per_cent(FAR_SHARE)} of the path length, {number(bound)} m"
 
 
 def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:

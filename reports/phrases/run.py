@@ -37,7 +37,7 @@ from .evidence import (
 )
 from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences
 
-SUSPECTED = "wrong matches, moving points or undetermined points"
+SUSPECTED = "wrong matches, moving points or points that cannot be triangulated"
 """reasons of `WRONG_MATCH`"""
 LONGEST_LIST = 80
 """letters of a list of frames; of a longer one only the first and the last frame are named"""
@@ -141,8 +141,8 @@ def _maximum_divergence(run: Run) -> list[str]:
     if wrong and overall is not None:
         each = listed(f"{per_cent(share)} ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Within {AROUND:g} s of these onsets the mask excluded {each} of the observations as {SUSPECTED}; "
-            f"{per_cent(overall)} in the whole recording."
+            f"Within {AROUND:g} s of the first frame above the threshold the mask excluded {each} of the observations "
+            f"as {SUSPECTED}; {per_cent(overall)} in the whole recording."
         )
     return sentences
 
@@ -151,7 +151,8 @@ def _with_status(status: Status, run: Run) -> list[str]:
     """Estimators that ended with a status, by reason."""
     found = {name: result.estimate for name, result in run.results.items() if result.estimate.status is status}
     reasons = grouped((estimate.reason or "no reason was given", name) for name, estimate in found.items())
-    return [f"{listed(names)} {status.value}: {reason.rstrip('.')}." for reason, names in reasons.items()]
+    outcome = "recovered (finished after losses)" if status is Status.RECOVERED else status.value
+    return [f"{listed(names)} {outcome}: {reason.rstrip('.')}." for reason, names in reasons.items()]
 
 
 def _missing_poses(run: Run) -> list[str]:
@@ -239,8 +240,8 @@ def _mask(run: Run) -> list[str]:
     second = f"{worst.second:.0f} s to {worst.second + 1.0:.0f} s"
     return [
         total,
-        f"As {SUSPECTED} it excluded {per_cent(overall)}; their largest share is {per_cent(worst.share)}, from "
-        f"{second}.",
+        f"Excluded as {SUSPECTED}: {per_cent(overall)}, at most {per_cent(worst.share)} within a second (from "
+        f"{second}).",
     ]
 
 

@@ -80,7 +80,8 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
         than = listed(f"{name} ({text[name]} m)" for name in better)
         sentences.append(
             f"The reference {reference} has a larger ATE ({text[reference]} m) than {than}, by paired bootstrap{over}; "
-            f"divergence from it does not measure accuracy on this recording.{_rough({n: pairs[n] for n in better})}"
+            f"divergence from it does not measure accuracy on this recording."
+            f"{_uncertain({(reference, name): pairs[name] for name in better})}"
         )
     sentences += no_difference(reference, [name for name in smaller if name not in (*better, *equal)], "ATE", over)
     if equal:
@@ -142,8 +143,8 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     if equal:
         sentences.append(f"The divergence of {listed([first, *equal])} is the same to the printed digits.")
     if larger:
-        rough = _rough({name: found.behind[name] for name in larger})
-        sentences.append(f"Larger divergence than {first}, by paired bootstrap: {each(larger)}.{rough}")
+        uncertain = _uncertain({(name, first): found.behind[name] for name in larger})
+        sentences.append(f"Larger divergence than {first}, by paired bootstrap: {each(larger)}.{uncertain}")
         sentences += _closeness(run, found)
     return sentences
 
@@ -153,10 +154,11 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
     sigma = run.results[str(run.reference)].evidence.sigma.position_rmse
     if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
         return []
+    solved = f" Trusted means that {run.reference} solves this problem well, not that its error is below its sigma."
     return [
-        f"All of them are within {WITHIN_SIGMAS:g} times the position sigma of {run.reference} itself, "
-        f"{number(sigma)} m RMS: "
-        "this order shows closeness to it, not accuracy."
+        f"The divergences (RMSE) of {listed(found.rmse)} are below {WITHIN_SIGMAS:g} times the position sigma of "
+        f"{run.reference} itself, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
+        f"which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
     ]
 
 
@@ -165,20 +167,22 @@ def _share(rmse: float, result: Result) -> str:
     return f" ({per_cent(rmse / length)} of the path length)" if length > 0 else ""
 
 
-def _rough(differences: Mapping[str, RmseDifference]) -> str:
-    """Intervals of differences that are not reliable, or of many the fewest blocks that these rest on."""
-    rough = {name: d for name, d in differences.items() if not d.reliable}
-    if not rough:
+def _uncertain(differences: Mapping[tuple[str, str], RmseDifference]) -> str:
+    """Intervals of differences (larger, smaller) that are not reliable, or of many the fewest blocks they rest on."""
+    unreliable = {names: d for names, d in differences.items() if not d.reliable}
+    if not unreliable:
         return ""
     why = "as the errors stay correlated over much of the recording"
-    if len(rough) > FEW:
-        blocks = plural(min(int(d.blocks) for d in rough.values()), "block")
-        return f" The intervals of {len(rough)} of these differences are rough, {why}: they rest on {blocks}."
+    if len(unreliable) > FEW:
+        blocks = plural(min(int(d.blocks) for d in unreliable.values()), "block")
+        n = len(unreliable)
+        return f" The 95 % intervals of {n} of these differences are uncertain, {why}: they rest on {blocks}."
     each = [
-        f"{name} {number(d.value)} m [{number(d.low)}, {number(d.high)}] from {plural(int(d.blocks), 'block')}"
-        for name, d in rough.items()
+        f"{larger} is {number(d.value)} m [{number(d.low)}, {number(d.high)}] above {smaller}, from "
+        f"{plural(int(d.blocks), 'block')}"
+        for (larger, smaller), d in unreliable.items()
     ]
-    return f" The interval of the difference is rough, {why}: {listed(each)}."
+    return f" The 95 % interval of the difference is uncertain, {why}: {listed(each)}."
 
 
 def _over(run: Run, found: PairedRanking) -> str:
@@ -228,9 +232,9 @@ def _claim(run: Run, result: Result) -> str:
     if difference is not None and difference.is_overconfident:
         difference = None  # its NEES is that of the few frames in which P - P_ref is positive definite
     figures = {
-        "NEES": float("nan") if result.nees is None else _median(result.nees),
-        "reference NEES": float("nan") if difference is None else _median(difference.nees),
-        "sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
+        "median NEES": float("nan") if result.nees is None else _median(result.nees),
+        "median reference NEES": float("nan") if difference is None else _median(difference.nees),
+        "median sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
     }
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
     measured = f"; {known}" if known else ""

@@ -105,14 +105,16 @@ def _noise(diagnosis: Diagnosis) -> str:
     assert fit is not None
     sigma, white = fit.sigmas, fit.white
     text = (
-        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s of a velocity over "
-        f"its interval, {sigma.pixel:.2f} px of a pixel row."
+        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s for each axis of a "
+        f"velocity over its interval, "
     )
     if fit.inflation.pixel > 1.0:
         text += (
-            f" Pixel sigma: {white.pixel:.2f} px from frame to frame, inflated by {fit.inflation.pixel:.1f} for "
-            "time-correlated errors."
+            f"{white.pixel:.2f} px for a pixel coordinate from frame to frame. The estimators use {sigma.pixel:.2f} "
+            f"px, {fit.inflation.pixel:.1f} times as much, because the errors of a track are correlated in time."
         )
+    else:
+        text += f"{sigma.pixel:.2f} px for a pixel coordinate."
     if fit.inflation.velocity > 1.0:
         text += f" Velocity sigma: inflated by {fit.inflation.velocity:.1f} for time-correlated errors."
     return text

@@ -21,7 +21,8 @@ from .table import Cell, Column, Row, Table, best
 OVERCONFIDENT = "overconfident"
 """in place of a reference NEES, for which P - P_ref has to be positive definite"""
 NOT_POSITIVE_DEFINITE = (
-    "in most frames P − P_ref is not positive definite: the claimed covariance is below the reference's"
+    "in most frames P − P_ref is not positive definite: the covariance P that it claims is below P_ref, that of the "
+    "reference"
 )
 NOT_DEFINED = "P − P_ref is not positive definite in the others"
 Estimators = Mapping[str, Mapping[str, Any]]
@@ -36,9 +37,9 @@ def main_table(run: Run, estimators: Estimators) -> Table:
     if not table.columns:
         return table
     caption = (
-        f"Best of a column in bold; equal printed values are all bold.{_unranked(run)} Reprojection errors "
-        "are over all observations of the landmarks that an estimator has; common observations are those that every "
-        "estimator with landmark updates used."
+        f"Best of a column in bold; equal printed values are all bold.{_unranked(run)} Reprojection errors are "
+        "over all observations of an estimator's landmarks, also those that the mask excludes as copied or wrong. "
+        "Common observations are those that every estimator with landmark updates used."
     )
     return replace(table, caption=caption)
 
@@ -111,7 +112,7 @@ def _table(run: Run, estimators: Estimators, metrics: Iterable[Metric]) -> Table
         mark = notes.setdefault(why, chr(ord("a") + len(notes) % 26)) if why else ""
         if overconfident:
             return Cell(OVERCONFIDENT, note=mark)
-        if not isfinite(value):
+        if not isfinite(value) or _is_of_few_frames(estimators[name], m):
             return Cell(DASH, note=mark)
         text, is_rounding = m.text(value, resolutions[m]), m.is_rounding(value, resolutions[m])
         return Cell(text, first is not None and text == m.text(first, resolutions[m]) and not is_rounding, mark)
@@ -163,6 +164,14 @@ def _stands_for(run: Run, name: str, metric: Metric) -> bool:
         return False
     difference = run.results[name].evidence.difference
     return difference is not None and difference.is_overconfident
+
+
+def _is_of_few_frames(estimator: Mapping[str, Any], metric: Metric) -> bool:
+    """Whether a reference NEES is defined in less than half of the frames, and does not describe the estimator."""
+    if metric.path not in (("nees_reference", "median"), ("nees_reference", "mean")):
+        return False
+    frames, left_out = (int(at(estimator, "nees_reference", key) or 0) for key in ("frames", "left_out"))
+    return frames < left_out
 
 
 def _rivals(run: Run, metric: Metric, answered: list[str]) -> set[str]:

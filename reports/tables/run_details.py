@@ -25,7 +25,7 @@ REASONS: Mapping[str, str] = {
     "feature not chosen": "not among the features asked for",
     "disparity": "disparity too small to determine the depth",
     "rows": "rows in the left and right image disagree",
-    "prediction": "contradicts its own track under the motion",
+    "prediction": "contradicts the motion of its track (wrong match)",
     "short": "rest of the track too short for a check",
     "geometry": "point not determined, or behind a camera",
     "moving": "point moved",
@@ -34,13 +34,30 @@ REASONS: Mapping[str, str] = {
 """why the mask excludes an observation"""
 
 
+REPAIR = ("without repair", "with repair and mask")
+"""headings of `before` and `after` of findings"""
+CONDITIONS: Mapping[str, str] = {
+    **dict.fromkeys(
+        ("angular_axes", "linear_axes"),
+        "Axes: without any repair of the velocities, and with that of their axes alone.",
+    ),
+    **dict.fromkeys(
+        ("gyro_bias", "time_offset"),
+        "Bias and time offset: without and with this repair, the others of the angular velocity applied.",
+    ),
+}
+"""which other repairs are applied where a finding is measured, by its code"""
+
+
 def trust_table(criteria: Iterable[Criterion]) -> Table:
     """Criteria of the trust in the reference: measured value, limits and verdict."""
     rows = []
     for c in criteria:
         text, sign = per_cent if c.unit == SHARE else number, "≥" if c.at_least else "≤"
         name = f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name
-        limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
+        limits = (
+            f"{'=' if limit == 0.0 and not c.at_least else sign} {text(limit)}" for limit in (c.doubtful, c.untrusted)
+        )
         rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
     columns = (*numbers("measured", "trusted", "doubtful"), *words("verdict", "remark"))
     return Table(columns, tuple(rows), name="criterion")
@@ -52,7 +69,8 @@ def findings_table(findings: Iterable[Finding]) -> Table:
     for f in findings:
         status = "ok" if f.certainty == "counted" else f.certainty
         rows.append(Row.of(f.sentence, f.measure, quantity(f.before, f.unit), quantity(f.after, f.unit), status=status))
-    return Table((*words("measure"), *numbers("before repair", "after")), tuple(rows), name="finding")
+    caption = " ".join(dict.fromkeys(CONDITIONS[f.code] for f in findings if f.code in CONDITIONS))
+    return Table((*words("measure"), *numbers(*REPAIR)), tuple(rows), name="fault", caption=caption)
 
 
 def terminal_findings(findings: Iterable[Finding]) -> Table:
@@ -62,8 +80,8 @@ def terminal_findings(findings: Iterable[Finding]) -> Table:
         certainty = "" if f.certainty == "counted" else f" ({f.certainty})"
         sizes = (quantity(x, f.unit).replace(NO_BREAK, " ") for x in (f.before, f.after))
         rows.append(Row.of(f.code, f"{f.sentence}{certainty}", f.measure, *sizes))
-    columns = (*words("description", "measure"), *numbers("before repair", "after"))
-    return Table(columns, tuple(rows), name="finding")
+    columns = (*words("description", "measure"), *numbers(*REPAIR))
+    return Table(columns, tuple(rows), name="fault")
 
 
 def _residuals(run: Run) -> Table:
@@ -71,7 +89,12 @@ def _residuals(run: Run) -> Table:
     tables = {r.name: r.evidence.patterns for r in run.answered}
     columns = {"observations": "n", "median, px": "median", "mean, px": "mean", "95th percentile, px": "p95"}
     title = "Reprojection errors by distance, track age, place in the image and camera"
-    return _frames(title, tables, {"by": "by", "class": "of"}, columns | {"median u, px": "u", "median v, px": "v"})
+    return _frames(
+        title,
+        tables,
+        {"grouped by": "by", "class": "of"},
+        columns | {"signed median u, px": "u", "signed median v, px": "v"},
+    )
 
 
 def _map(run: Run) -> Table:
@@ -88,12 +111,15 @@ def _moved(run: Run) -> Table:
     table = run.results[run.reference].evidence.moved
     moved = table[table["moved"]].sort_values("gain", ascending=False)
     more = f", the clearest {MAX_DYNAMIC}" if len(moved) > MAX_DYNAMIC else ""
-    title = f"{counted(len(moved), 'track')} whose points moved or slid, as {run.reference} sees them{more}"
+    title = (
+        f"{counted(len(moved), 'used track')} better explained by a point of constant velocity than by a fixed one, by "
+        f"the residuals of {run.reference}{more}"
+    )
     rows = tuple(
         Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
         for row in moved.head(MAX_DYNAMIC).to_dict("records")
     )
-    columns = numbers("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
+    columns = numbers("observations", "speed, m/s", "chi-square", "drop in chi-square with a constant velocity")
     return Table(columns, rows, name="landmark", title=title)
 
 
@@ -108,7 +134,8 @@ def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     )
     columns = tuple(Column(title, row, "px") for row in seen or PIXEL_ROWS for title in ("median", "1.4826 MAD"))
     caption = (
-        "Measured minus predicted, over all observations of the landmarks that an estimator has. 1.4826 times the "
+        "Measured minus predicted, over all observations of an estimator's landmarks, also those that the mask "
+        "excludes. 1.4826 times the "
         "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
     )
     return Table(columns, rows, caption=caption)
@@ -150,8 +177,8 @@ def _where(events: list[Event]) -> tuple[str, str, str]:
     frames = sorted({event.frame for event in events})
     landmarks = sorted({event.landmark for event in events if event.landmark is not None})
     span = f"{frames[0]}" if len(frames) == 1 else f"{frames[0]}–{frames[-1]}"
-    few = ", ".join(map(str, landmarks)) if len(landmarks) <= 3 else f"{number(len(landmarks))} of them"
-    return number(len(events)), span, few
+    few = f"no. {', '.join(map(str, landmarks))}" if landmarks else ""
+    return number(len(events)), span, few if len(landmarks) <= 3 else counted(len(landmarks), "landmark")
 
 
 def _frames(

@@ -112,7 +112,7 @@ def test_few_observations_are_not_trusted() -> None:
     used[rare[::5]] = True
     verdict = compare.trust(clean(), replace(reference(), used=used))
     assert verdict.verdict is Verdict.UNTRUSTED
-    assert any("of the recorded ones that are not too far" in reason for reason in verdict.reasons[:2])
+    assert any("of the recorded ones except far points (disparity of 0 to 1 px)" in r for r in verdict.reasons[:2])
     assert any("fewer than 6" in reason for reason in verdict.reasons[:2])
 
 
@@ -140,7 +140,7 @@ def test_the_reasons_are_sorted_by_how_bad_they_are_and_the_first_one_decides() 
     limits = TrustLimits(weak_frames=(-1.0, 2.0), weak_below=1000, used_share=(2.0, 2.0))
     verdict = compare.trust(clean(), reference(), limits=limits)
     assert verdict.verdict is Verdict.UNTRUSTED
-    assert "of the recorded ones that are not too far" in verdict.reasons[0]
+    assert "of the recorded ones except far points (disparity of 0 to 1 px)" in verdict.reasons[0]
     assert "fewer than 1000" in verdict.reasons[1]
 
 
@@ -164,7 +164,7 @@ def test_no_estimator_uses_more_than_was_offered(preset: Callable[[data.Sequence
     problem = preset(with_pixels(far, pixel))
     for estimate in (smoother.isam2(problem), ekf.ekf(problem)):
         assert not (estimate.used & ~expected_observations(problem)).any()
-        share = next(r for r in compare.trust(problem, estimate).reasons if "that are not too far" in r)
+        share = next(r for r in compare.trust(problem, estimate).reasons if "except far points" in r)
         assert all(float(part.split()[-1]) <= 100.0 for part in share.split("%")[:-1])
 
 
@@ -273,13 +273,13 @@ def test_intervals_without_common_landmarks_are_reported() -> None:
     answer = true_answer(problem)
     frame = problem.sequence.observations.frame
     said = (
-        "have no landmark observed on both sides; there only the velocities constrain the motion, and a jump would go "
-        "unnoticed"
+        "have no used landmark in common; there only the velocities constrain the motion, and a jump would go unnoticed"
     )
     for seen, untied in ((3, 7), (8, 2), (10, 0)):
         reasons = compare.trust(problem, replace(answer, used=answer.used & (frame < seen))).reasons
-        assert (f"{untied} of 9 intervals ({100 * untied / 9:.3g} %) {said}" in reasons) == (untied > 0)
-        assert any("no landmark observed" in reason for reason in reasons) == (untied > 0)
+        pairs = f"{untied} of 9 pairs of consecutive frames ({100 * untied / 9:.3g} %)"
+        assert (f"{pairs} {said}" in reasons) == (untied > 0)
+        assert any("no used landmark in common" in reason for reason in reasons) == (untied > 0)
     limits = TrustLimits(*[(np.inf, np.inf)] * 2, (0.0, 0.0), (1.0, 1.0), given_up_frames=(1.0, 1.0))
     verdicts = [
         compare.trust(problem, replace(answer, used=answer.used & (frame < seen)), limits=limits).verdict
@@ -298,8 +298,8 @@ def test_the_reasons_of_trust_state_their_figures() -> None:
     assert set(compare.trust(problem, reference()).reasons) == {
         f"normalized pixel residual RMS {pixel:.2g} (limit 1.6; 1 is expected)",
         f"normalized motion residual RMS {motion:.2g} (limit 1.4; up to 1 is expected)",
-        f"it used {n:,} observations: {of_recorded} of the recorded ones that are not too far, {of_unmasked} of those "
-        "that the mask leaves",
+        f"it used {n:,} observations: {of_recorded} of the recorded ones except far points (disparity of 0 to 1 px), "
+        f"{of_unmasked} of the unmasked ones",
         "the recording was not diagnosed: its noise is assumed",
         "not compared with a batch solution",
     }

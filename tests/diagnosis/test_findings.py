@@ -95,7 +95,8 @@ def test_a_car_shows_only_which_axis_is_forward() -> None:
     assert d.linear.name.split(",")[0] == "-y"
     assert d.linear.seen == (True, False, False)
     sentences = " ".join(not_identifiable(d))
-    assert "its -y is along x of imu_T_cam, not which of its components are along y and z" in sentences
+    assert "The y and z axes of the linear velocity" in sentences
+    assert "its -y is along x of the IMU axes of imu_T_cam, not the order or the signs of the other" in sentences
     assert codes(d) == ["angular_axes", "linear_axes"]
 
 

@@ -11,6 +11,7 @@ from fgbaseline.compare import Verdict
 from fgbaseline.reports import comparison
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.phrases.run_accuracy import ate_sentences
 from fgbaseline.reports.results.reader import read_folder
@@ -94,6 +95,30 @@ def test_a_reference_nees_over_part_of_the_frames_says_so_and_causes_have_a_note
     assert len(notes_of_ekf) == 1
 
 
+@pytest.mark.parametrize(("defined", "is_shown"), [(20, False), (40, True)])
+def test_a_reference_nees_of_less_than_half_of_the_frames_is_no_value_of_the_table(
+    defined: int, is_shown: bool
+) -> None:
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    nearly = claiming(0.0999, T)  # below the reference's, by less than makes it overconfident
+    nearly[:defined] = claiming(0.2, defined)
+    run = run_of(
+        problem,
+        answer(problem, "ekf", (0.01, 0.0, 0.0), covariance=nearly),
+        answer(problem, "isam2", covariance=claiming(0.1, T)),
+    )
+    estimators = summarize(run).model_dump(mode="json")["estimators"]
+    assert estimators["ekf"]["nees_reference"]["median"] is not None
+    for table in (main_table(run, estimators), evidence_table(run, estimators)):
+        column = next(i for i, c in enumerate(table.columns) if "reference NEES" in f"{c.group} {c.title}")
+        cell = next(row.cells[column] for row in table.rows if row.name == "ekf")
+        assert (cell.text != "–") == is_shown
+        assert dict(table.notes)[cell.note].startswith(f"over {defined} of {T} frames")
+    hint = next(chart["hint"] for chart in page_data(run)["charts"] if chart["name"] == "nees-reference")
+    assert f"no value in {T - defined} frames of ekf, where P − P_ref is not positive definite" in hint
+
+
 def test_another_minimum_of_the_same_graph_is_not_called_overconfident() -> None:
     problem = plain_problem(scene())
     run = run_of(problem, answer(problem, "isam2"), answer(problem, "batch"))
@@ -104,13 +129,13 @@ def test_inflated_pixel_noise_is_stated_and_low_residuals_are_no_praise() -> Non
     problem = plain_problem(scene())
     inflated = run_of(replace(problem, pixel_inflation=5.5), answer(problem, "isam2"))
     pixel = next(c for c in inflated.trust.criteria if c.code == "pixel_scale")
-    assert pixel.remark == "the pixel sigma is inflated 5.5 times for time-correlated track errors"
+    assert pixel.remark == "the pixel sigma is inflated by 5.5 for time-correlated track errors"
     assert any(
-        "(limit 1.6; 0.18 is expected for white track errors, because the pixel sigma is inflated 5.5 times" in reason
+        reason.endswith(f"(limit 1.6; {pixel.remark}; errors without correlation would give 0.18)")
         for reason in inflated.trust.reasons
     )
     rows = trust_table(inflated.trust.criteria).rows
-    assert "inflated 5.5 times" in rows[0].cells[-1].text
+    assert "inflated by 5.5" in rows[0].cells[-1].text
     assert summarize(inflated).problem.pixel_inflation == 5.5
     plain = run_of(problem, answer(problem, "isam2"))
     assert not any("inflated" in reason for reason in plain.trust.reasons)
@@ -186,11 +211,13 @@ def test_an_inflation_of_a_few_percent_is_not_mentioned() -> None:
 
 
 @pytest.mark.parametrize("n", [2, 6])
-def test_rough_intervals_of_many_estimators_are_counted_and_not_listed(n: int) -> None:
+def test_uncertain_intervals_of_many_estimators_are_counted_and_not_listed(n: int) -> None:
     problem = plain_problem(scene())
     filters = [answer(problem, f"filter-{i}", (3.0 * i, 0.0, 0.0)) for i in range(n + 1)]
     run = run_of(problem, answer(problem, "isam2"), *filters)
-    (sentence,) = (s for s in verdict(run) if "rough" in s and s.startswith("Larger divergence"))
+    (sentence,) = (s for s in verdict(run) if "uncertain" in s and s.startswith("Larger divergence"))
     assert sentence.count("[") == (n if n == 2 else 0)
-    assert (f"The intervals of {n} of these differences are rough" in sentence) == (n > 2)
+    assert (f"The 95 % intervals of {n} of these differences are uncertain" in sentence) == (n > 2)
+    assert all(f"filter-{i} is " in sentence for i in range(1, n + 1)) == (n == 2)
+    assert sentence.count("] above filter-0, from ") == (n if n == 2 else 0)
     assert "block" in sentence

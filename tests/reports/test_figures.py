@@ -308,7 +308,7 @@ def test_each_observation_of_the_problem_or_the_mask_is_in_one_band() -> None:
     counts = observations_by_frame(replace(problem, excluded=excluded))
     assert list(counts) == list(BANDS)
     np.testing.assert_array_equal(sum(counts.values()), np.bincount(problem.sequence.observations.frame))
-    assert counts["copied from the frame before"].sum() == (excluded == Excluded.COPIED).sum() > 0
+    assert counts["copied from the previous frame"].sum() == (excluded == Excluded.COPIED).sum() > 0
 
 
 def test_labels_of_a_column_of_panels_are_aligned() -> None:

@@ -241,12 +241,12 @@ def test_masked_observations_are_counted_and_events_of_one_kind_and_cause_are_on
     twin = answer(problem, "isam2-online", events=events)
     run = run_of(problem, answer(problem, "isam2", events=events, by_products={"isam2-online": twin}), twin)
     html = rendered(run)
-    assert re.search(r"contradicts its own track[^/]*</th><td>31</td>", html)
+    assert re.search(r"contradicts the motion of its track[^/]*</th><td>31</td>", html)
     assert "isam2, isam2-online: 250 × landmark dropped" in html
     assert html.count("it came to lie behind") == 1
     (table,) = events_tables(run)
     assert [[row.name, *(cell.text for cell in row.cells)] for row in table.rows] == [
-        ["landmark dropped", "250", "0–59", "250 of them", "it came to lie behind"]
+        ["landmark dropped", "250", "0–59", "250 landmarks", "it came to lie behind"]
     ]
     assert "tables/events.csv" in table.caption
     _write_tables(run, tmp_path)
@@ -282,7 +282,7 @@ def test_the_moment_of_most_wrong_matches_is_the_one_of_the_sentence() -> None:
     run = run_of(replace(problem, excluded=excluded), answer(problem, "isam2"))
     (bookmark,) = page_data(run)["bookmarks"]
     assert bookmark == {"frame": 35, "text": "most wrong or moving points"}
-    assert any("from 3 s to 4 s." in sentence for sentence in verdict(run))
+    assert any("from 3 s to 4 s)." in sentence for sentence in verdict(run))
 
 
 @pytest.mark.parametrize(

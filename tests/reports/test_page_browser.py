@@ -129,7 +129,7 @@ def test_a_frame_shows_the_outcome_of_each_observation_and_its_true_reprojection
     table = table[(table["frame"] == 7) & table["used"]]
     shown = float(opened.text(".frame-summary").partition("median error ")[2].partition("\u00a0")[0])
     assert math.isclose(shown, float(table["error"].median()), rel_tol=0.01)
-    assert "3 × contradicts its own track" in opened.text(".frame-summary")
+    assert "3 × contradicts the motion of its track" in opened.text(".frame-summary")
     used = opened.page.inner_html('[data-side="left"]')
     opened.page.select_option("#frame-view select", "2")
     assert opened.page.inner_html('[data-side="left"]') != used

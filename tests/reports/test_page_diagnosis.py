@@ -1,5 +1,6 @@
 """What the page says of the recording, and what stands above its table."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -26,15 +27,20 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
         Finding("bursts", "Bursts.", 0.412, 0.002, "share of the matches", "counted"),
     )
     problem = replace(run.problem, diagnosed=True, findings=found, repairs=("user-specified: velocity_scale = 1.5",))
-    html = rendered(replace(run, problem=problem))
+    labeled = rendered(replace(run, problem=problem))
+    assert 'data-label="with repair and mask"' in labeled
+    html = re.sub(r' data-label="[^"]*"', "", labeled)
     assert "The recording: 3 faults detected" in html
     assert "It &lt;drifts&gt;." in html
-    assert ">median error of the angular velocity</td>" in html
+    assert ">median difference of the angular velocity from visual odometry</td>" in html
     assert "<td>0.0271\N{NO-BREAK SPACE}rad/s</td><td>0.0201\N{NO-BREAK SPACE}rad/s</td>" in html
     assert ">observations</td><td>6,562</td><td>0</td>" in html
     assert "<td>41.2 %</td><td>0.2 %</td>" in html
     assert "standard error 0.001 rad/s" in html
     assert "counted" not in html
+    assert "Bias and time offset: without and with this repair, the others of the angular velocity applied." in html
+    assert "Axes: without any repair" not in html
+    assert ">without repair</th>" in html
     assert "<li>User-specified: velocity_scale = 1.5.</li>" in html
 
 

@@ -72,7 +72,7 @@ function fill() {
   for (const cell of table.querySelectorAll("td")) {
     const chart = charts[Number(cell.dataset.chart)];
     const line = chart.lines.get(cell.dataset.key);
-    cell.textContent = line ? figure(line[chosen.frame], chart.unit) : "";
+    cell.textContent = line ? figure(line[chosen.frame], chart.unit) : "–";
   }
 }
 if (table) {
