@@ -42,16 +42,16 @@ def write_run(run: Run, folder: Path, processes: int = 1, pictures: Pictures | N
 def write_numbers(run: Run, folder: Path) -> Summary:
     """Writes all files except figures and page; returns the summary."""
     summary = summarize(run)
+    sequence, truth = run.problem.sequence, run.problem.sequence.truth
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
         _nine_digits(_series(run, result)).to_csv(folder / "series" / f"{name}.csv")
         if result.answered:
-            write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
+            write_tum(folder / "trajectories" / f"{name}.tum", sequence.t, result.estimate.world_T_imu, sequence.up)
             _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
-    truth = run.problem.sequence.truth
     if truth is not None:
-        write_tum(folder / TRUTH, run.problem.sequence.t, truth.world_T_imu)
+        write_tum(folder / TRUTH, sequence.t, truth.world_T_imu, sequence.up if truth.up is None else truth.up)
     _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
     content = summary.content
