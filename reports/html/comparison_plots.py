@@ -15,6 +15,8 @@ from ..figures.panels import nees_bounds, nees_median
 from ..formatting import distance
 from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
 
+GROUP = "Position and rotation"
+"""title of the charts of errors and heights"""
 MOMENTS = 4000
 """largest number of positions of the slider"""
 REFERENCE_MOMENTS = 1000
@@ -98,21 +100,21 @@ Charts = Iterable[dict[str, Any] | None]
 def _differences(data: ComparisonData, t: FloatArray) -> Charts:
     of, how = data.reference, data.alignment
     wanted = {
-        "position": ("divergence", f"Distance from {of}, {how}", "m"),
-        "rotation_deg": ("rotation", f"Rotation from {of}, {how}", "°"),
+        "position": ("divergence", f"Position error against {of}, {how}", "m"),
+        "rotation_deg": ("rotation", f"Rotation error against {of}, {how}", "°"),
         "along": ("along", f"Ahead of {of}", "m"),
         "across": ("across", f"To the left of {of}", "m"),
         "up": ("above", f"Above {of}", "m"),
-        "heading_deg": ("heading", f"Heading from {of}, to the left", "°"),
+        "heading_deg": ("heading", f"Heading error against {of}, to the left", "°"),
     }
     for column, (name, title, unit) in wanted.items():
         lines = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
-        yield chart("Differences", name, title, unit, numbered((data.reference, *data.names), lines))
+        yield chart(GROUP, name, title, unit, numbered((data.reference, *data.names), lines))
 
 
 def _heights(lines: Mapping[str, FloatArray]) -> Charts:
     heights = numbered(lines, {name: path[:, 2] for name, path in lines.items()})
-    yield chart("Differences", "height", "Height above the reference's start", "m", heights)
+    yield chart(GROUP, "height", "Height above the reference's start", "m", heights)
 
 
 def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) -> Charts:

@@ -42,7 +42,7 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
         name = f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name
         limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
         rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
-    columns = (*figures("measured", "trusted", "doubtful"), *words("verdict", "remark"))
+    columns = (*figures("measured", "trusted if", "doubtful if"), *words("verdict", "remark"))
     return Table(columns, tuple(rows), name="criterion")
 
 
