@@ -4,7 +4,7 @@ Ground truth is never used.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.wording import distance, per_cent, plural
 from fgbaseline.geometry import disparity
+from fgbaseline.geometry.monocular import UNIT_LENGTH
 
 from .residuals.cost import cost
 from .residuals.noise_scale import motion_scale, pixel_scale
@@ -259,13 +260,17 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
     rmse = rms_norm(apart)
     baselines = rmse / problem.sequence.camera.unit_length
-    criteria = (_criterion(limit, "batch_cost", excess), _criterion(limit, "batch_position", baselines))
+    position = _criterion(limit, "batch_position", baselines)
+    lengths = f", {baselines:.2g} baselines"
+    if problem.sequence.monocular:  # no baseline, and its stand-in means nothing to a reader
+        position, lengths = replace(position, unit=f"{UNIT_LENGTH:g} m"), ""
+    criteria = (_criterion(limit, "batch_cost", excess), position)
     verdict = max(criterion.verdict for criterion in criteria)
     start = ", started at isam2's solution," if EventKind.STARTED_AT_ISAM2 in kinds else ""
     agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
     side = "above" if excess > 0.0 else "below"
     cost_gap = f"{per_cent(abs(excess))} {side} the batch's" if abs(excess) >= RESOLUTION else "the same"
-    path_gap = f"{distance(rmse)} (RMSE, {baselines:.2g} baselines) away" if rmse >= RESOLUTION else "the same"
+    path_gap = f"{distance(rmse)} (RMSE{lengths}) away" if rmse >= RESOLUTION else "the same"
     text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the trajectory {path_gap}"
     return _BesideBatch(verdict, text, criteria)
 

@@ -35,11 +35,13 @@ MEASURES = {
     "rad/s": "median error of the angular velocity",
     "m/s": "median error of the linear velocity",
     "m/s^2": "acceleration",
+    "rad/s/sqrt(Hz)": "noise density of the gyroscope",
+    "m/s^2/sqrt(Hz)": "noise density of the accelerometer",
     "°": "misalignment",
     "px": "disparity offset",
     "s": "time offset",
 }
-"""quantity of a finding by its unit; other units name it themselves, such as `observations`"""
+"""quantity of a finding by its physical unit; other units name it themselves, such as `observations`"""
 
 
 @dataclass(frozen=True, slots=True)

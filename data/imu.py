@@ -69,8 +69,10 @@ class ImuSamples(Displayed):
         M = len(self.t)
         if M < 2:
             raise InputError(f"imu_time_stamps: raw inertial data needs at least 2 samples, this one has {M}")
-        for name in ("angular_velocity", "specific_force"):
-            array = getattr(self, name)
+        for name, array in (
+            ("angular_velocity", self.angular_velocity),
+            ("linear_acceleration", self.specific_force),
+        ):
             if array.shape != (M, 3):
                 raise InputError(f"imu_{name}: expected 3 values for each of the {M} samples, got shape {array.shape}")
             finite = measurable(array).all(axis=1)

@@ -37,7 +37,7 @@ class Calibration:
     """intervals after its stamp from which a velocity holds (`motion.zero_order_hold`); 0: that of frame k moves frame
     k to k + 1"""
     mask: MaskSettings = field(default_factory=MaskSettings)
-    """not for one camera, whose observations cannot be predicted from each other"""
+    """not for one camera, whose tracks are masked by the diagnosis only"""
     kernel: HuberKernel | None = field(default_factory=HuberKernel)
 
 
@@ -114,7 +114,7 @@ def _inertial(
     if sequence.monocular:
         if settings is not None:
             if settings.mask != MaskSettings():
-                raise InputError("settings: the mask predicts by stereo, and the recording has one camera")
+                raise InputError("settings: a mask of one camera needs the diagnosis; leave the mask out")
             return as_recorded_monocular(sequence, features, settings.noise.pixel, settings.kernel)
         return monocular_problem(diagnosis or diagnose_inertial(sequence), features)
     if settings is not None:

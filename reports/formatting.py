@@ -5,6 +5,7 @@ from collections.abc import Hashable, Iterable, Mapping
 from math import isfinite
 from typing import TypeVar
 
+from fgbaseline.data.finding import MEASURES
 from fgbaseline.data.wording import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
 
 __all__ = ["DASH", "INFINITY", "MINUS", "distance", "listed", "number", "per_cent"]
@@ -84,7 +85,7 @@ def quantity(value: float, unit: str) -> str:
     """A finding's value: a share in percent, a physical unit beside the number, and none beside a count."""
     if unit.startswith("share"):
         return per_cent(value)
-    if unit in ("m/s", "rad/s", "°", "px", "s"):
+    if unit in MEASURES:
         return f"{number(value)}{'' if unit == '°' else NO_BREAK}{unit}"
     return number(int(value) if float(value).is_integer() else value)
 

@@ -28,7 +28,9 @@ def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
     is the ninth of the left image within the bounding box of the observations, and `side` compares the error of the
     left camera, the norm of uL and vL, with that of the right one.
     """
-    u, v = 0.5 * (table["uL"] + table["uR"]), 0.5 * (table["vL"] + table["vR"])
+    u, v = table["uL"], table["vL"]
+    if not sequence.monocular:
+        u, v = 0.5 * (u + table["uR"]), 0.5 * (v + table["vR"])
     both = pd.DataFrame({"error": table["error"], "u": u, "v": v})
     age = _age(sequence)[table["observation"].to_numpy()]
     parts = [
@@ -37,6 +39,8 @@ def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
         _classified(both, REGION, _region(sequence, table), [f"{row} {column}" for row in ROWS for column in COLUMNS]),
     ]
     for side, name in (("L", "left camera"), ("R", "right camera")):
+        if side == "R" and sequence.monocular:
+            continue
         u, v = table[f"u{side}"], table[f"v{side}"]
         one = pd.DataFrame({"error": np.hypot(u, v), "u": u, "v": v})
         parts.append(_classified(one, SIDE, np.zeros(len(one), dtype=np.int64), [name]))

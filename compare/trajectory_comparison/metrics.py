@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -38,8 +38,22 @@ FEWEST = 2
 """least number of pairs of poses"""
 
 
-def compare_entries(entries: Entries, settings: Settings) -> Comparison:
-    """Figures of all estimates. Raises InputError where an estimate has too few poses in common with the reference."""
+class PairedEntries(NamedTuple):
+    """Entries with their pairs of poses: what can be wrong with inputs has been found."""
+
+    entries: Entries
+    settings: Settings
+    """with the alignment and the deltas that are taken by default"""
+    up: FloatArray
+    """(3,)"""
+    up_from: str
+    """the source of `up`"""
+    matched: dict[str, tuple[MatchedTrajectories, TimeOffset | None]]
+    """by estimate: see `matched_poses`"""
+
+
+def pair_entries(entries: Entries, settings: Settings) -> PairedEntries:
+    """Pairs of poses of all estimates. Raises InputError where one has too few in common with the reference."""
     everything = [entries.reference, *entries.estimates]
     settings = replace(
         settings,
@@ -49,8 +63,15 @@ def compare_entries(entries: Entries, settings: Settings) -> Comparison:
     up, up_from = _up(entries, settings)
     if settings.align == Align.YAW:
         _require_one_up(entries, up)
+    matched = {e.name: matched_poses(entries.reference, e, up, settings) for e in entries.estimates}
+    return PairedEntries(entries, settings, up, up_from, matched)
+
+
+def compare_paired(paired: PairedEntries) -> Comparison:
+    """Figures of all estimates."""
+    entries, settings, up, up_from, _ = paired
     paths, pixels, held_out = _by_observations(entries, settings)
-    results = {e.name: _compared(entries, e, up, settings, paths, pixels.get(e.name)) for e in entries.estimates}
+    results = {e.name: _compared(paired, e, paths, pixels.get(e.name)) for e in entries.estimates}
     return Comparison(
         reference=entries.reference,
         reference_pixels=pixels.get(entries.reference.name),
@@ -145,17 +166,11 @@ def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
     return (Delta(1.0, "s") if stamped else Delta(1.0, "frames"), Delta(10.0, "m"))
 
 
-def _compared(
-    entries: Entries,
-    entry: Entry,
-    up: FloatArray,
-    settings: Settings,
-    paths: Mapping[str, FloatArray],
-    pixels: "Pixels | None",
-) -> Result:
+def _compared(paired: PairedEntries, entry: Entry, paths: Mapping[str, FloatArray], pixels: "Pixels | None") -> Result:
+    entries, settings, up, _, _ = paired
     reference, seed = entries.reference, settings.seed
     notes = {} if pixels is None else dict(pixels.notes)
-    matched, offset = matched_poses(reference, entry, up, settings)
+    matched, offset = paired.matched[entry.name]
     absolute, divergence = dict(absolute_error_columns(matched)), dict(divergence_columns(matched, up))
     bare = [path.name for path in (reference.trajectory, entry.trajectory) if not path.oriented]
     if bare:

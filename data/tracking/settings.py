@@ -28,7 +28,7 @@ class TrackerSettings(BaseModel):
     pyramid_levels: Annotated[int, Field(ge=0, le=8)] = 4
     forward_backward: Pixels = 1.0
     """px; a point tracked forward and back has to return within this distance"""
-    row_gate: Pixels = 0.8
+    row_gate: Pixels = 0.6
     """px; largest |vL - vR| of a match in a rectified pair"""
     min_disparity: Pixels = 0.5
     """px"""

@@ -38,7 +38,7 @@ def monocular_problem(found: InertialDiagnosis, features: int | None) -> Problem
     if start is None or tracks is None:
         raise InputError(f"{sequence.source or sequence.name}: {found.cannot_tell or 'no start is found'}")
     remarks = (
-        f"pixel noise {'found in the recording' if found.pixel_found else 'assumed'}: {found.pixel:.2f} px",
+        f"pixel noise {'estimated from the recording' if found.pixel_found else 'assumed'}: {found.pixel:.2f} px",
         *imu_remarks(sequence),
         f"scale: {start.remark}",
     )

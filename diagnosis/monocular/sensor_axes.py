@@ -29,8 +29,8 @@ WORST = 50.0
 """px, of a window without a solution"""
 SMALLEST = 0.3
 """px, below which a misfit says nothing"""
-LEAD = 2.0
-"""ratio of misfits by which another convention must lead"""
+LEAD, FITTING = 2.0, 2.0
+"""ratio of misfits by which another convention must lead, and px that it must not exceed"""
 MIN_KEYFRAMES = 5
 
 
@@ -45,12 +45,14 @@ def monocular_axes(sequence: Sequence, seen: Odometry) -> SensorAxes:
     others = [SensorAxes(accelerometer=name, sign=sign) for name in AXIS_CONVENTIONS for sign in (1.0, -1.0)]
     windows = _windows(turned)
     recorded = [_misfit(turned, window) for window in windows]
-    informative = [i for i, value in enumerate(recorded) if value > LEAD * SMALLEST]
+    informative = [i for i, value in enumerate(recorded) if value > FITTING]
     for candidates in (usual, others):
         found = dict.fromkeys(range(len(candidates)), 0.0)
         for w in informative:
             values = {i: _misfit(in_imu_axes(turned, candidates[i]), windows[w]) for i in found}
-            found = {i: found[i] + np.log(value) for i, value in values.items() if value * LEAD < recorded[w]}
+            found = {
+                i: found[i] + np.log(value) for i, value in values.items() if value < min(FITTING, recorded[w] / LEAD)
+            }
         if found and informative:
             best = min(found, key=lambda i: found[i])
             misfits = (

@@ -1,6 +1,7 @@
-"""Mask of the tracks of one camera: what leaves the epipolar planes of the motion that its frame's others show.
+"""Mask of the tracks of one camera: what leaves the epipolar lines of the motion that its frame's others show.
 
-A wrong match that stays in its epipolar plane, and an object that moves along it, pass: kernel and gates are for them.
+Along its line a track may not pass infinity, nor come far nearer than its frame's points. A wrong match that stays
+within, and an object that moves within, pass: kernel and gates are for them.
 """
 
 from dataclasses import replace
@@ -12,13 +13,17 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
-from ..odometry.monocular_odometry import motions_of_links, track_links
+from ..odometry.epipolar_motion import beyond_scene, epipolar_motions
+from ..odometry.monocular_odometry import ray_links, track_links
 from ..repairs.repaired_sequence import RepairedTracks, renumbered_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, prediction_gate, split_tracks
 from ..tracks.track_segments import consecutive
 
 STEPS = (1, 2, 3)
 """frames between the observations that are compared, so that a track is followed over one that is wrong"""
+
+PIXEL = 0.5
+"""px, least noise of a row: errors of a tracker that are smaller from frame to frame are shared by its tracks"""
 
 
 class EpipolarConsistency:
@@ -27,13 +32,16 @@ class EpipolarConsistency:
     def __init__(self, sequence: Sequence) -> None:
         self._observations = sequence.observations
         self.error: dict[int, FloatArray] = {}
-        """step -> (n,) px, distance of the rays of an observation and of the one that many frames later from a common
-        plane; NaN where there is none, or no motion is known"""
+        """step -> (n,) px, by which an observation and the one that many frames later leave their epipolar line, or
+        the scene along it; NaN where there is none, or no motion is known"""
         for step in STEPS:
             before, after = track_links(sequence, step)
-            found = motions_of_links(sequence, before, after)
+            links = ray_links(sequence, before, after)
+            found = epipolar_motions(links, sequence.n_frames - 1)
+            across, along = np.sqrt(found.whitened) * found.sigma, beyond_scene(links, found.motion)
+            along = np.where(found.directed(PIXEL / sequence.camera.fu)[links.pair], along, 0.0)
             self.error[step] = np.full(len(sequence.observations), np.nan)
-            self.error[step][before] = np.sqrt(found.whitened) * found.sigma * sequence.camera.fu
+            self.error[step][before] = np.maximum(across, along) * sequence.camera.fu
         self.gate = prediction_gate(self.error[1][np.isfinite(self.error[1])])
         """px"""
 

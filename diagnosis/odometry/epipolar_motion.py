@@ -21,6 +21,9 @@ FREEDOM = 5
 TRUNCATION = 9.0
 """squared whitened residual of an outlier"""
 CHI_SQUARE_1_MEDIAN = 0.4549
+DIRECTED = 0.05
+"""rad, sigma of a direction of motion that is known"""
+NEARER = 4.0
 DAMPING = 1e-6
 """information of each step for rays of unit noise"""
 SMALLEST_SIGMA = 1e-6
@@ -56,11 +59,16 @@ class EpipolarMotions:
     """(p,)"""
     motion: Motion
     covariance: FloatArray
-    """(p, 3, 3) of the right perturbation of the rotation, rad^2; NaN where unknown"""
+    """(p, 5, 5) of the right perturbation of the rotation and of the direction's tangent, rad^2; NaN where unknown"""
     whitened: FloatArray
     """(n,) squared residual of each link at `sigma`; NaN where the motion is unknown"""
     sigma: float
     """rad, of a ray, from the bulk of the residuals"""
+
+    def directed(self, least: float) -> BoolArray:
+        """(p,) whether the direction is known to `DIRECTED`, with rays of `least` rad or more."""
+        variance = np.trace(self.covariance[:, 3:, 3:], axis1=1, axis2=2) * max(1.0, least / self.sigma) ** 2
+        return np.asarray(np.nan_to_num(variance, nan=np.inf) < DIRECTED**2, dtype=np.bool_)
 
 
 def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
@@ -70,6 +78,9 @@ def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
     chosen = np.flatnonzero(enough[links.pair])
     used = Links(links.pair[chosen], links.first[chosen], links.second[chosen])
     still = np.tile(np.eye(3), (n_pairs, 1, 1))
+    if len(chosen) == 0:
+        nothing = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(links.pair), np.nan)
+        return EpipolarMotions(enough, Motion(still, still[:, 2]), *nothing, 1.0)
     best = _refined(used, _along(used, _least_flow(used, still)))
     best = _better(used, best, _refined(used, _along(used, still)))
     for shift in (1, -1):
@@ -80,10 +91,28 @@ def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
     H, _ = _normal_equations(used, best, inlier.astype(np.float64), n_pairs)
     known = enough & (np.bincount(used.pair[inlier], minlength=n_pairs) >= MIN_LINKS)
     known[known] = np.linalg.eigvalsh(H[known])[:, 0] > DAMPING
-    covariance, whitened = np.full((n_pairs, 3, 3), np.nan), np.full(len(links.pair), np.nan)
-    covariance[known] = sigma**2 * np.linalg.inv(H[known])[:, :3, :3]
+    covariance, whitened = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(links.pair), np.nan)
+    covariance[known] = sigma**2 * np.linalg.inv(H[known])
     whitened[chosen] = np.where(known[used.pair], squared / sigma**2, np.nan)
     return EpipolarMotions(known, best, covariance, whitened, sigma)
+
+
+def beyond_scene(links: Links, motion: Motion) -> FloatArray:
+    """(n,) rad by which a track moves along its epipolar line otherwise than a point of the scene does.
+
+    A point lies no farther than infinity, and no nearer than the nearest tenth of its pair's points by a factor of
+    `NEARER`.
+    """
+    moved, t = _turned(links, motion.rotation), motion.direction[links.pair]
+    across = t - (t * links.first).sum(axis=1)[:, None] * links.first
+    sine = np.maximum(np.linalg.norm(across, axis=1), SMALLEST_SIGMA)
+    shift = -((moved - links.first) * across).sum(axis=1) / sine
+    order = np.lexsort((shift / sine, links.pair))
+    count = np.bincount(links.pair, minlength=len(motion.rotation))
+    place = np.cumsum(count) - count + (0.9 * (count - 1)).astype(np.int64)
+    near = (shift / sine)[order][np.clip(place, 0, max(len(order) - 1, 0))] if len(order) else np.zeros(len(count))
+    beyond = np.maximum(-shift, shift - NEARER * np.maximum(near, 0.0)[links.pair] * sine)
+    return np.asarray(np.maximum(beyond, 0.0), dtype=np.float64)
 
 
 def _least_flow(links: Links, rotation: FloatArray) -> FloatArray:
@@ -120,7 +149,7 @@ def _refined(links: Links, motion: Motion) -> Motion:
         residual, _ = _residuals(links, motion)
         squared = residual**2
         # Geman-McClure kernel, with its scale annealed down to that of the noise
-        bulk = float(np.median(squared)) / CHI_SQUARE_1_MEDIAN if len(squared) else 1.0
+        bulk = float(np.median(squared)) / CHI_SQUARE_1_MEDIAN
         weight = _robust(squared, bulk * max(9.0, 200.0 * 0.5**step))
         H, g = _normal_equations(links, motion, weight, len(motion.rotation))
         delta = np.linalg.solve(H + DAMPING * np.eye(FREEDOM), g[:, :, None])[:, :, 0]
@@ -133,7 +162,7 @@ def _refined(links: Links, motion: Motion) -> Motion:
 def _better(links: Links, best: Motion, other: Motion) -> Motion:
     """For each pair the motion with the smaller truncated cost."""
     squared = np.stack([_residuals(links, each)[0] ** 2 for each in (best, other)], axis=1)
-    bulk = max(float(np.median(squared[:, 0])) / CHI_SQUARE_1_MEDIAN, SMALLEST_SIGMA**2) if len(squared) else 1.0
+    bulk = max(float(np.median(squared[:, 0])) / CHI_SQUARE_1_MEDIAN, SMALLEST_SIGMA**2)
     cost = _sums(links, np.minimum(squared, TRUNCATION * bulk), len(best.rotation))
     better = cost[:, 1] < cost[:, 0]
     rotation = np.where(better[:, None, None], other.rotation, best.rotation)
@@ -187,8 +216,6 @@ def _robust(squared: FloatArray, scale: float) -> FloatArray:
 
 def _bulk_sigma(links: Links, squared: FloatArray, count: IntArray) -> float:
     """rad: the deviation at which the median squared residual is that of chi-square, the fitted freedom counted."""
-    if len(squared) == 0:
-        return 1.0
     freed = squared / (1.0 - FREEDOM / count[links.pair])
     return max(SMALLEST_SIGMA, float(np.sqrt(np.median(freed) / CHI_SQUARE_1_MEDIAN)))
 
@@ -196,7 +223,6 @@ def _bulk_sigma(links: Links, squared: FloatArray, count: IntArray) -> float:
 def _sums(links: Links, values: FloatArray, n_pairs: int) -> FloatArray:
     """Sums (p, ...) of values (n, ...) over the links of each pair; zero for pairs without any."""
     total = np.zeros((n_pairs, *values.shape[1:]))
-    if len(links.pair):
-        starts = np.flatnonzero(np.diff(links.pair, prepend=-1))
-        total[links.pair[starts]] = np.add.reduceat(values, starts, axis=0)
+    starts = np.flatnonzero(np.diff(links.pair, prepend=-1))
+    total[links.pair[starts]] = np.add.reduceat(values, starts, axis=0)
     return total

@@ -7,7 +7,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..tracks.track_segments import TrackSegments, repeated
-from .epipolar_motion import EpipolarMotions, Links, epipolar_motions
+from .epipolar_motion import Links, epipolar_motions
 from .stereo_odometry import Odometry
 
 
@@ -17,12 +17,12 @@ def monocular_odometry(sequence: Sequence) -> Odometry:
     o, n = sequence.observations, sequence.n_frames - 1
     copied = repeated(sequence)[o.frame[before]]
     before, after = before[~copied], after[~copied]
-    found = motions_of_links(sequence, before, after)
+    found = epipolar_motions(ray_links(sequence, before, after), n)
     motion, covariance = np.full((n, 4, 4), np.nan), np.full((n, 6, 6), np.nan)
     motion[found.known] = np.eye(4)
     motion[found.known, :3, 3] = np.nan
     motion[found.known, :3, :3] = found.motion.rotation[found.known]
-    covariance[:, 3:, 3:] = found.covariance
+    covariance[:, 3:, 3:] = found.covariance[:, :3, :3]
     links = TrackSegments(
         before=before,
         after=after,
@@ -54,7 +54,7 @@ def rays(sequence: Sequence) -> FloatArray:
     return np.asarray(ray / np.linalg.norm(ray, axis=1, keepdims=True))
 
 
-def motions_of_links(sequence: Sequence, before: IntArray, after: IntArray) -> EpipolarMotions:
-    """Motions from each frame to a later one by the links of observations (n,) and (n,), sorted by frame."""
+def ray_links(sequence: Sequence, before: IntArray, after: IntArray) -> Links:
+    """The links as rays."""
     ray = rays(sequence)
-    return epipolar_motions(Links(sequence.observations.frame[before], ray[before], ray[after]), sequence.n_frames - 1)
+    return Links(sequence.observations.frame[before], ray[before], ray[after])

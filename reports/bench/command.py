@@ -22,13 +22,7 @@ FAILED = 1
 
 
 def bench(
-    suite: Path,
-    out: Path | None,
-    *,
-    data: Path | None,
-    workers: int | None,
-    scheduler: str | None,
-    force: bool,
+    suite: Path, out: Path | None, *, data: Path | None, workers: int | None, scheduler: str | None, force: bool
 ) -> int:
     """Runs the remaining jobs, writes the report, prints its sentences; returns 1 where an estimator failed, else 0."""
     read = read_suite(suite)

@@ -150,15 +150,13 @@ def _inputs(suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None)
 def _check_repairs(suite: TomlFile[Suite], index: int, entry: Entry, sweep: list[dict[str, Any]]) -> None:
     if entry.repairs is None:
         return
+    place: Place = ("sequence", index, "repairs")
     for settings in sweep:
         if settings["preset"] == "documented" or settings["noise"] == "assumed":
             why = "the documented preset" if settings["preset"] == "documented" else 'noise = "assumed"'
-            raise suite.wrong(
-                ("sequence", index, "repairs"),
-                f"{why} uses no repairs; leave out one of the two",
-            )
+            raise suite.wrong(place, f"{why} uses no repairs; leave out one of the two")
         if isinstance(settings["noise"], Mapping):
-            raise suite.wrong(("sequence", index, "repairs"), "[sweep] sets the noise too; leave out one of the two")
+            raise suite.wrong(place, "[sweep] sets the noise too; leave out one of the two")
 
 
 def _recordings(
@@ -186,10 +184,10 @@ def _recordings(
         yield entry.name or path.stem, source, float(len(sequence.observations))
 
 
-def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> list[tuple[Path, tuple[str | int, ...]]]:
+def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> list[tuple[Path, Place]]:
     """The files with their key paths, sorted within a pattern, each once."""
     excluded = {path for pattern in several(entry.leave_out) for path in _matching(folder, pattern)}
-    found: dict[Path, tuple[str | int, ...]] = {}
+    found: dict[Path, Place] = {}
     for number, pattern in enumerate(entry.patterns):
         place = ("sequence", index, "files", number)
         paths = [path for path in _matching(folder, pattern) if path.is_file() and path not in excluded]

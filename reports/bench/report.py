@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,12 +11,12 @@ from matplotlib.figure import Figure
 from fgbaseline.geometry import FloatArray
 
 from ..figures.bench import draw
+from ..figures.palette import colors
 from ..figures.saving import encoded
-from ..figures.style import colors
 from ..formatting import counted
-from ..html.page import Grid, Note, Page, Section, folded, render_page
-from ..html.templates import picture
-from ..phrases.bench import FIGURES, NEES, TABLE, sentences
+from ..html.page import Grid, Note, Page, Section, folded, pictures
+from ..html.rendering import render_page
+from ..phrases.bench import FIGURES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
 from ..results.documents import INFINITE, at
@@ -76,10 +75,6 @@ def _csv(table: pd.DataFrame) -> bytes:
 
 def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
     """The page `report.html`, which opens offline; it links to the pages of the runs."""
-    pictures = [
-        replace(picture(key, figure), caption=NEES if key.startswith("nees_") else FIGURES.get(key, ""))
-        for key, figure in figures.items()
-    ]
     about = (
         f"{', '.join(results.estimators)} on {counted(len(results.cases), 'case')}, "
         f"{counted(len(results.planned), 'run')} that took {duration(results.seconds)} together."
@@ -94,7 +89,7 @@ def render(name: str, results: Results, figures: Mapping[str, Figure]) -> str:
             verdict=sentences(results),
             table=Section("table", "Every case", [Grid(table)], "Table"),
             sections=[
-                Section("figures", "Figures", pictures),
+                Section("figures", "Figures", list(pictures(figures, FIGURES).values())),
                 Section("rankings", "Rankings", [Note(RANKINGS), *rankings] if rankings else []),
                 Section("runs", "Every run", [folded(runs, MOST_OPEN)], "Runs"),
             ],

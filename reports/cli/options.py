@@ -151,8 +151,8 @@ _IMAGES = (
     click.option(
         "--cameras",
         type=click.Choice(["stereo", "left"]),
-        help="Images: a pair, or the left camera alone; run and export then need raw inertial samples, diagnose "
-        "needs a pair.  [default: what there is]",
+        help="Images: a pair, or the left camera alone; run, diagnose and export then need raw inertial "
+        "samples.  [default: what there is]",
     ),
     click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )

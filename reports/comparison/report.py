@@ -12,8 +12,7 @@ import numpy as np
 
 from fgbaseline.compare.columns import Columns
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
-from fgbaseline.compare.trajectory_comparison.entry import Entries
-from fgbaseline.compare.trajectory_comparison.metrics import compare_entries
+from fgbaseline.compare.trajectory_comparison.metrics import PairedEntries, compare_paired, pair_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.dataframes import as_cell_value
@@ -161,19 +160,17 @@ def report_of(
     are too many to send from there.
     """
     with np.errstate(all="ignore"):
-        entries = read_entries(reference, estimates, landmarks, settings)
-        if drawn and entries.problem is None:
-            comparison = _compared_meanwhile(entries, settings)
-        else:
-            comparison = compare_entries(entries, settings)
+        paired = pair_entries(read_entries(reference, estimates, landmarks, settings), settings)
+        in_a_fork = drawn and paired.entries.problem is None
+        comparison = _compared_meanwhile(paired) if in_a_fork else compare_paired(paired)
     return ComparisonReport(**{field.name: getattr(comparison, field.name) for field in fields(comparison)})
 
 
-def _compared_meanwhile(entries: Entries, settings: Settings) -> Comparison:
+def _compared_meanwhile(paired: PairedEntries) -> Comparison:
     """Comparison of all estimates, in a fork, while this process imports what draws them."""
     from fgbaseline.data.parallel import background_map, cores
 
-    with background_map(lambda _: compare_entries(entries, settings), 1, cores()) as compared:
+    with background_map(lambda _: compare_paired(paired), 1, cores()) as compared:
         import_module("fgbaseline.reports.figures.comparison")
         (comparison,) = compared()
     return comparison

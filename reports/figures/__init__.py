@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .diagnosis import draw_diagnosis
-    from .run import draw, draw_and_write, draw_for_paper, drawn_in_background
+    from .palette import colors
+    from .run import draw, draw_for_paper, drawn_in_background
     from .run_data import RunData, of_folder, of_run
     from .saving import EncodedFigure, encoded, save
-    from .style import colors
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
@@ -15,10 +15,10 @@ else:
         __name__,
         {
             "diagnosis": "draw_diagnosis",
-            "run": "draw draw_and_write draw_for_paper drawn_in_background",
+            "palette": "colors",
+            "run": "draw draw_for_paper drawn_in_background",
             "run_data": "RunData of_folder of_run",
             "saving": "EncodedFigure encoded save",
-            "style": "colors",
         },
     )
 
@@ -27,7 +27,6 @@ __all__ = [
     "RunData",
     "colors",
     "draw",
-    "draw_and_write",
     "draw_diagnosis",
     "draw_for_paper",
     "drawn_in_background",

@@ -1,5 +1,7 @@
 """Figures of a bench: accuracy by case and against time, cost by size, NEES over runs."""
 
+from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -7,16 +9,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from fgbaseline import compare
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
-from .layout import lay_out
-from .panels import DEGREES_OF_FREEDOM, intervals, nees_bounds
-from .style import BAND, GRAY, GREEN, SCREEN, in_style, safe_text, stacked_panels, swatch, title_and_legend
-from .style import colors as colors_of
+from .drawing import drawn
+from .legend import swatch, title_and_legend
+from .palette import BAND, GRAY, GREEN
+from .palette import colors as colors_of
+from .panels import DEGREES_OF_FREEDOM, chi_square_limits, intervals
+from .style import SCREEN, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results
@@ -36,19 +40,16 @@ def draw(results: "Results", metric: "Metric | None", cases: pd.DataFrame, costs
     `metric` is the one by which accuracy is judged (None: there is none), `cases` and `costs` are the tables by case
     and estimator.
     """
-    drawn: dict[str, Figure | None] = {}
-    with in_style():
-        if metric is not None:
-            drawn["accuracy"] = accuracy(results, metric, cases)
-            drawn["accuracy_against_time"] = accuracy_against_time(results, metric, cases, costs)
-        drawn["scaling"] = scaling(results)
-        figures = {name: figure for name, figure in drawn.items() if figure is not None}
-        for number, case in enumerate(results.cases, 1):
-            if len(figures) < MOST_CASES and (figure := nees_over_time(results, case)) is not None:
-                figures[f"nees_{number}"] = figure
-        for figure in figures.values():
-            lay_out(figure)
-    return figures
+    figures = drawn(
+        {
+            "accuracy": lambda: None if metric is None else accuracy(results, metric, cases),
+            "accuracy_against_time": lambda: None if metric is None else against_time(results, metric, cases, costs),
+            "scaling": lambda: scaling(results),
+        }
+    )
+    repeated = {f"nees_{n}": case for n, case in enumerate(results.cases, 1) if _runs(results, case) > 1}
+    chosen = islice(repeated.items(), MOST_CASES - len(figures))
+    return figures | drawn({name: partial(nees_over_time, results, case) for name, case in chosen})
 
 
 def accuracy(results: "Results", metric: "Metric", cases: pd.DataFrame) -> Figure:
@@ -74,9 +75,7 @@ def accuracy(results: "Results", metric: "Metric", cases: pd.DataFrame) -> Figur
     return figure
 
 
-def accuracy_against_time(
-    results: "Results", metric: "Metric", cases: pd.DataFrame, costs: pd.DataFrame
-) -> Figure | None:
+def against_time(results: "Results", metric: "Metric", cases: pd.DataFrame, costs: pd.DataFrame) -> Figure | None:
     """Accuracy over time per frame: one mark for each estimator and case; None without costs."""
     if costs.empty:
         return None
@@ -92,8 +91,7 @@ def accuracy_against_time(
         axes.plot(row["ms_per_frame"], row[metric.name], **mark)
     _logarithmic(axes, "x")
     _logarithmic(axes, "y")
-    axes.set_xlabel("time per frame, ms")
-    axes.set_ylabel(metric.heading)
+    axes.set(xlabel="time per frame, ms", ylabel=metric.heading)
     title_and_legend(figure, "Accuracy against time: lower left is better", _legend(results))
     _case_legend(figure, results)
     return figure
@@ -134,12 +132,15 @@ def _power(n: FloatArray, seconds: FloatArray) -> tuple[float, float] | None:
     return float(exponent), float(np.exp(log_factor))
 
 
-def nees_over_time(results: "Results", case: str) -> Figure | None:
-    """ANEES over the runs of a case, frame by frame, with chi-square bounds; None for a single run."""
+def _runs(results: "Results", case: str) -> int:
+    """Largest number of runs of a case whose NEES an estimator has."""
+    return max((len(nees) for (of, _), nees in results.nees.items() if of == case), default=0)
+
+
+def nees_over_time(results: "Results", case: str) -> Figure:
+    """ANEES over the runs of a case, frame by frame, with chi-square bounds."""
     columns = {name: results.nees[case, name] for name in results.estimators if (case, name) in results.nees}
-    runs = max((len(values) for values in columns.values()), default=0)
-    if runs < 2:
-        return None
+    runs = _runs(results, case)
     figure, (axes,) = stacked_panels(3.9)
     color, handles, values = _colors(results), [], []
     for name, own in columns.items():
@@ -148,13 +149,10 @@ def nees_over_time(results: "Results", case: str) -> Figure | None:
         values.append(table["anees"].to_numpy(dtype=np.float64))
         if len(own) == runs:
             bounds = table[["low", "high"]]
-    axes.set_yscale("log")
-    axes.set_ylim(*_reach(values))
+    axes.set(yscale="log", ylim=_reach(values), xlabel="frame", ylabel="ANEES (above: overconfident)")
     band = axes.fill_between(bounds.index, bounds["low"], bounds["high"], color=BAND, zorder=1, linewidth=0)
     band.set_label(f"95 % bounds ({plural(runs, 'run')})")
     axes.axhline(DEGREES_OF_FREEDOM, color=GREEN, linewidth=0.9, zorder=1.5)
-    axes.set_xlabel("frame")
-    axes.set_ylabel("ANEES (above: overconfident)")
     title_and_legend(figure, f"NEES over time, mean of {plural(runs, 'run')}: {safe_text(case)}", [*handles, band])
     return figure
 
@@ -162,8 +160,9 @@ def nees_over_time(results: "Results", case: str) -> Figure | None:
 def _reach(values: list[FloatArray]) -> tuple[float, float]:
     every = np.concatenate(values)
     every = every[np.isfinite(every) & (every > 0.0)]
-    low, high = np.percentile(every, [1.0, 99.5]) if len(every) else nees_bounds()
-    return max(min(float(low), nees_bounds()[0]) * 0.7, 1e-3), max(float(high), nees_bounds()[1]) * 1.4
+    below, _, above = chi_square_limits(DEGREES_OF_FREEDOM)
+    low, high = np.percentile(every, [1.0, 99.5]) if len(every) else (below, above)
+    return max(min(float(low), below) * 0.7, 1e-3), max(float(high), above) * 1.4
 
 
 def _colors(results: "Results") -> dict[str, str]:
@@ -182,12 +181,10 @@ def _case_legend(figure: Figure, results: "Results") -> None:
     """Legend of the marks of the cases, below the panel."""
     if not 1 < len(results.cases) <= MOST_CASES:
         return
-    names = {safe_text(case): mark for case, mark in _marks(results).items()}
-    marks = [
-        Line2D([], [], color=GRAY, marker=mark, linestyle="none", markersize=6, label=name)
-        for name, mark in names.items()
-    ]
-    columns = max(1, SCREEN.letters // (max(map(len, names)) + SCREEN.spare))
+    look: dict[str, Any] = {"color": GRAY, "linestyle": "none", "markersize": 6}
+    marks = [Line2D([], [], marker=mark, label=safe_text(case), **look) for case, mark in _marks(results).items()]
+    longest = max(len(str(mark.get_label())) for mark in marks)
+    columns = max(1, SCREEN.letters // (longest + SCREEN.spare))
     figure.legend(handles=marks, loc="outside lower left", ncols=columns, alignment="left")
 
 
@@ -195,12 +192,8 @@ def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
     """Logarithmic axis with plain numbers, also where it has less than two decades."""
     axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_major_formatter(FuncFormatter(_plain_number))
+    axis.set_major_formatter("{x:g}")
     low, high = axis.get_view_interval()
     few = low > 0.0 and high / low < FEW_DECADES
     axis.set_minor_locator(LogLocator(subs=(2.0, 5.0) if few else (2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)))
-    axis.set_minor_formatter(FuncFormatter(_plain_number) if few else NullFormatter())
-
-
-def _plain_number(value: float, _: int | None = None) -> str:
-    return f"{value:g}"
+    axis.set_minor_formatter("{x:g}" if few else NullFormatter())

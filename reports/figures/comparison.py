@@ -1,9 +1,8 @@
 """Figures of a comparison of trajectories, and of one that a check of accuracy failed."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,27 +19,16 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
 from .comparison_data import ComparisonData, of_comparison
-from .drawing import DrawOne, encoded_in_background
-from .evidence import maps_by_depth, three_sigma_of
-from .layout import lay_out
+from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
+from .evidence import map_difference, three_sigma
+from .legend import swatch, title_and_legend
 from .over_time import TITLE_ROOM, columns, component_panels
+from .palette import GRAY, TRUTH
 from .panels import few_ticks, fit_log_or_linear
 from .paths import frame_top_view
 from .reprojection import distribution
 from .saving import EncodedFigure
-from .style import (
-    GRAY,
-    PAPER,
-    SCREEN,
-    TRUTH,
-    WHITE,
-    Style,
-    in_style,
-    safe_text,
-    stacked_panels,
-    swatch,
-    title_and_legend,
-)
+from .style import SCREEN, WHITE, Style, in_style, safe_text, stacked_panels
 from .view_limits import common_window
 
 if TYPE_CHECKING:
@@ -56,45 +44,30 @@ CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
 CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
 
 
-def draw(comparison: "Comparison") -> dict[str, Figure]:
-    """Figures by name; those for which there is nothing to show are missing."""
-    with in_style():
-        return _laid_out({name: draw_one() for name, draw_one in figure_functions(comparison).items()})
-
-
 def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
-    """Functions that draw each of these figures, within `in_style()` and without layout; each may answer None."""
+    """Functions that draw each figure, by name, within `in_style()` and without layout; each may answer None."""
     data = of_comparison(comparison)
     each: dict[str, DrawOne] = {name: partial(draw_one, data) for name, (draw_one, _) in EACH.items()}
     each["reprojection"] = partial(_reprojection, comparison, data)
     return each | {f"three_sigma_{n}": partial(_three_sigma, data, r) for n, r in comparison.results.items()}
 
 
-@contextmanager
-def drawn_in_background(comparison: "Comparison", processes: int) -> Iterator[Callable[[], dict[str, EncodedFigure]]]:
+def draw(comparison: "Comparison") -> dict[str, Figure]:
+    """Figures by name; those for which there is nothing to show are missing."""
+    return drawn(figure_functions(comparison))
+
+
+def drawn_in_background(
+    comparison: "Comparison", processes: int
+) -> AbstractContextManager[Callable[[], dict[str, EncodedFigure]]]:
     """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, encoded."""
-    with encoded_in_background(figure_functions(comparison), processes) as drawn:
-        yield drawn
+    return encoded_in_background(figure_functions(comparison), processes)
 
 
 def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
     """Figures of a comparison for a paper in two columns: name -> figure and caption."""
-    words = {
-        "reference": data.reference,
-        "alignment": data.alignment,
-        "pairs": "all pairs" if data.all_pairs else "pairs end to end",
-        "lengths": "KITTI's lengths" if data.official else "lengths fitted to the trajectory, not KITTI's",
-    }
-    with in_style(PAPER):
-        figures = _laid_out({name: draw_one(data, PAPER) for name, (draw_one, _) in EACH.items()})
-    return {name: (figure, EACH[name][1].format(**words)) for name, figure in figures.items()}
-
-
-def _laid_out(drawn: Mapping[str, Figure | None]) -> dict[str, Figure]:
-    figures = {name: figure for name, figure in drawn.items() if figure is not None}
-    for figure in figures.values():
-        lay_out(figure)
-    return figures
+    words = {"reference": data.reference, "alignment": data.alignment, "pairs": data.pairs, "lengths": data.lengths}
+    return drawn_for_paper(data, EACH, words)
 
 
 def paths(data: ComparisonData, style: Style = SCREEN) -> Figure:
@@ -160,11 +133,9 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
             _boxes(panel, names, data.colors, motions, column)
-            panel.set_xlabel(f"over {delta}: {'translation' if unit == 'm' else 'rotation'}, {unit}")
-            panel.set_xlim(left=0.0)
-    pairs = "all pairs" if data.all_pairs else "pairs end to end"
+            panel.set(xlabel=f"over {delta}: {column.removesuffix('_deg')}, {unit}", xlim=(0.0, None))
     over = " and ".join(data.relative)
-    title_and_legend(figure, f"Relative errors (RPE) over {over}, {pairs}", style=style)
+    title_and_legend(figure, f"Relative errors (RPE) over {over}, {data.pairs}", style=style)
     return figure
 
 
@@ -203,23 +174,12 @@ def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
         for name, means in data.segments.items():
             look = {"marker": "o", "markersize": 4} if style.titled else {}
             handles += panel.plot(means["length"], means[column], **{**line(name), **look})
-        panel.set_ylabel(title)
-        panel.set_xlabel("length of the segments, m")
-        panel.set_ylim(bottom=0.0)
-    which = "KITTI's lengths" if data.official else "lengths fitted to the trajectory, not KITTI's"
-    title_and_legend(figure, f"Segment errors ({which})", handles, style)
+        panel.set(xlabel="length of the segments, m", ylabel=title, ylim=(0.0, None))
+    title_and_legend(figure, f"Segment errors ({data.lengths})", handles, style)
     return figure
 
 
-def map_difference(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
-    """Median distance of landmarks from the reference's by depth; None where none is shared."""
-    if not data.by_depth:
-        return None
-    return maps_by_depth(data.by_depth, data.line(style, max(map(len, data.by_depth.values()))), data.reference, style)
-
-
-Drawing = Callable[..., Figure | None]
-EACH: Mapping[str, tuple[Drawing, str]] = {
+EACH: Captioned = {
     "paths": (paths, "Trajectories from above, {alignment} to {reference}."),
     "errors": (errors, "Position and rotation error against {reference} over time, {alignment}."),
     "growth": (growth, "Position and heading error against {reference} over its path length, {alignment}."),
@@ -227,7 +187,6 @@ EACH: Mapping[str, tuple[Drawing, str]] = {
     "segments": (segments, "Segment errors ({lengths})."),
     "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
 }
-"""name -> figure, which may be None, and its caption in a paper"""
 
 
 def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | None:
@@ -242,12 +201,10 @@ def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | No
 
 
 def _three_sigma(data: ComparisonData, result: "Result") -> Figure | None:
-    reported = result.reported_covariance
+    reported, name = result.reported_covariance, result.name
     if reported is None or not np.isfinite(reported.nees).any():
         return None
-    return three_sigma_of(
-        result.name, data.t[result.name], reported.error, reported.covariance, data.line()(result.name)
-    )
+    return three_sigma(name, data.t[name], reported.error, reported.covariance, data.line()(name))
 
 
 def draw_failed_check(
@@ -262,25 +219,16 @@ def draw_failed_check(
         above, below = figure.subplots(2, 1, height_ratios=(2, 1))
         _aligned_paths(above, aligned)
         for name, (table, largest) in errors.items():
-            below.plot(
-                table["t"] - table["t"].iloc[0],
-                table["translation"],
-                color=CHECK_COLORS[name],
-                label=CHECK_LABELS[name],
-            )
+            t, color = table["t"] - table["t"].iloc[0], CHECK_COLORS[name]
+            below.plot(t, table["translation"], color=color, label=CHECK_LABELS[name])
             if largest is not None:
-                below.axhline(largest, color=CHECK_COLORS[name], linestyle=(0, (4, 2)), linewidth=1.0)
-        below.set(
-            xlabel="time since the first pose, s" if aligned.reference.stamped else "frame",
-            ylabel="distance, m",
-            ylim=(0, None),
-        )
+                below.axhline(largest, color=color, linestyle=(0, (4, 2)), linewidth=1.0)
+        moment = "time since the first pose, s" if aligned.reference.stamped else "frame"
+        below.set(xlabel=moment, ylabel="distance, m", ylim=(0, None))
         below.legend()
-        stream = BytesIO()
-        figure.savefig(stream, format="png", dpi=120)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as file:
-        file.write(stream.getvalue())
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as file:
+            figure.savefig(file, format="png", dpi=120)
 
 
 def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
@@ -289,10 +237,8 @@ def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
     axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=safe_text(aligned.reference.name))
     axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_COLORS["ate"], label=safe_text(aligned.estimate.name))
     axes.plot(*here[0], color=TRUTH, marker="o", linestyle="none", label="start")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(
-        xlabel="m", ylabel="m", title=f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
-    )
+    title = f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
+    axes.set(aspect="equal", adjustable="datalim", xlabel="m", ylabel="m", title=title)
     axes.legend()
 
 

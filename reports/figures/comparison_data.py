@@ -17,8 +17,8 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..results.documents import COMPARISON
 from ..results.reader import RunFolder
-from .panels import Line
-from .style import SCREEN, Style, colors, line, marked_line
+from .palette import colors
+from .style import SCREEN, Line, Style, lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +32,9 @@ ALIGNED = {
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
 }
+PAIRS = {True: "all pairs", False: "pairs end to end"}
+LENGTHS = {True: "KITTI's lengths", False: "lengths fitted to the trajectory, not KITTI's"}
+"""by whether they are KITTI's own"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +60,12 @@ class ComparisonData:
     """position RMSE over the common stamps, m, of the ranked estimates, nearest first"""
     relative: Mapping[str, Mapping[str, Columns]]
     """by delta, then estimate: `translation`, m, and `rotation_deg` of each motion"""
-    all_pairs: bool
+    pairs: str
+    """poses that these are between, in words"""
     segments: Mapping[str, Columns]
     """by estimate, KITTI's segment errors: see `SegmentErrors.means_by_length`"""
-    official: bool
-    """whether these lengths are KITTI's own"""
+    lengths: str
+    """those of the segments, in words"""
     by_depth: "Mapping[str, pd.DataFrame]"
     """by estimate: see `compare.map_by_depth`"""
 
@@ -72,11 +76,8 @@ class ComparisonData:
 
     def line(self, style: Style = SCREEN, points: int | None = None) -> Line:
         """Look of the line of a trajectory in a style, with so many points (default: one a pair)."""
-        color = self.colors
-        if style is SCREEN:
-            return lambda name: line(name, color[name], self.reference)
         n = max(map(len, self.t.values())) if points is None else points
-        return lambda name: marked_line(name, color[name], self.reference, self.names, n)
+        return lines(style, self.colors, self.reference, self.names, n)
 
     @cached_property
     def view(self) -> TopView:
@@ -122,9 +123,9 @@ def of_comparison(comparison: "Comparison") -> ComparisonData:
         series={name: r.divergence for name, r in results.items()},
         rmse={name: ranking.rmse(name) for name in ranking.rivals or ranking.at},
         relative=_by_delta({name: r.relative for name, r in results.items()}),
-        all_pairs=comparison.settings.all_pairs,
+        pairs=PAIRS[comparison.settings.all_pairs],
         segments={name: found.means_by_length for name, found in segments.items()},
-        official=all(found.official for found in segments.values()),
+        lengths=LENGTHS[all(found.official for found in segments.values())],
         by_depth={name: compare.map_by_depth(table) for name, table in maps.items()},
     )
 
@@ -172,17 +173,14 @@ def _of_files(files: RunFolder, summary: Mapping[str, Any]) -> ComparisonData:
                 if table is not None
             }
         ),
-        all_pairs=bool(summary["settings"]["all_pairs"]),
+        pairs=PAIRS[bool(summary["settings"]["all_pairs"])],
         segments={name: of_frame(pd.DataFrame(found["by_length"])) for name, found in segments.items()},
-        official=all(found["official"] for found in segments.values()),
+        lengths=LENGTHS[all(found["official"] for found in segments.values())],
         by_depth={name: compare.map_by_depth(table) for name, table in maps.items() if table is not None},
     )
 
 
 def _by_delta(relative: Mapping[str, Mapping[str, Columns]]) -> dict[str, dict[str, Columns]]:
     """Tables by delta, then estimate, of those by estimate, then delta."""
-    found: dict[str, dict[str, Columns]] = {}
-    for name, tables in relative.items():
-        for delta, table in tables.items():
-            found.setdefault(delta, {})[name] = table
-    return found
+    deltas = dict.fromkeys(delta for tables in relative.values() for delta in tables)
+    return {delta: {n: tables[delta] for n, tables in relative.items() if delta in tables} for delta in deltas}

@@ -1,5 +1,6 @@
 """Figures of a diagnosis: visual odometry beside the recorded velocities, and the likelihood of each convention."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from fgbaseline.diagnosis import Diagnosis, TrackStatistics
 from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
 
-from .layout import lay_out
-from .panels import moving_sum
-from .style import GRAY, SCREEN, in_style, stacked_panels, swatch, title_and_legend
+from .drawing import DrawOne, drawn
+from .legend import swatch, title_and_legend
+from .palette import GRAY
+from .style import SCREEN, stacked_panels
 
 SEEN, RECORDED, REPAIRED = "#111111", "#D55E00", "#0072B2"
 """the cameras, the recording and what the repair makes of it"""
@@ -27,18 +29,11 @@ BINS = np.linspace(-5.0, 5.0, 61)
 
 def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, Figure]:
     """Figures of a diagnosis by name; those for which it has nothing to show are missing."""
-    figures: dict[str, Figure] = {}
-    with in_style():
-        if diagnosis.odometry is not None and diagnosis.fit is not None:
-            figures["angular_rates"] = angular_rates(diagnosis)
-            figures["conventions"] = conventions(diagnosis)
-            if len(diagnosis.timing.shifts):
-                figures["time_offset"] = time_offset(diagnosis)
-            figures["velocity_residuals"] = velocity_residuals(diagnosis)
-        figures["tracks"] = tracks_over_time(diagnosis, tracks)
-        for figure in figures.values():
-            lay_out(figure)
-    return figures
+    figures: dict[str, DrawOne] = {}
+    if diagnosis.odometry is not None and diagnosis.fit is not None:
+        of_motion = angular_rates, conventions, time_offset, velocity_residuals
+        figures = {one.__name__: partial(one, diagnosis) for one in of_motion}
+    return drawn(figures | {"tracks": partial(tracks_over_time, diagnosis, tracks)})
 
 
 def angular_rates(diagnosis: Diagnosis) -> Figure:
@@ -58,21 +53,19 @@ def angular_rates(diagnosis: Diagnosis) -> Figure:
     handles: list[Any] = []
     for i, axis in enumerate(axes):
         known = odometry.known
-        values = smoothed(np.where(known, seen[:, i], np.nan), width)
+        values = moving_mean(np.where(known, seen[:, i], np.nan), width)
         lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="visual odometry", zorder=2)
-        lines += axis.plot(t, smoothed(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
+        lines += axis.plot(t, moving_mean(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
         if changed:
-            lines += axis.plot(t, smoothed(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
+            lines += axis.plot(t, moving_mean(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
         axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
-        before, after = (median_error(seen[known, i], r[known, i]) for r in (recorded, repaired))
+        before, after = (float(np.median(np.abs(seen[known, i] - r[known, i]))) for r in (recorded, repaired))
         text = f"median error {before:.3f} rad/s" + (f", repaired {after:.3f}" if changed else "")
         axis.set_title(text, loc="right", fontsize=8, color=GRAY, pad=2.0)
         handles = handles or lines
-    axes[-1].set_xlabel("time, s")
-    axes[-1].set_xlim(0.0, float(t[-1]))
-    title_and_legend(
-        figure, f"Angular velocity about the axes of imu_T_cam, averaged over {AVERAGED_OVER:g} s", handles
-    )
+    axes[-1].set(xlabel="time, s", xlim=(0.0, float(t[-1])))
+    title = f"Angular velocity about the axes of imu_T_cam, averaged over {AVERAGED_OVER:g} s"
+    title_and_legend(figure, title, handles)
     return figure
 
 
@@ -87,9 +80,8 @@ def conventions(diagnosis: Diagnosis) -> Figure:
         colors = [REPAIRED if n == axes.name else RECORDED if n == IDENTITY else OTHERS for n in ranked]
         rows = np.arange(len(ranked))
         panel.barh(rows, behind, color=colors, height=0.75)
-        panel.plot(
-            [0.0] * sum(b == 0 for b in behind), [i for i, b in enumerate(behind) if b == 0], ".", color="#333333"
-        )
+        first = np.flatnonzero(np.array(behind) == 0.0)
+        panel.plot(np.zeros(len(first)), first, ".", color="#333333")
         panel.set_yticks(rows, ranked, fontsize=7.5)
         for label, name in zip(panel.get_yticklabels(), ranked, strict=True):
             if name in (axes.name, IDENTITY):
@@ -98,8 +90,8 @@ def conventions(diagnosis: Diagnosis) -> Figure:
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
         unseen = [n for n, s in zip("xyz", axes.seen, strict=True) if not s]
-        panel.set_title(f"{which} velocity" + (f" ({', '.join(unseen)} not identifiable)" if unseen else ""))
-        panel.set_xlabel("behind the best, log-likelihood")
+        remark = f" ({', '.join(unseen)} not identifiable)" if unseen else ""
+        panel.set(title=f"{which} velocity{remark}", xlabel="behind the best, log-likelihood")
     changed = diagnosis.angular.changed or diagnosis.linear.changed
     handles = [swatch(REPAIRED, "found" if changed else "found: as recorded")]
     handles += [swatch(RECORDED, "as recorded")] if changed else []
@@ -108,9 +100,11 @@ def conventions(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def time_offset(diagnosis: Diagnosis) -> Figure:
-    """Agreement of the recorded rates with the cameras at each shift in time."""
+def time_offset(diagnosis: Diagnosis) -> Figure | None:
+    """Agreement of the recorded rates with the cameras at each shift in time; None where none was tried."""
     timing = diagnosis.timing
+    if len(timing.shifts) == 0:
+        return None
     dt = float(np.median(diagnosis.sequence.dt))
     figure, (axes,) = stacked_panels(3.6)
     axes.plot(timing.shifts, timing.agreement, color=REPAIRED, linewidth=1.8)
@@ -123,21 +117,13 @@ def time_offset(diagnosis: Diagnosis) -> Figure:
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.22 * (high - low))
     usual = ((Shift.AFTER, "interval after"), (Shift.MIDDLE, "instant of the frame"), (Shift.BEFORE, "interval before"))
+    look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "va": "top", "fontsize": 8, "color": GRAY}
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
     for row, (shift, text) in enumerate(usual):
         axes.axvline(shift, color="#888888", linewidth=0.9, linestyle=":")
-        axes.text(
-            shift,
-            0.99 - 0.06 * row,
-            f" {text}",
-            transform=axes.get_xaxis_transform(),
-            va="top",
-            fontsize=8,
-            color=GRAY,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-        )
+        axes.text(shift, 0.99 - 0.06 * row, f" {text}", **look, bbox=box)
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= 1.0])
-    axes.set_xlabel(f"shift of the velocities, intervals of {dt:.3f} s")
-    axes.set_ylabel("agreement (1: equal rates)")
+    axes.set(xlabel=f"shift of the velocities, intervals of {dt:.3f} s", ylabel="agreement (1: equal rates)")
     title = "Agreement of the recorded rates with visual odometry"
     title_and_legend(figure, title if timing.identifiable else f"{title}: no shift is identifiable", handles)
     return figure
@@ -174,8 +160,7 @@ def tracks_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     t = sequence.t - sequence.t[0]
     figure, (upper, lower) = stacked_panels(5.0, 2)
     handles: list[Any] = list(upper.plot(t, tracks.usable, color=GRAY, linewidth=1.0, label="usable features"))
-    upper.set_ylabel("features per frame")
-    upper.set_ylim(bottom=0)
+    upper.set(ylabel="features per frame", ylim=(0, None))
     lower.bar(t[:-1], 100.0 * np.nan_to_num(tracks.wrong_share), sequence.dt, align="edge", color=WRONG)
     handles.append(swatch(WRONG, "matches that contradict the motion of their frame"))
     copied = np.flatnonzero(diagnosis.repeated) + 1
@@ -185,25 +170,22 @@ def tracks_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
     few = np.flatnonzero(tracks.few)
     if len(few):
         _mark(upper, t[few], WRONG, 0.94)
-    lower.set_ylabel("wrong matches, %")
-    lower.set_ylim(bottom=0)
-    lower.set_xlabel("time, s")
-    lower.set_xlim(0.0, float(t[-1]))
+    lower.set(ylabel="wrong matches, %", ylim=(0, None), xlabel="time, s", xlim=(0.0, float(t[-1])))
     title = "Tracks: usable features and wrong matches" + (", copied frames" if len(copied) else "")
     title_and_legend(figure, title, handles)
     return figure
 
 
-def smoothed(values: FloatArray, width: float) -> FloatArray:
-    """(n,) mean over a window of so many entries; NaN is left out, and stays where it fills the window."""
-    known = np.isfinite(values)
-    total, count = moving_sum(np.where(known, values, 0.0), width), moving_sum(known, width)
-    return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+def moving_mean(values: FloatArray, width: float) -> FloatArray:
+    """(n,) means over the `width` entries around each, as many as there are and known; NaN where none is.
 
+    The window is rounded to whole entries, at least one; an even one reaches one entry further back than ahead.
+    """
+    import pandas as pd
 
-def median_error(seen: FloatArray, recorded: FloatArray) -> float:
-    """Median absolute error of one axis."""
-    return float(np.median(np.abs(seen - recorded)))
+    window = max(1, round(min(width, 2.0 * len(values))))
+    rolling = pd.Series(values).rolling(window, center=True, min_periods=1)
+    return np.asarray(rolling.mean().to_numpy(dtype=np.float64))
 
 
 def _mark(axes: Axes, t: FloatArray, color: str, height: float) -> None:

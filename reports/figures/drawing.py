@@ -1,8 +1,10 @@
-"""Figures drawn and encoded in the background, by forks of this process."""
+"""Figures of a result: drawn and laid out at once, or drawn and encoded in the background by forks of this process."""
 
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -10,13 +12,31 @@ from fgbaseline.data.parallel import background_map
 
 from .layout import lay_out
 from .saving import EncodedFigure, encode_figure
-from .style import in_style
+from .style import PAPER, SCREEN, Style, in_style
 
 FORMS = ("png", "svg")
 SHARES = 256
 """largest number of shares of the work: as many as `background_map` takes"""
 DrawOne = Callable[[], Figure | None]
 """draws a figure, within `in_style()` and without layout; None where there is nothing to show"""
+Captioned = Mapping[str, tuple[Callable[..., Figure | None], str]]
+"""name -> figure from the data of a result and a style, which may be None, and its caption in a paper"""
+
+
+def drawn(figures: Mapping[str, DrawOne], style: Style = SCREEN) -> dict[str, Figure]:
+    """Figures by name, laid out; those for which there is nothing to show are missing."""
+    with in_style(style):
+        every = {name: draw_one() for name, draw_one in figures.items()}
+        there = {name: figure for name, figure in every.items() if figure is not None}
+        for figure in there.values():
+            lay_out(figure)
+    return there
+
+
+def drawn_for_paper(data: Any, figures: Captioned, words: Mapping[str, str]) -> dict[str, tuple[Figure, str]]:
+    """Figures of a result for a paper in two columns: name -> figure, and caption with the `words` in place."""
+    there = drawn({name: partial(draw_one, data, PAPER) for name, (draw_one, _) in figures.items()}, PAPER)
+    return {name: (figure, figures[name][1].format(**words)) for name, figure in there.items()}
 
 
 @contextmanager
@@ -41,21 +61,15 @@ def encoded_in_background(
 
 
 def _encoded(draw_one: DrawOne) -> EncodedFigure | None:
-    with without_garbage_collection(), in_style():
-        figure = draw_one()
-        if figure is None:
-            return None
-        lay_out(figure)
-        return encode_figure(figure, FORMS)
+    """Figure as bytes, drawn without the search for cyclic garbage.
 
-
-@contextmanager
-def without_garbage_collection() -> Iterator[None]:
-    """Without the search for cyclic garbage, a seventh of the time; that garbage is 13 MB for seven estimators."""
+    That search takes a seventh of the time; the garbage is 13 MB for seven estimators.
+    """
     collected = gc.isenabled()
     gc.disable()
     try:
-        yield
+        figure = drawn({"": draw_one}).get("")
+        return None if figure is None else encode_figure(figure, FORMS)
     finally:
         if collected:
             gc.enable()

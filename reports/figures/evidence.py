@@ -1,10 +1,9 @@
 """Evidence beside the paths: consistency (NEES, NIS, sigmas), held-out tracks, and landmarks of the reference."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -12,14 +11,13 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import RESOLUTION, per_cent
-from .over_time import Expected, Panel, time_panels
-from .panels import CONSISTENT, DEGREES_OF_FREEDOM, Line, chi_square_band, intervals, log_where_positive, short
+from .comparison_data import ComparisonData
+from .legend import title_and_legend
+from .over_time import Panel, time_panels
+from .panels import DEGREES_OF_FREEDOM, intervals, log_where_positive, short
 from .reprojection import medians_by_class
 from .run_data import RunData
-from .style import GREEN, SCREEN, Style, safe_text, title_and_legend
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .style import SCREEN, Style, safe_text
 
 AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
 QUANTITIES = {
@@ -33,73 +31,49 @@ OVER_BAND, BELOW_ONE = "overconfident above the band", "overconfident below 1"
 
 def nees(run: RunData) -> Figure | None:
     """NEES of each pose against ground truth; None without truth or covariances."""
-    label, height = "NEES (above: overconfident)", 3.8 - SCREEN.room
-    panel = Panel(label, "nees", height, decades=6.0, expected=_pose_band("95 % bounds (6 dof)"))
+    label, bounds = "NEES (above: overconfident)", "95 % bounds (6 dof)"
+    panel = Panel(label, "nees", 3.8 - SCREEN.room, 6.0, degrees=DEGREES_OF_FREEDOM, band=bounds)
     title = "NEES of each pose: squared error over covariance"
     return time_panels(run, [panel], title, SCREEN, linewidth=1.1)
 
 
 def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Reference NEES, NIS and sigma ratios over time; None without any of these. On paper also the NEES."""
+    rows = run.nis_rows
+    pose: dict[str, Any] = {"degrees": DEGREES_OF_FREEDOM}
+    nis: dict[str, Any] = {"smooth": True, "degrees": rows, "per": rows or 1.0}
     if not style.titled:
-        pose, innovation = _pose_band(CONSISTENT, 0.6), _innovation_band(CONSISTENT, 0.6)
         panels = [
-            Panel("NEES", "nees", 0.95, 5.0, pose),
-            Panel("ref. NEES", "nees_reference", 0.95, 5.0, pose),
-            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, innovation, smooth=True),
+            Panel("NEES", "nees", 0.95, 5.0, **pose),
+            Panel("ref. NEES", "nees_reference", 0.95, 5.0, **pose),
+            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, **nis),
             Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
         ]
         return time_panels(run, panels, "", style)
-    nis = _innovation_band(CONSISTENT)
     panels = [
-        Panel("reference NEES", "nees_reference", 1.95, 5.0, _pose_band(CONSISTENT), OVER_BAND),
-        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, nis, OVER_BAND, smooth=True),
-        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, _one, BELOW_ONE),
-        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, _one, BELOW_ONE),
+        Panel("reference NEES", "nees_reference", 1.95, 5.0, OVER_BAND, **pose),
+        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, OVER_BAND, **nis),
+        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, BELOW_ONE, expected=1.0),
+        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, BELOW_ONE, expected=1.0),
     ]
     return time_panels(run, panels, "Consistency without truth", style, linewidth=1.0)
 
 
-def _pose_band(label: str, width: float = 0.9) -> Expected:
-    return lambda _, axes: [chi_square_band(axes, DEGREES_OF_FREEDOM, label, width=width)]
+def three_sigma(
+    name: str, t: FloatArray, error: FloatArray | None, covariance: FloatArray | None, look: Mapping[str, Any]
+) -> Figure | None:
+    """Errors (n, 6) in the body frame at t (n,), s, with ±3-sigma bounds of their covariances (n, 6, 6).
 
-
-def _innovation_band(label: str, width: float = 0.9) -> Expected:
-    """Band for the median number of rows of an innovation."""
-
-    def draw(run: RunData, axes: Axes) -> list[Any]:
-        rows = run.nis_rows
-        return [] if rows is None else [chi_square_band(axes, rows, label, per=rows, width=width)]
-
-    return draw
-
-
-def _one(_: RunData, axes: Axes) -> list[Any]:
-    axes.axhline(1.0, color=GREEN, linewidth=0.9, zorder=1.5)
-    return []
-
-
-def three_sigma(run: RunData, name: str) -> Figure | None:
-    """Error of each pose in its own body frame, between three of its sigmas; None without truth or covariances."""
-    if run.observed is None or name not in run.observed.errors:
+    None without truth or covariances.
+    """
+    if error is None or covariance is None or not np.isfinite(error).any() or not np.isfinite(covariance).any():
         return None
-    error, covariance = run.observed.errors[name]
-    if not np.isfinite(error).any() or not np.isfinite(covariance).any():
-        return None
-    return three_sigma_of(name, run.t, error, covariance, run.line()(name))
-
-
-def three_sigma_of(
-    name: str, t: FloatArray, error: FloatArray, covariance: FloatArray, look: Mapping[str, Any]
-) -> Figure:
-    """Errors (n, 6) in the body frame at t (n,), s, with ±3-sigma bounds of their covariances (n, 6, 6)."""
     scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
     with np.errstate(invalid="ignore"):
         sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
     title = f"{safe_text(name)}: error in the body frame, with ±3-sigma bounds (99.7 %)"
-    return _between_three_sigmas(
-        title, t, dict(zip(AXES, zip((scale * error).T, sigma.T, strict=True), strict=True)), look
-    )
+    shown = dict(zip(AXES, zip((scale * error).T, sigma.T, strict=True), strict=True))
+    return _between_three_sigmas(title, t, shown, look)
 
 
 def velocity_and_biases(run: RunData, name: str) -> Figure | None:
@@ -152,24 +126,19 @@ def _reach(error: FloatArray, sigma: FloatArray) -> float:
     return 1.15 * max(most, min(band, 30.0 * most), 1e-9)
 
 
-def map_difference(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Median distance of landmarks from the reference's by depth; None where none is shared."""
-    if not run.by_depth:
-        return None
-    classes = max(map(len, run.by_depth.values()))
-    return maps_by_depth(run.by_depth, run.line(style, classes), run.reference or "", style)
+def map_difference(data: RunData | ComparisonData, style: Style = SCREEN) -> Figure | None:
+    """Median distance of landmarks from the reference's by depth; None where none is shared.
 
-
-def maps_by_depth(
-    tables: "Mapping[str, pd.DataFrame]", line: Line, reference: str, style: Style = SCREEN
-) -> Figure | None:
-    """Tables of `compare.map_by_depth` by name: in meters and sigmas, on paper only in the camera frame."""
+    In meters and sigmas, on paper only in the camera frame.
+    """
+    tables = data.by_depth
     columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
     if not style.titled:
         columns = {"seen": ""}
     shown = {c: title for c, title in columns.items() if any(t[c].notna().any() for t in tables.values())}
     if not shown:
         return None
+    line = data.line(style, max(map(len, tables.values())))
     figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.7))
     panels = figure.subplots(1, len(shown), squeeze=False)[0]
     handles = []
@@ -179,13 +148,11 @@ def maps_by_depth(
         log_where_positive(panel)
         if column != "sigmas" and panel.get_yscale() == "log" and panel.get_ylim()[1] > RESOLUTION:
             panel.set_ylim(bottom=max(RESOLUTION, panel.get_ylim()[0]))
-        panel.set_title(title)
-        panel.set_xlabel("depth, m")
+        panel.set(title=title, xlabel="depth, m")
     if not style.titled:
         panels[0].set_ylabel("distance, m")
-    title_and_legend(
-        figure, f"Landmarks: median distance from those of {safe_text(reference)}, by depth", handles, style
-    )
+    title = f"Landmarks: median distance from those of {safe_text(data.reference or '')}, by depth"
+    title_and_legend(figure, title, handles, style)
     return figure
 
 
@@ -213,7 +180,8 @@ def held_out(run: RunData, style: Style = SCREEN) -> Figure | None:
         panel.xaxis.set_major_formatter("{x:g}")
         panel.xaxis.set_minor_formatter(NullFormatter())
     panel.set_xlabel("median held-out error, px" + (", with its 95 % interval" if style.titled else ""))
-    pieces = 0 if run.observed is None else run.observed.held_out_tracks
+    held = None if run.run is None else run.run.held_out
+    pieces = 0 if held is None or held.errors is None else held.errors.inliers
     title = f"Held-out error: {plural(pieces, 'piece')} of tracks that no estimator used"
     title_and_legend(figure, title, style=style)
     return figure

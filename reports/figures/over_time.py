@@ -1,6 +1,6 @@
 """Figures over time: divergence from the reference, error to ground truth, height, and time per frame."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.columns import Columns
 from fgbaseline.geometry import FloatArray
 
+from .legend import title_and_legend
+from .palette import GREEN
 from .panels import (
-    Line,
+    CONSISTENT,
+    chi_square_band,
     few_ticks,
     fit_log,
     fit_log_or_linear,
@@ -23,7 +26,7 @@ from .panels import (
     smoothed,
 )
 from .run_data import RunData
-from .style import SCREEN, Style, safe_text, stacked_panels, title_and_legend
+from .style import SCREEN, Line, Style, safe_text, stacked_panels
 from .view_limits import common_window, signed_range
 
 if TYPE_CHECKING:
@@ -44,10 +47,6 @@ TITLE_ROOM = 58
 """letters that a title has for numbers"""
 
 
-Expected = Callable[[RunData, Axes], list[Any]]
-"""draws the values of a consistent estimator into a panel; gives their entries in the legend"""
-
-
 @dataclass(frozen=True, slots=True)
 class Panel:
     """Quantity of a run's series over time."""
@@ -58,34 +57,46 @@ class Panel:
     """inches"""
     decades: float | None = None
     """decades of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
-    expected: Expected | None = None
     title: str = ""
     smooth: bool = False
     """whether its lines jump from frame to frame, so that running medians are drawn"""
+    degrees: float | None = None
+    """degrees of freedom of the chi-square of a consistent estimator, over `per`, whose band is drawn"""
+    per: float = 1.0
+    band: str = CONSISTENT
+    """the band's entry in the legend"""
+    expected: float | None = None
+    """value of a consistent estimator"""
 
 
-def time_panels(
-    run: RunData, wanted: Sequence[Panel], title: str, style: Style, *, without: str | None = None, **look: Any
-) -> Figure | None:
+def time_panels(run: RunData, wanted: Sequence[Panel], title: str, style: Style, **look: Any) -> Figure | None:
     """Panels that have something to show above one another, `look` being that of the lines; None where none has."""
-    known = [(panel, _drawn(run.column(panel.column, without), smooth=panel.smooth)) for panel in wanted]
-    if not style.titled:  # a line of zeros, such as the time of an estimator without one, cannot be described in print
-        known = [(panel, {name: v for name, v in series.items() if np.nansum(np.abs(v))}) for panel, series in known]
-    shown = [(panel, series) for panel, series in known if series]
+    shown: dict[Panel, dict[str, FloatArray]] = {}
+    for panel in wanted:
+        series = run.column(panel.column)
+        if panel.smooth:
+            series = {name: running_median(values) for name, values in series.items()}
+        if not style.titled:  # a line of zeros, such as the time of an estimator without one, says nothing in print
+            series = {name: values for name, values in series.items() if np.nansum(np.abs(values))}
+        if series:
+            shown[panel] = series
     if not shown:
         return None
-    heights = [panel.height for panel, _ in shown]
+    heights = [panel.height for panel in shown]
     figure, axes = stacked_panels(style.room + sum(heights), len(shown), style, height_ratios=heights)
     lines: list[Any] = []
     bands: list[Any] = []
-    for on, (panel, series) in zip(axes, shown, strict=True):
+    for on, (panel, series) in zip(axes, shown.items(), strict=True):
         lines += plot_series(on, run.t, series, run.line(style), **look)
         if panel.decades is None:
             fit_log_or_linear(on, series)
         else:
             fit_log(on, series, panel.decades)
+        if panel.degrees is not None:
+            width = 0.9 if style.titled else 0.6
+            bands.append(chi_square_band(on, panel.degrees, panel.band, per=panel.per, width=width))
         if panel.expected is not None:
-            bands += panel.expected(run, on)
+            on.axhline(panel.expected, color=GREEN, linewidth=0.9, zorder=1.5)
         few_ticks(on, style)
         on.set_ylabel(panel.label)
         remarks = [panel.title, smoothed(len(run.t)) if panel.smooth and style.titled else ""]
@@ -94,10 +105,6 @@ def time_panels(
     order = [run.line(style)(name)["label"] for name in run.names]  # a panel may lack the first of them
     title_and_legend(figure, title, [*sorted(lines, key=lambda one: order.index(one.get_label())), *bands], style)
     return figure
-
-
-def _drawn(series: Mapping[str, FloatArray], *, smooth: bool) -> dict[str, FloatArray]:
-    return {name: running_median(values) if smooth else values for name, values in series.items()}
 
 
 def time_axis(run: RunData, axes: Sequence[Axes], style: Style = SCREEN) -> None:
@@ -110,11 +117,8 @@ def time_axis(run: RunData, axes: Sequence[Axes], style: Style = SCREEN) -> None
 def divergence(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Distance, angle and (on the screen) the components of the difference from the reference; None without any."""
     if not style.titled:
-        panels = [
-            Panel("distance, m", "divergence_position", 0.95),
-            Panel("angle, °", "divergence_rotation_deg", 0.95),
-        ]
-        return time_panels(run, panels, "", style, without=run.reference)
+        labels = {"divergence_position": "distance, m", "divergence_rotation_deg": "angle, °"}
+        return time_panels(run, [Panel(label, column, 0.95) for column, label in labels.items()], "", style)
     names = [name for name in run.names if name != run.reference and "divergence_position" in run.series[name]]
     if not names or run.reference is None:
         return None
@@ -184,20 +188,21 @@ def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
     """Time per frame, on the screen beside the interval between frames; None where none is known."""
     if not style.titled:
         return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0, smooth=True)], "", style)
-    known = {name: 1e3 * seconds for name, seconds in run.column("seconds").items() if seconds.any()}
-    times = _drawn(known, smooth=True)
+    times = {name: running_median(ms) for name, ms in run.milliseconds().items()}
     if not times:
         return None
     figure, axes = stacked_panels(3.4)
     handles: list[Any] = []
-    for names in _names_by_times(times):
-        together = " and ".join(map(safe_text, names))
-        handles += plot_series(axes[0], run.t, {names[0]: times[names[0]]}, run.line(), linewidth=0.9, label=together)
+    equal: dict[bytes, list[str]] = {}  # estimators that one run gave
+    for name, ms in times.items():
+        equal.setdefault(ms.tobytes(), []).append(name)
+    for name, *others in equal.values():
+        together = " and ".join(map(safe_text, (name, *others)))
+        handles += plot_series(axes[0], run.t, {name: times[name]}, run.line(), linewidth=0.9, label=together)
     interval = 1e3 * float(np.median(np.diff(run.t)))
     fit_log(axes[0], {**times, "": np.array([interval])})
-    real_time = axes[0].axhline(
-        interval, color="#888888", linewidth=1.0, linestyle=":", label=f"interval between frames ({interval:.3g} ms)"
-    )
+    look: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "linestyle": ":"}
+    real_time = axes[0].axhline(interval, **look, label=f"interval between frames ({interval:.3g} ms)")
     axes[0].set_ylabel("time, ms")
     axes[0].set_title(smoothed(len(run.t)))
     time_axis(run, axes)
@@ -234,15 +239,3 @@ def _maxima(tables: Mapping[str, Columns]) -> str:
     each = [f"{safe_text(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
     name, far = max(farthest.items(), key=lambda item: item[1])
     return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else f"at most {far:.3g} m ({safe_text(name)})")
-
-
-def _names_by_times(times: Mapping[str, FloatArray]) -> list[list[str]]:
-    """Groups of estimators with equal times, which one run gave."""
-    shared: list[list[str]] = []
-    for name, ms in times.items():
-        same = next((names for names in shared if np.array_equal(times[names[0]], ms)), None)
-        if same is None:
-            shared.append([name])
-        else:
-            same.append(name)
-    return shared

@@ -1,6 +1,6 @@
 """Building blocks of panels: series over time with their axes, chi-square bands, intervals, medians by depth."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Literal
 
@@ -12,31 +12,24 @@ from numpy.typing import ArrayLike
 from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
-from .style import BAND, GREEN, Style, note, safe_text
+from .legend import note
+from .palette import BAND, GREEN
+from .style import Line, Style, safe_text
 
 DECADES = 1.5
 """between what the estimators reach, from which on an axis is logarithmic"""
-DEGREES_OF_FREEDOM = 6
+DEGREES_OF_FREEDOM = 6.0
 """degrees of freedom of a pose"""
 CONSISTENT = "95 % if consistent"
 MEDIANS = 100
 """windows of a running median that a line holds"""
 
-Line = Callable[[str], Mapping[str, Any]]
-"""look of the line of an estimator"""
-
 
 @cache
-def nees_bounds() -> tuple[float, float]:
-    """95 % chi-square bounds of the NEES of a pose."""
-    low, high = compare.chi_square_bounds(float(DEGREES_OF_FREEDOM))
-    return float(low), float(high)
-
-
-@cache
-def nees_median() -> float:
-    """Median NEES of a pose of a consistent estimator."""
-    return float(compare.chi_square_quantile(0.5, float(DEGREES_OF_FREEDOM)))
+def chi_square_limits(degrees: float, per: float = 1.0) -> tuple[float, float, float]:
+    """Lower 95 % bound, median and upper 95 % bound of chi-square with so many degrees of freedom, over `per`."""
+    low, high = compare.chi_square_bounds(degrees)
+    return float(low) / per, float(compare.chi_square_quantile(0.5, degrees)) / per, float(high) / per
 
 
 def median_window(n: int) -> int:
@@ -131,8 +124,8 @@ def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray
 
 def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0, width: float = 0.9) -> Any:
     """Median and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
-    low, high = (float(limit) / per for limit in compare.chi_square_bounds(degrees))
-    axes.axhline(float(compare.chi_square_quantile(0.5, degrees)) / per, color=GREEN, linewidth=width, zorder=1.5)
+    low, median, high = chi_square_limits(degrees, per)
+    axes.axhline(median, color=GREEN, linewidth=width, zorder=1.5)
     bottom, top = axes.get_ylim()
     axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
     return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)
@@ -156,17 +149,3 @@ def intervals(
 def short(text: str) -> str:
     """Name of a class as a tick has room for it: `5 to 10 m` is 5–10 m."""
     return text.replace(" and more", "+").replace(" to ", "–")
-
-
-def moving_sum(values: ArrayLike, width: float) -> FloatArray:
-    """(n,) sums of values (n,) over the `width` entries around each, as many of them as there are.
-
-    The window is rounded to whole entries, at least one; an even one reaches one entry further back than ahead. The
-    time it takes does not depend on the width.
-    """
-    known = np.asarray(values, dtype=np.float64)
-    n = len(known)
-    size = max(1, round(min(width, 2.0 * n)))
-    last = np.arange(n) + (size - 1) // 2
-    total = np.concatenate([[0.0], np.cumsum(known)])
-    return np.asarray(total[np.minimum(last + 1, n)] - total[np.maximum(last + 1 - size, 0)])

@@ -1,18 +1,24 @@
 """Paths from above: over one another, side by side, and each with its landmarks."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from fgbaseline.data.top_view import TopView
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
+from .legend import note, swatch, title_and_legend
+from .palette import GRAY, LANDMARK, TRUTH
 from .run_data import RunData
-from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, label, note, safe_text, swatch, title_and_legend
+from .style import SCREEN, WHITE, Style, label, safe_text
 from .view_limits import Window, common_window, known, robust_window
+
+if TYPE_CHECKING:
+    from fgbaseline.compare.estimate_comparison import Run
 
 ARROWS = 40
 """along a path"""
@@ -27,11 +33,8 @@ MIN_MARGIN = 0.5
 
 def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
     """Frames a panel: equal scales, the box and the labels of its axes."""
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlim(box.low[0], box.high[0])
-    axes.set_ylim(box.low[1], box.high[1])
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    (left, bottom), (right, top) = box.low, box.high
+    axes.set(aspect="equal", adjustable="box", xlim=(left, right), ylim=(bottom, top), xlabel=x, ylabel=y)
 
 
 def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
@@ -75,8 +78,8 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     figure, (axes,) = _panels(box, 1, 1)
     handles = [_draw_landmarks(axes, landmarks)] if len(landmarks) else []
     handles += axes.plot(*path.T, **run.line()(name))
-    if run.observed is not None:
-        _draw_orientation(axes, path, run.observed.directions[name], run.colors[name])
+    if run.run is not None:
+        _draw_orientation(axes, path, _directions(run.run, name), run.colors[name])
     handles += _draw_ends(axes, path)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, f"{label(name, run.reference)}: trajectory from above and landmarks", handles)
@@ -165,6 +168,12 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
         landmarks[:, 0], landmarks[:, 1], s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5
     )
     return swatch(LANDMARK, plural(len(landmarks), "landmark"))
+
+
+def _directions(run: "Run", name: str) -> FloatArray:
+    """(T, 2) where the camera looks, seen from above."""
+    optical_axis = run.problem.sequence.imu_T_cam[:3, 2]
+    return TopView.of(run.problem).plane(run.results[name].estimate.world_T_imu[:, :3, :3] @ optical_axis)
 
 
 def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> None:

@@ -4,6 +4,7 @@ The source paper's figures show x and y of the world, the path red, its ends mar
 """
 
 from collections.abc import Sequence as Several
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,9 +21,10 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
-from .layout import lay_out
+from .drawing import DrawOne, drawn
+from .legend import note, swatch, title_and_legend
 from .paths import frame_top_view
-from .style import SCREEN, in_style, note, safe_text, swatch, title_and_legend
+from .style import SCREEN, safe_text
 from .view_limits import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ AROUND = 0.25
 """share of the path's extent: landmarks farther off are counted and not shown"""
 SQUARE = (0.6, 1.0 / 0.6)
 """height over width of a picture of the report's kind, at least and at most"""
+TITLE = 62
+"""letters of a line of a title"""
 COLUMNS = 2
 MARGIN = 1.1
 """factor on the largest box: all stages have one scale"""
@@ -54,48 +58,43 @@ ROOM = 0.95
 
 def draw(studies: Several["Study"]) -> dict[str, Figure]:
     """The source paper's figures by number, those of other recordings by name, then `sweep` and `causes_NAME`."""
-    figures: dict[str, Figure] = {}
-    with in_style():
-        for study in studies:
-            figures |= numbered(study)
-        in_report = sorted(name for name in figures if name.startswith("figure_"))
-        figures = {name: figures[name] for name in [*in_report, *figures]}
-        figures["sweep"] = sweep_figure(studies)
-        figures |= {f"causes_{study.subject.name}": stages_figure(study) for study in studies}
-        for figure in figures.values():
-            lay_out(figure)
-    return figures
+    every: dict[str, DrawOne] = {}
+    for study in studies:
+        every |= numbered(study)
+    in_report = sorted(name for name in every if name.startswith("figure_"))
+    figures = {name: every[name] for name in [*in_report, *every]}
+    figures["sweep"] = partial(sweep_figure, studies)
+    return drawn(figures | {f"causes_{study.subject.name}": partial(stages_figure, study) for study in studies})
 
 
-def numbered(study: "Study") -> dict[str, Figure]:
+def numbered(study: "Study") -> dict[str, DrawOne]:
     """Figures of a recording by name, `figure_01` and so on where the report has them under a number."""
     paper, name, label = study.subject.paper, safe_text(study.subject.name), safe_text(study.subject.label)
     of_path, of_arrows, of_slam = (paper.path, paper.arrows, paper.slam) if paper else (None,) * 3
-    figures: dict[str, Figure] = {}
+    figures: dict[str, DrawOne] = {}
 
     def add(kind: str, number: int | None, title: str, path: FloatArray, **shown: Any) -> None:
         key = f"figure_{number:02d}" if number is not None else f"{study.subject.name}_{kind}"
-        figures[key] = plot(title, path, number, **shown)
+        text = f"{title[0].upper()}{title[1:]}" if number is None else f"Figure {number}: {title}"
+        figures[key] = partial(plot, text, path, **shown)
 
     add("path", of_path, f"trajectory of the IMU after prediction, {name}", study.predicted)
     add("arrows", of_arrows, f"trajectory of the IMU with orientations, {name}", study.predicted, arrows=True)
     for n, mapped in study.mapped.items():
-        number, estimate = paper.mapped.get(n) if paper else None, mapped.estimate
-        title, landmarks = f"after landmark update, {label}, N = {n}", estimate.landmarks.position
+        title, estimate = f"after landmark update, {label}, N = {n}", mapped.estimate
+        number, landmarks = paper.mapped.get(n) if paper else None, estimate.landmarks.position
         add(f"mapped_{n}", number, title, estimate.world_T_imu, landmarks=landmarks)
     title, landmarks = f"visual-inertial SLAM, {label}, N = {study.recorded.features}", study.slam.landmarks.position
     add("slam", of_slam, title, study.slam.world_T_imu, landmarks=landmarks)
     return figures
 
 
-def plot(
-    title: str, path: FloatArray, number: int | None, *, arrows: bool = False, landmarks: FloatArray | None = None
-) -> Figure:
+def plot(title: str, path: FloatArray, *, arrows: bool = False, landmarks: FloatArray | None = None) -> Figure:
     """Figure of the report's kind, of a path (T, 4, 4) and landmarks (m, 3) in the world."""
     figure = Figure(figsize=(SIDE, SIDE))
     axes = figure.subplots()
     xy = path[:, :2, 3]
-    box = _around(xy)
+    box = (robust_window(xy) or Window(-np.ones(2), np.ones(2))).shaped(SQUARE, 0.5, 0.06)
     handles: list[Any] = []
     if landmarks is not None and len(landmarks):
         points = landmarks[:, :2]
@@ -115,36 +114,22 @@ def plot(
     width, height = box.high - box.low
     figure.set_size_inches(SIDE, (SIDE - 0.7) * height / width + HEAD)
     frame_top_view(axes, box, "x, m", "y, m")
-    title_and_legend(figure, _headline(title, number), handles)
+    title_and_legend(figure, _in_two_lines(title), handles)
     return figure
 
 
-def _headline(title: str, number: int | None) -> str:
-    """Number and title of a figure of the report, in two lines at most."""
-    text = f"{title[0].upper()}{title[1:]}" if number is None else f"Figure {number}: {title}"
-    return "\n".join(_halves(text))
-
-
-def _halves(text: str, most: int = 62) -> tuple[str, ...]:
-    if len(text) <= most:
-        return (text,)
-    cut = text.rfind(", ", 0, most) + 1
-    return (text[:cut], text[cut + 1 :]) if cut > 1 else (text,)
+def _in_two_lines(title: str) -> str:
+    """A long title broken at its last comma that the first line has room for, if there is one."""
+    cut = title.rfind(", ", 0, TITLE) + 1 if len(title) > TITLE else 0
+    return f"{title[:cut]}\n{title[cut + 1 :]}" if cut > 1 else title
 
 
 def _arrows(axes: Axes, path: FloatArray) -> None:
     chosen = path[:: max(1, len(path) // ARROWS)]
     pointing = chosen[:, :2, 0]
     pointing = pointing / np.maximum(np.linalg.norm(pointing, axis=1, keepdims=True), 1e-12)
-    axes.quiver(
-        *chosen[:, :2, 3].T, *pointing.T, angles="xy", scale=24, width=0.004, headwidth=4, color=ARROW, zorder=3
-    )
-
-
-def _around(xy: FloatArray) -> Window:
-    """Box of a path (T, 2) with a margin."""
-    box = robust_window(xy) or Window(-np.ones(2), np.ones(2))
-    return box.shaped(SQUARE, 0.5, 0.06)
+    look: dict[str, Any] = {"scale": 24, "width": 0.004, "headwidth": 4, "color": ARROW, "zorder": 3}
+    axes.quiver(*chosen[:, :2, 3].T, *pointing.T, angles="xy", **look)
 
 
 def stages_figure(study: "Study") -> Figure:
@@ -172,17 +157,15 @@ def stages_figure(study: "Study") -> Figure:
         axes.tick_params(labelsize=7)
     for axes in panels[len(study.staged) :]:
         axes.set_visible(False)
-    title_and_legend(
-        figure,
-        f"{safe_text(study.subject.label)}, N = {study.recorded.features}: cause by cause, from above, m",
-        handles,
-    )
+    label = safe_text(study.subject.label)
+    title_and_legend(figure, f"{label}, N = {study.recorded.features}: cause by cause, from above, m", handles)
     return figure
 
 
 def sweep_figure(studies: Several["Study"]) -> Figure:
     """Two maps over features and V for each recording, and below them the filter of figure 9 cause by cause."""
-    heights = [h for s in studies for h in (MAP_ROW * _rows(s) + ROOM, BAR * len(s.staged) + ROOM)]
+    rows = [len({outcome.settings.pixel_variance for outcome in study.swept}) for study in studies]
+    heights = [h for n, s in zip(rows, studies, strict=True) for h in (MAP_ROW * n + ROOM, BAR * len(s.staged) + ROOM)]
     figure = Figure(figsize=(SCREEN.width, sum(heights) + 1.0))
     grid = figure.add_gridspec(2 * len(studies), 2, height_ratios=heights)
     for i, study in enumerate(studies):
@@ -197,20 +180,13 @@ def sweep_figure(studies: Several["Study"]) -> Figure:
     return figure
 
 
-def _rows(study: "Study") -> int:
-    return len({outcome.settings.pixel_variance for outcome in study.swept})
-
-
 def _map(axes: Axes, study: "Study", outcomes: Several["Outcome"]) -> None:
     features = sorted({o.settings.features or 0 for o in study.swept})
     noises = sorted({o.settings.pixel_variance for o in study.swept})
-    axes.set_xlim(-0.5, len(features) - 0.5)
-    axes.set_ylim(-0.5, len(noises) - 0.5)
+    axes.set(xlim=(-0.5, len(features) - 0.5), ylim=(-0.5, len(noises) - 0.5), xlabel="features", ylabel="V, px²")
     axes.grid(visible=False)
     axes.set_xticks(range(len(features)), [str(n) for n in features])
     axes.set_yticks(range(len(noises)), [f"{v:g}" for v in noises])
-    axes.set_xlabel("features")
-    axes.set_ylabel("V, px²")
     if not outcomes:
         axes.text(0.5, 0.5, "nothing to repair was found", transform=axes.transAxes, ha="center", va="center")
     broken = []
@@ -238,15 +214,12 @@ def _bars(axes: Axes, study: "Study") -> None:
     """Bars of the RMS distance from dead reckoning after each repair."""
     values = [staged.outcome.apart_rmse for staged in study.staged]
     rows = range(len(values))
-    style: dict[str, Any] = {"height": 0.62, "color": "#7a8794"}
-    axes.barh(rows, np.nan_to_num(values), **style)
+    axes.barh(rows, np.nan_to_num(values), height=0.62, color="#7a8794")
     axes.set_yticks(rows, [staged.stage.name for staged in study.staged])
     axes.invert_yaxis()
-    axes.set_xscale("log")
     finite = [v for v in values if np.isfinite(v) and v > 0] or [1.0]
-    axes.set_xlim(min(finite) / 3.0, max(finite) * 100.0)
+    axes.set(xscale="log", xlim=(min(finite) / 3.0, max(finite) * 100.0), xlabel="m from dead reckoning (RMS)")
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel("m from dead reckoning (RMS)")
     for row, staged in zip(rows, study.staged, strict=True):
         o = staged.outcome
         lost = f", lost at {plural(o.lost, 'frame')}" if o.lost else ""

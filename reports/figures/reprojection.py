@@ -13,13 +13,17 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.geometry import FloatArray
 
+from .legend import swatch, title_and_legend
 from .over_time import Panel, time_axis, time_panels
-from .panels import Line, fit_log, log_where_positive, plot_series, running_median, short, smoothed
-from .run_data import RunData, RunDetails
-from .style import GRAY, GREEN, SCREEN, Style, label, stacked_panels, swatch, title_and_legend
+from .palette import GRAY, GREEN
+from .panels import fit_log, log_where_positive, plot_series, running_median, short, smoothed
+from .run_data import RunData
+from .style import SCREEN, Line, Style, label, stacked_panels
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from fgbaseline.compare.estimate_comparison import Run
 
 SMALL_ERROR = 3.0
 """px, a column of the tables"""
@@ -46,20 +50,18 @@ def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None
     if not style.titled:
         panel = Panel("median error, px", "reprojection_median", 1.2, decades=5.0, smooth=True)
         return time_panels(run, [panel], "", style)
-    if run.observed is None or len(run.observed.problem.sequence.observations) == 0:
+    if run.run is None or len(run.run.problem.sequence.observations) == 0:
         return None
     figure, (upper, lower) = stacked_panels(5.6, 2, height_ratios=[2, 1])
     medians = {name: running_median(values) for name, values in run.column("reprojection_median").items()}
     handles = plot_series(upper, run.t, medians, run.line(), linewidth=1.0)
     fit_log(upper, medians)
     _mark_small_error(upper, vertical=False)
-    upper.set_ylabel("median error, px")
-    upper.set_title(smoothed(len(run.t)))
-    counts = observations_by_frame(run.observed.problem)
+    upper.set(ylabel="median error, px", title=smoothed(len(run.t)))
+    counts = observations_by_frame(run.run.problem)
     colors = [BANDS[name][0] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
-    lower.set_ylabel("observations per frame")
-    lower.set_ylim(bottom=0)
+    lower.set(ylabel="observations per frame", ylim=(0, None))
     time_axis(run, [upper, lower])
     bands = [swatch(BANDS[name][0], name) for name in counts if counts[name].any()]
     title_and_legend(figure, "Median reprojection error by frame, and the observations", [*handles, *bands])
@@ -68,7 +70,7 @@ def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None
 
 def reprojection_distribution(run: RunData) -> Figure | None:
     """Share of observations below a reprojection error, for each estimator; None without any."""
-    tables = {} if run.observed is None else {n: t for n, t in run.observed.reprojection.items() if len(t)}
+    tables = {r.name: r.reprojection for r in run.answered if len(r.reprojection)}
     if not tables:
         return None
     used = {name: table.loc[table["used"], "error"] for name, table in tables.items()}
@@ -95,13 +97,11 @@ def distribution(
         handles += axes.plot(GRID, 100.0 * share_within(known, GRID), **{**line(name), "linestyle": "solid"})
         if name in dashed:
             axes.plot(GRID, 100.0 * share_within(dashed[name], GRID), **{**line(name), **DASHED, "label": None})
-    axes.set_xscale("log")
     ends = [np.nanpercentile(known, (1, 99)) for known in errors.values() if known.notna().any()]
     first, last = min((e[0] for e in ends), default=0.5), max((e[1] for e in ends), default=30.0)
-    axes.set_xlim(float(np.clip(first, GRID[0], 0.5)), float(np.clip(last, 30.0, GRID[-1])))
-    axes.set_ylim(0.0, 101.0)
-    axes.set_xlabel("reprojection error, px (norm of the four differences)")
-    axes.set_ylabel("share of observations, %")
+    shown = float(np.clip(first, GRID[0], 0.5)), float(np.clip(last, 30.0, GRID[-1]))
+    axes.set(xscale="log", xlim=shown, ylim=(0.0, 101.0))
+    axes.set(xlabel="reprojection error, px (norm of the four differences)", ylabel="share of observations, %")
     for text, look in zip(labels, ({}, DASHED), strict=False):
         handles += axes.plot([], [], color=GRAY, label=text, **look)
     title_and_legend(figure, "Share of observations below a reprojection error", handles)
@@ -110,26 +110,26 @@ def distribution(
 
 def reprojection_classes(run: RunData) -> Figure | None:
     """Median error of each class, and chi-square of the tracks beside that of the noise as assumed."""
-    if run.observed is None or not run.observed.classes:
+    classes = _classes(run)
+    if run.run is None or not classes:
         return None
     figure = Figure(figsize=(SCREEN.width, 3.8))
     panels = figure.subplots(1, 3).ravel()
     handles: list[Any] = []
     for panel, (by, title) in zip(panels, CLASSES.items(), strict=False):
-        tables = {n: c.loc[c["by"] == by].set_index("of")["median"] for n, c in run.observed.classes.items()}
+        tables = {n: c.loc[c["by"] == by].set_index("of")["median"] for n, c in classes.items()}
         handles += medians_by_class(panel, tables, run.line())
         panel.set_title(title)
         log_where_positive(panel)
     panels[0].set_ylabel("median error, px")
-    handles += _track_chi_square(panels[2], run.observed, run.line())
+    handles += _track_chi_square(panels[2], run.run, list(classes), run.line())
     title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
     return figure
 
 
 def image_regions(run: RunData) -> Figure | None:
     """Median error in each ninth of the image as a map of 3 x 3, a panel for each estimator; None without any."""
-    tables = {} if run.observed is None else run.observed.classes
-    maps = {name: _ninths(table) for name, table in tables.items()}
+    maps = {name: _ninths(table) for name, table in _classes(run).items()}
     positive = np.concatenate([m[m > 0.0] for m in maps.values()] or [np.empty(0)])
     if len(positive) == 0:
         return None
@@ -152,6 +152,11 @@ def image_regions(run: RunData) -> Figure | None:
         panel.set_visible(False)
     title_and_legend(figure, "Median reprojection error by place in the left image, px")
     return figure
+
+
+def _classes(run: RunData) -> "dict[str, pd.DataFrame]":
+    """Median errors by class of each estimator that has any: see `compare.residual_patterns`."""
+    return {r.name: r.evidence.patterns for r in run.answered if len(r.evidence.patterns)}
 
 
 def _ninths(classes: "pd.DataFrame") -> FloatArray:
@@ -200,13 +205,12 @@ def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
     return np.searchsorted(known, limits, side="right") / max(1, len(errors))
 
 
-def _track_chi_square(panel: Axes, observed: RunDetails, line: Line) -> list[Any]:
+def _track_chi_square(panel: Axes, run: "Run", names: Iterable[str], line: Line) -> list[Any]:
     """Share of tracks whose chi-square per degree of freedom is at most x, over x, and what is expected."""
     degrees = np.empty(0)
-    for name in observed.classes:
-        tracks = compare.track_chi_square(
-            observed.problem, compare.evaluated_rows(observed.problem, observed.reprojection[name])
-        )
+    for name in names:
+        rows = compare.evaluated_rows(run.problem, run.results[name].reprojection)
+        tracks = compare.track_chi_square(run.problem, rows)
         degrees = np.concatenate([degrees, tracks["degrees"].to_numpy(dtype=np.float64)])
         ratio = np.sort((tracks["squared"] / tracks["degrees"]).to_numpy(dtype=np.float64))
         share = np.arange(1, len(ratio) + 1) / max(1, len(ratio))
@@ -215,21 +219,17 @@ def _track_chi_square(panel: Axes, observed: RunDetails, line: Line) -> list[Any
     expected = 1.0 - compare.p_value(RATIOS[:, None] * each, each) @ counts / max(1, len(degrees))
     look: dict[str, Any] = {"color": GREEN, "linewidth": 1.0, "linestyle": ":", "label": "noise as assumed"}
     drawn = panel.plot(RATIOS, 100.0 * expected, **look)
-    panel.set_xscale("log")
-    panel.set_xlim(RATIOS[0], RATIOS[-1])
-    panel.set_ylim(0.0, 101.0)
-    panel.set_xlabel("chi-square per degree of freedom")
-    panel.set_ylabel("share of tracks, %")
-    panel.set_title("tracks by chi-square")
+    panel.set(xscale="log", xlim=(RATIOS[0], RATIOS[-1]), ylim=(0.0, 101.0), title="tracks by chi-square")
+    panel.set(xlabel="chi-square per degree of freedom", ylabel="share of tracks, %")
     return list(drawn)
 
 
 def _mark_small_error(axes: Axes, *, vertical: bool) -> None:
     style: dict[str, Any] = {"color": "#888888", "linewidth": 0.9, "linestyle": ":", "zorder": 1.8}
-    letters: dict[str, Any] = {"fontsize": 8.5, "color": GRAY}
+    letters: dict[str, Any] = {"fontsize": 8.5, "color": GRAY, "ha": "left"}
     if vertical:
         axes.axvline(SMALL_ERROR, **style)
-        axes.text(SMALL_ERROR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), ha="left", va="bottom", **letters)
+        axes.text(SMALL_ERROR, 0.02, " 3 px", transform=axes.get_xaxis_transform(), va="bottom", **letters)
     else:
         axes.axhline(SMALL_ERROR, **style)
-        axes.text(1.003, SMALL_ERROR, "3 px", transform=axes.get_yaxis_transform(), ha="left", va="center", **letters)
+        axes.text(1.003, SMALL_ERROR, "3 px", transform=axes.get_yaxis_transform(), va="center", **letters)

@@ -1,22 +1,20 @@
 """All figures of a run, in the order in which the page shows them, and those of its folder for a paper."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from .drawing import encoded_in_background
+from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
 from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
-from .layout import lay_out
 from .over_time import divergence, error_to_truth, height, time_per_frame
 from .panels import smoothed
 from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
 from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
 from .saving import EncodedFigure
-from .style import PAPER, in_style
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
@@ -36,40 +34,36 @@ OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
     map_difference,
 )
 """each gives None where the run has no data for it"""
-PAPER_FIGURES: Mapping[str, tuple[Callable[[RunData], Figure | None], str]] = {
-    "paths": (partial(paths_overlaid, style=PAPER), "Trajectories on {sequence} from above."),
+PAPER_FIGURES: Captioned = {
+    "paths": (paths_overlaid, "Trajectories on {sequence} from above."),
     "landmarks": (
-        lambda run: path_with_landmarks(run, estimator_with_landmarks(run), PAPER),
+        lambda run, style: path_with_landmarks(run, estimator_with_landmarks(run), style),
         "Trajectory and landmarks of {mapped} on {sequence} from above.",
     ),
     "divergence": (
-        partial(divergence, style=PAPER),
+        divergence,
         "Position and rotation divergence from the reference, {reference} ({trust}), on {sequence}, without alignment.",
     ),
-    "error_to_truth": (partial(error_to_truth, style=PAPER), "Error to ground truth on {sequence}, without alignment."),
+    "error_to_truth": (error_to_truth, "Error to ground truth on {sequence}, without alignment."),
     "reprojection": (
-        partial(reprojection_over_time, style=PAPER),
+        reprojection_over_time,
         "Median reprojection error of each frame of {sequence} (norm of the four pixel differences){smoothed}.",
     ),
     "consistency": (
-        partial(consistency, style=PAPER),
+        consistency,
         "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
         "sigma ratios of the position are to {reference}{smoothed_nis}.",
     ),
-    "held_out": (
-        partial(held_out, style=PAPER),
-        "Median held-out error on {sequence}, with 95 % intervals.",
-    ),
+    "held_out": (held_out, "Median held-out error on {sequence}, with 95 % intervals."),
     "map_difference": (
-        partial(map_difference, style=PAPER),
+        map_difference,
         "Median distance of landmarks from those of {reference}, in the camera frame, by depth.",
     ),
-    "time_per_frame": (partial(time_per_frame, style=PAPER), "Time per frame on {sequence}{smoothed}."),
+    "time_per_frame": (time_per_frame, "Time per frame on {sequence}{smoothed}."),
 }
-"""name -> figure, which may be None, and caption"""
 
 
-def draw(run: "Run") -> dict[str, Figure]:
+def figure_functions(run: RunData) -> dict[str, DrawOne]:
     """Figures of a run by name, as `DIR/figures` and the page have them; none where no estimator answered.
 
     `paths_overlaid`, `paths_side_by_side`, `path_NAME` for each estimator that answered, then those over time that
@@ -77,29 +71,21 @@ def draw(run: "Run") -> dict[str, Figure]:
     `three_sigma_NAME` of each that has covariances, where there is truth, and its `velocity_and_biases_NAME` where it
     has them.
     """
-    with in_style():
-        drawn = {name: draw_one() for name, draw_one in figure_functions(of_run(run)).items()}
-        figures = {name: figure for name, figure in drawn.items() if figure is not None}
-        for figure in figures.values():
-            lay_out(figure)
+    if not run.names:
+        return {}
+    figures: dict[str, DrawOne] = {one.__name__: partial(one, run) for one in (paths_overlaid, paths_side_by_side)}
+    figures |= {f"path_{name}": partial(path_with_landmarks, run, name) for name in run.names}
+    figures |= {one.__name__: partial(one, run) for one in OVER_TIME}
+    for r in run.answered:
+        error, covariance, look = r.evidence.error, r.estimate.covariance, run.line()(r.name)
+        figures[f"three_sigma_{r.name}"] = partial(three_sigma, r.name, run.t, error, covariance, look)
+        figures[f"velocity_and_biases_{r.name}"] = partial(velocity_and_biases, run, r.name)
     return figures
 
 
-def figure_functions(run: RunData) -> dict[str, Callable[[], Figure | None]]:
-    """Functions that draw each of these figures, within `in_style()` and without layout; each may answer None."""
-    if not run.names:
-        return {}
-    overlaid: dict[str, Callable[[], Figure | None]] = {
-        "paths_overlaid": partial(paths_overlaid, run),
-        "paths_side_by_side": partial(paths_side_by_side, run),
-    }
-    paths = {f"path_{name}": partial(path_with_landmarks, run, name) for name in run.names}
-    over_time = {draw_one.__name__: partial(draw_one, run) for draw_one in OVER_TIME}
-    bands: dict[str, Callable[[], Figure | None]] = {}
-    for name in run.names:
-        bands |= {f"three_sigma_{name}": partial(three_sigma, run, name)}
-        bands |= {f"velocity_and_biases_{name}": partial(velocity_and_biases, run, name)}
-    return {**overlaid, **paths, **over_time, **bands}
+def draw(run: "Run") -> dict[str, Figure]:
+    """Figures of a run by name, those of `figure_functions` that have something to show."""
+    return drawn(figure_functions(of_run(run)))
 
 
 def draw_for_paper(run: RunData) -> dict[str, tuple[Figure, str]]:
@@ -109,32 +95,16 @@ def draw_for_paper(run: RunData) -> dict[str, tuple[Figure, str]]:
         "smoothed": remark and f", {remark}",
         "smoothed_nis": remark and f"; NIS: {remark}",
         "sequence": run.sequence,
-        "reference": run.reference,
+        "reference": str(run.reference),
         "trust": run.trust,
         "mapped": estimator_with_landmarks(run) or "",
     }
-    drawn = {}
-    with in_style(PAPER):
-        for name, (draw_one, caption) in PAPER_FIGURES.items():
-            figure = draw_one(run)
-            if figure is not None:
-                lay_out(figure)
-                drawn[name] = (figure, caption.format(**words))
-    return drawn
+    return drawn_for_paper(run, PAPER_FIGURES, words)
 
 
-@contextmanager
-def drawn_in_background(run: "Run", processes: int) -> Iterator[Callable[[], dict[str, EncodedFigure]]]:
+def drawn_in_background(run: "Run", processes: int) -> AbstractContextManager[Callable[[], dict[str, EncodedFigure]]]:
     """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, written as PNG and SVG.
 
-    The bytes are the same however many processes share the work. The figures over time, which take longest, are the
-    last and come first.
+    The figures over time, which take longest, are the last and come first.
     """
-    with encoded_in_background(figure_functions(of_run(run)), processes) as drawn:
-        yield drawn
-
-
-def draw_and_write(run: "Run", processes: int = 1) -> dict[str, EncodedFigure]:
-    """Figures as `drawn_in_background` gives them, with nothing else to do meanwhile."""
-    with drawn_in_background(run, processes) as drawn:
-        return drawn()
+    return encoded_in_background(figure_functions(of_run(run)), processes)

@@ -8,36 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.data import Problem
 from fgbaseline.data.formats.named_file import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..results.documents import SUMMARY, document_in
 from ..results.reader import RunFolder
-from .panels import Line
-from .style import SCREEN, Style, colors, line, marked_line
+from .palette import colors
+from .style import SCREEN, Line, Style, lines
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from fgbaseline.compare.estimate_comparison import Result, Run
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class RunDetails:
-    """Data that only a run in memory has."""
-
-    problem: Problem
-    reprojection: "Mapping[str, pd.DataFrame]"
-    """by estimator, one row per observation of its landmarks: see `compare.reprojection`"""
-    classes: "Mapping[str, pd.DataFrame]"
-    """see `compare.residual_patterns`"""
-    directions: Mapping[str, FloatArray]
-    """(T, 2) where the camera looks, seen from above"""
-    errors: Mapping[str, tuple[FloatArray, FloatArray]]
-    """error of each pose in its own body frame (T, 6), and its covariance (T, 6, 6); nothing without truth"""
-    held_out_tracks: int
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,8 +51,13 @@ class RunData:
     """see `compare.held_out_ranking`, best first; None without held-out tracks"""
     by_depth: "Mapping[str, pd.DataFrame]"
     """by estimator: see `compare.map_by_depth`"""
-    observed: RunDetails | None = None
+    run: "Run | None" = None
     """None where the data come from a folder"""
+
+    @property
+    def answered(self) -> "list[Result]":
+        """Results with a trajectory; none where the data come from a folder."""
+        return [] if self.run is None else self.run.answered
 
     @property
     def colors(self) -> dict[str, str]:
@@ -78,17 +66,20 @@ class RunData:
 
     def line(self, style: Style = SCREEN, points: int | None = None) -> Line:
         """Look of the line of an estimator in a style, with so many points (default: one a frame)."""
-        chosen, reference = self.colors, self.reference
-        if style is SCREEN:
-            return lambda name: line(name, chosen[name], reference)
-        others = [name for name in self.names if name != reference]
-        n = len(self.t) if points is None else points
-        return lambda name: marked_line(name, chosen[name], reference, others, n)
+        return lines(style, self.colors, self.reference, self.names, len(self.t) if points is None else points)
 
-    def column(self, name: str, without: str | None = None) -> dict[str, FloatArray]:
-        """(T,) values of a column of the series by estimator, where any of them is finite."""
+    def column(self, name: str) -> dict[str, FloatArray]:
+        """(T,) values of a column of the series by estimator, where any of them is finite.
+
+        The reference is not compared with itself.
+        """
+        without = self.reference if name.startswith("divergence_") else None
         values = {n: s[name].to_numpy(dtype=np.float64) for n, s in self.series.items() if name in s and n != without}
         return {n: v for n, v in values.items() if np.isfinite(v).any()}
+
+    def milliseconds(self) -> dict[str, FloatArray]:
+        """(T,) time per frame of each estimator that measured any."""
+        return {name: 1e3 * seconds for name, seconds in self.column("seconds").items() if seconds.any()}
 
     @property
     def nis_rows(self) -> float | None:
@@ -100,18 +91,15 @@ class RunData:
 
 def of_run(run: "Run") -> RunData:
     """Data of a run in memory."""
-    answered, sequence, held = run.answered, run.problem.sequence, run.held_out
-    view, optical_axis = TopView.of(run.problem), sequence.imu_T_cam[:3, 2]
+    answered, sequence, held, view = run.answered, run.problem.sequence, run.held_out, TopView.of(run.problem)
     landmarks = {r.name: r.estimate.landmarks.position for r in answered}
     maps = {r.name: r.evidence.map for r in answered}
-    errors = {r.name: (r.evidence.error, r.estimate.covariance) for r in answered}
-    reference = None if run.reference is None else run.results[run.reference].estimate
     return RunData(
         sequence=sequence.name,
         every=tuple(run.results),
         names=tuple(r.name for r in answered),
         reference=run.reference,
-        by_products=frozenset() if reference is None else frozenset(reference.by_products),
+        by_products=run.by_products,
         trust=run.trust.verdict.name.lower(),
         t=np.asarray(sequence.t - sequence.t[0], dtype=np.float64),
         paths={r.name: view.scene(r.estimate.world_T_imu[:, :3, 3]) for r in answered},
@@ -120,14 +108,7 @@ def of_run(run: "Run") -> RunData:
         series={r.name: _series(r, len(sequence.t)) for r in answered},
         held_out=None if held is None or len(held.ranking) == 0 else held.ranking.reset_index(),
         by_depth={name: compare.map_by_depth(m) for name, m in maps.items() if m is not None and len(m)},
-        observed=RunDetails(
-            problem=run.problem,
-            reprojection={r.name: r.reprojection for r in answered},
-            classes={r.name: r.evidence.patterns for r in answered if len(r.evidence.patterns)},
-            directions={r.name: view.plane(r.estimate.world_T_imu[:, :3, :3] @ optical_axis) for r in answered},
-            errors={name: (e, P) for name, (e, P) in errors.items() if e is not None and P is not None},
-            held_out_tracks=0 if held is None or held.errors is None else held.errors.inliers,
-        ),
+        run=run,
     )
 
 
@@ -135,29 +116,21 @@ def _series(result: "Result", n_frames: int) -> "pd.DataFrame":
     import pandas as pd
 
     evidence, estimate = result.evidence, result.estimate
-    parts: list[tuple[str, pd.DataFrame | None]] = [
-        ("divergence", result.divergence),
-        ("truth", result.truth),
-        ("sigma_ratio", evidence.sigma_ratio),
-    ]
-    columns: dict[str, Any] = {
-        f"{prefix}_{name}": values.to_numpy()
-        for prefix, table in parts
-        if table is not None
-        for name, values in table.items()
-    }
-    medians = result.reprojection.groupby("frame")["error"].median()
-    columns["reprojection_median"] = medians.reindex(range(n_frames)).to_numpy(dtype=np.float64)
-    if result.nees is not None:
-        columns["nees"] = result.nees
-    if evidence.difference is not None:
-        columns["nees_reference"] = evidence.difference.nees
-    if estimate.innovations is not None:
-        columns |= {"nis_per_row": evidence.nis_per_degree, "nis_degrees": estimate.innovations.degrees}
+    parts = {"divergence_": result.divergence, "truth_": result.truth, "sigma_ratio_": evidence.sigma_ratio}
     if result.inertial is not None:
-        columns |= {str(name): values.to_numpy() for name, values in result.inertial.series.items()}
-    columns["seconds"] = estimate.seconds if len(estimate.seconds) == n_frames else np.full(n_frames, np.nan)
-    return pd.DataFrame(columns)
+        parts[""] = result.inertial.series
+    table = pd.DataFrame(index=pd.RangeIndex(n_frames, name="frame"))
+    for prefix, part in parts.items():
+        table = table if part is None else table.join(part.add_prefix(prefix))
+    table["reprojection_median"] = result.reprojection.groupby("frame")["error"].median()
+    if result.nees is not None:
+        table["nees"] = result.nees
+    if evidence.difference is not None:
+        table["nees_reference"] = evidence.difference.nees
+    if estimate.innovations is not None:
+        table["nis_per_row"], table["nis_degrees"] = evidence.nis_per_degree, estimate.innovations.degrees
+    table["seconds"] = estimate.seconds if len(estimate.seconds) == n_frames else np.nan
+    return table
 
 
 def of_folder(folder: Path) -> RunData:

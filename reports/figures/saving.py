@@ -16,8 +16,6 @@ from PIL import Image
 from .layout import without_layout_engine
 from .style import SCREEN, Style, in_style
 
-FORMATS: Final = ("pdf", "svg", "png")
-"""forms of the files of a paper"""
 CAPTIONS: Final = "captions.json"
 UNDATED: Mapping[str, Mapping[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """metadata without the time of writing"""

@@ -1,74 +1,31 @@
-"""Two styles of all figures, for the screen and for paper: colors, sheets, lines, legends and safe text.
+"""Two styles of all figures, for the screen and for paper: settings, sheets, and the looks of lines."""
 
-An estimator has one color and dash in every figure and on the page: Okabe and Ito's colors, and dashes where
-color-blind readers could confuse two of them.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain, cycle, pairwise
 from typing import Any
 
-import numpy as np
 from matplotlib import style as rc_style
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.lines import Line2D
 
-from .coinciding import widen_coinciding
+from .palette import GRAY, TRUTH, linestyle
 
-REFERENCE = "#000000"
-TRUTH = "#7f7f7f"
-LANDMARK = "#5fb98c"
-
-ESTIMATOR_COLORS: Mapping[str, str] = {
-    "dead-reckoning": "#0072B2",
-    "ekf": "#D55E00",
-    "joint-ekf": "#E69F00",
-    "isam2": "#882255",
-    "isam2-online": "#CC79A7",
-    "fixed-lag": "#56B4E9",
-    "batch": "#009E73",
-    "landmark-mapping": "#B3A100",
-}
-"""by the name an estimator is registered under; the reference of a run is black instead, whatever its name"""
-
-EXTRA_COLORS = ("#44AA99", "#999933", "#661100", "#6699CC", "#AA4499", "#332288")
-"""for estimators of other packages, once the colors are used up that this run leaves"""
-DASHED, DASH_DOT, DASH_DOT_DOT = (6.0, 3.0), (8.0, 2.5, 1.5, 2.5), (8.0, 2.0, 1.5, 2.0, 1.5, 2.0)
-"""lengths of dashes and gaps, px on the page"""
-DASHES: Mapping[str, tuple[float, ...]] = {
-    TRUTH: DASHED,
-    "#0072B2": DASHED,
-    "#CC79A7": DASH_DOT,
-    "#B3A100": DASHED,
-    "#44AA99": DASH_DOT_DOT,
-    "#999933": DASH_DOT,
-    "#661100": DASHED,
-    "#6699CC": DASHED,
-    "#AA4499": DASH_DOT,
-    "#332288": DASH_DOT_DOT,
-}
-"""dashes of the lines of a color, solid without: two colors that color-blind readers may confuse differ in these"""
-DARK_GROUND, DARK_INK, DARK_CHROMA = "#1d2126", "#edf0f2", 1.15
-"""ground and black ink of a figure on a dark page, and by how much colors are stronger there"""
-
-MAX_NAME = 48
-"""characters of a name that a figure has room for"""
-GREEN, BAND, GRAY = "#6b9a72", "#d7e8d9", "#555555"
-"""expected values, the band around them, and marks of no estimator"""
 MARKERS = "os^Dv<P*X>"
 """markers of lines on paper, distinguished without color"""
 MARKS_PER_LINE = 8
 """marks of a line on paper"""
 REFERENCE_ORDER = 2.0
 """zorder of the reference, below the other lines"""
+MAX_NAME = 48
+"""characters of a name that a figure has room for"""
 WHITE: Mapping[str, Any] = {"color": "white", "markeredgecolor": "black", "zorder": 5}
 """marks of a start or an end"""
+
+Line = Callable[[str], Mapping[str, Any]]
+"""look of the line of an estimator"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -86,6 +43,8 @@ class Style:
     """characters in a row of the legend"""
     spare: int
     """letters that the mark of each entry takes"""
+    line: float
+    """width of an estimator's line, points; the reference's is twice that"""
     truth: Mapping[str, Any]
     """line of the true path"""
     titled: bool
@@ -110,7 +69,6 @@ SCREEN = Style(
         "font.size": 9.5,
         "axes.titlesize": 10,
         "axes.titlelocation": "left",
-        "axes.labelsize": 9.5,
         "axes.edgecolor": GRAY,
         "axes.labelcolor": "#333333",
         "grid.linewidth": 0.7,
@@ -119,12 +77,8 @@ SCREEN = Style(
         "xtick.labelsize": 9,
         "ytick.labelsize": 9,
         "lines.linewidth": 1.4,
-        "legend.fontsize": 9.5,
         "legend.handlelength": 1.6,
         "figure.dpi": 150,  # so that letters are measured once for layout and PNG
-        "figure.facecolor": "white",
-        "savefig.facecolor": "white",
-        "svg.fonttype": "path",
         "path.simplify_threshold": 0.25,
         "agg.path.chunksize": 0,
     },
@@ -133,6 +87,7 @@ SCREEN = Style(
     room=1.2,
     letters=92,
     spare=6,
+    line=1.3,
     truth={"color": TRUTH, "linewidth": 1.8, "linestyle": (0, (4, 2)), "zorder": 2.2, "label": "truth"},
     titled=True,
 )
@@ -140,7 +95,6 @@ PAPER = Style(
     settings={
         **SHARED,
         "font.size": 7,
-        "axes.labelsize": 7,
         "axes.titlesize": 7,
         "xtick.labelsize": 6.5,
         "ytick.labelsize": 6.5,
@@ -162,44 +116,10 @@ PAPER = Style(
     room=0.55,
     letters=58,
     spare=8,
+    line=0.8,
     truth={"color": TRUTH, "linewidth": 2.4, "alpha": 0.6, "zorder": 1.8, "label": "truth"},
     titled=False,
 )
-
-
-def colors(names: Iterable[str], reference: str | None) -> dict[str, str]:
-    """Color of each of the names.
-
-    The reference is black, a known name has its own color, and the others take, in their order, those colors that
-    none of the names has.
-    """
-    every = list(names)
-    taken = {name: ESTIMATOR_COLORS[name] for name in every if name in ESTIMATOR_COLORS}
-    free = [color for color in ESTIMATOR_COLORS.values() if color not in taken.values()]
-    rest = chain(free, EXTRA_COLORS, cycle(EXTRA_COLORS))
-    chosen: dict[str, str] = {}
-    for name in every:
-        if name == reference:
-            chosen[name] = REFERENCE
-        else:
-            chosen[name] = taken[name] if name in taken else next(rest)
-    return chosen
-
-
-def on_dark(color: str) -> str:
-    """Color in place of `color` where the ground is dark: as `dark_matrix` makes it of a still figure."""
-    matrix = np.array(dark_matrix())
-    rgb = np.clip(matrix[:, :3] @ to_rgb(color) + matrix[:, 3], 0.0, 1.0)
-    return to_hex((float(rgb[0]), float(rgb[1]), float(rgb[2]))).upper()
-
-
-@cache
-def dark_matrix() -> tuple[tuple[float, ...], ...]:
-    """Affine map (3, 4) of sRGB values in [0, 1]: white becomes the dark ground, black light ink, hues stay."""
-    luma = np.tile([0.2126, 0.7152, 0.0722], (3, 1))
-    ground, ink = np.array(to_rgb(DARK_GROUND)), np.array(to_rgb(DARK_INK))
-    linear = DARK_CHROMA * (np.eye(3) - luma) + (ground - ink)[:, None] * luma
-    return tuple(tuple(round(float(v), 4) for v in (*row, at)) for row, at in zip(linear, ink, strict=True))
 
 
 def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
@@ -214,96 +134,36 @@ def stacked_panels(height: float, rows: int = 1, style: Style = SCREEN, **grid: 
     return figure, list(axes[:, 0])
 
 
-def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
-    """Title on top of a figure (not on paper) and below it one legend: each label once, in rows.
+def lines(style: Style, colors: Mapping[str, str], reference: str | None, names: Sequence[str], points: int) -> Line:
+    """Looks of the estimators' lines, the reference below the others and thick.
 
-    Called when the panels are drawn. On the screen the lower ones of lines that coincide become wider.
+    On paper the others have marks: `names` are those shown, and each line has so many points.
     """
-    by_label = {str(handle.get_label()): handle for handle in handles}
-    figure.set_label(title)
-    if not style.titled and not by_label:
-        return
-    bold: dict[str, Any] = {"title": title, "title_fontproperties": {"weight": "bold", "size": 11.5}}
-    legend = figure.legend(
-        list(by_label.values()),
-        list(by_label),
-        loc="outside upper left",
-        ncols=_legend_columns([len(text) + style.spare for text in by_label], style.letters),
-        **({"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}),
-    )
-    legend.get_title().set_color("#222222")
-    for axes in figure.axes if style.titled else []:
-        widen_coinciding(axes, REFERENCE_ORDER)
+    others = [name for name in names if name != reference]
 
+    def look(name: str) -> dict[str, Any]:
+        color = colors[name]
+        base: dict[str, Any] = {"color": color, "linestyle": linestyle(color), "label": label(name, reference)}
+        if name == reference:
+            return base | {"linewidth": 2.0 * style.line, "zorder": REFERENCE_ORDER}
+        base |= {"linewidth": style.line, "zorder": 2.5}
+        if style.titled:
+            return base
+        number, apart = others.index(name), max(1, points // MARKS_PER_LINE)
+        return base | {
+            "marker": MARKERS[number % len(MARKERS)],
+            "markevery": (apart * number // len(others), apart),
+            "markersize": 3.0,
+            "markerfacecolor": "white",
+            "markeredgewidth": 0.7,
+        }
 
-def _legend_columns(widths: Sequence[int], room: int) -> int:
-    """Most columns that fit into the room; entries of these widths fill a legend column by column."""
-    for columns in range(len(widths), 1, -1):
-        each, longer = divmod(len(widths), columns)
-        ends = np.cumsum([0] + [each + (i < longer) for i in range(columns)])
-        if sum(max(widths[i:j]) for i, j in pairwise(ends.tolist())) <= room:
-            return columns
-    return 1
-
-
-def linestyle(color: str) -> str | tuple[float, tuple[float, ...]]:
-    """Matplotlib's line style of a color."""
-    return (0.0, tuple(0.6 * length for length in DASHES[color])) if color in DASHES else "solid"
-
-
-def line(name: str, color: str, reference: str | None) -> dict[str, Any]:
-    """Look of an estimator's line on the screen: the reference lies below the others, and shows beside them."""
-    thick = name == reference
-    return {
-        "color": color,
-        "linestyle": linestyle(color),
-        "linewidth": 2.6 if thick else 1.3,
-        "zorder": REFERENCE_ORDER if thick else 2.5,
-        "label": label(name, reference),
-    }
-
-
-def marked_line(name: str, color: str, reference: str | None, others: Sequence[str], points: int) -> dict[str, Any]:
-    """Look of an estimator's line of so many points on paper: the reference thick and lowest, the `others` marked."""
-    look: dict[str, Any] = {"color": color, "linestyle": linestyle(color), "label": label(name, reference)}
-    if name == reference:
-        return look | {"linewidth": 1.6, "zorder": REFERENCE_ORDER}
-    number, apart = others.index(name), max(1, points // MARKS_PER_LINE)
-    return look | {
-        "linewidth": 0.8,
-        "zorder": 2.5,
-        "marker": MARKERS[number % len(MARKERS)],
-        "markevery": (apart * number // len(others), apart),
-        "markersize": 3.0,
-        "markerfacecolor": "white",
-        "markeredgewidth": 0.7,
-    }
+    return look
 
 
 def label(name: str, reference: str | None) -> str:
     """Name of an estimator in a legend."""
     return safe_text(name) + (" (reference)" if name == reference else "")
-
-
-def note(axes: Axes, text: str) -> None:
-    """Remark in the lower right corner of a panel."""
-    axes.text(
-        0.995,
-        0.015,
-        text,
-        transform=axes.transAxes,
-        ha="right",
-        va="bottom",
-        fontsize=8.5,
-        color="#444444",
-        zorder=6,
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.5},
-    )
-
-
-def swatch(color: str, text: str, size: float = 7.0) -> Line2D:
-    """Legend's entry for an area or a cloud of points."""
-    return Line2D([], [], color=color, marker="s", linestyle="none", markersize=size, label=text)
 
 
 def safe_text(text: str) -> str:

@@ -15,8 +15,8 @@ from ..results.comparison import Summary
 from ..tables.comparison import comparison_table
 from ..tables.table import Row
 from .comparison_plots import comparison_plots
-from .page import Folded, Grid, Live, Page, Section, figure_blocks, render_page, still_figures, trust
-from .templates import picture
+from .page import Folded, Grid, Live, Page, Section, figure_blocks, pictures, still_figures, trust
+from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
@@ -43,12 +43,12 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     settings = {name: value for name, value in summary.settings.items() if value is not None}
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
-    pictures = {name: replace(picture(name, figure), caption=_caption(name)) for name, figure in figures.items()}
+    drawn = pictures(figures, CAPTIONS)
     notes = {name: estimate.notes for name, estimate in estimates.items() if estimate.notes}
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
-    bands = [p for name, p in pictures.items() if name.startswith("three_sigma_")]
-    beyond = [p for name, p in pictures.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
-    stills = figure_blocks(pictures, STILLS)
+    bands = [p for name, p in drawn.items() if name.startswith("three_sigma_")]
+    beyond = [p for name, p in drawn.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
+    stills = figure_blocks(drawn, STILLS)
     grid = Grid(
         replace(
             table,
@@ -71,11 +71,11 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                 Section(
                     "over-time",
                     "Over time",
-                    [Live("charts"), *figure_blocks(pictures, ["growth"])],
+                    [Live("charts"), *figure_blocks(drawn, ["growth"])],
                 ),
                 Section(
                     "evidence",
-                    _beyond_title(pictures, bool(bands)),
+                    _beyond_title(drawn, bool(bands)),
                     [*beyond, *folded],
                     "Beyond the trajectories",
                 ),
@@ -84,7 +84,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             settings={"Missing values": notes, "Files": sources, "Settings": settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
-            still_paths=pictures.get("paths"),
+            still_paths=drawn.get("paths"),
         )
     )
 
@@ -107,10 +107,6 @@ def _beyond_title(names: Iterable[str], has_bands: bool) -> str:
     parts = [text for beginning, text in of.items() if any(name.startswith(beginning) for name in names)]
     title = listed([*parts, *(["±3-sigma bounds"] if has_bands else [])])
     return title[:1].upper() + title[1:]
-
-
-def _caption(name: str) -> str:
-    return next((text for beginning, text in CAPTIONS.items() if name.startswith(beginning)), "")
 
 
 def _with_intervals_below(row: Row) -> Row:

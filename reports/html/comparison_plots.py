@@ -1,22 +1,20 @@
 """Data of the plots on a comparison's page, in the form of a run's (see `plot_data.page_data`)."""
 
-from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fgbaseline import compare
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.entry import Entry
 from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData
-from ..figures.panels import nees_bounds, nees_median
+from ..figures.panels import DEGREES_OF_FREEDOM
 from ..formatting import distance
-from .plot_encoding import chart, floats, integers, median_by_frame, numbered, position_covariances
+from .plot_encoding import Chart, Lines, chart, expected, floats, grouped, integers, numbered, position_covariances
 
-GROUP = "Position and rotation"
-"""title of the charts of errors and heights"""
 MOMENTS = 4000
 """largest number of positions of the slider"""
 REFERENCE_MOMENTS = 1000
@@ -34,7 +32,6 @@ def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, 
     entries: dict[str, tuple[Entry, Result | None]] = {data.reference: (comparison.reference, None)}
     entries |= {name: (result.entry, result) for name, result in comparison.results.items()}
     start = comparison.reference.trajectory.position[0]
-    charts = [*_differences(data, t), *_heights(lines), *_consistency(comparison, data, t), *_pixels(comparison, t)]
     return {
         "frames": len(t),
         "step": "stamp" if data.stamped else "frame",
@@ -47,7 +44,7 @@ def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, 
         "camera": None,
         "observations": None,
         "reasons": {},
-        "charts": [one for one in charts if one is not None],
+        "charts": _charts(comparison, data, t, lines),
         "bookmarks": _bookmarks(comparison, data, t),
     }
 
@@ -94,61 +91,46 @@ def _estimator(
     return about
 
 
-Charts = Iterable[dict[str, Any] | None]
-
-
-def _differences(data: ComparisonData, t: FloatArray) -> Charts:
+def _charts(comparison: Comparison, data: ComparisonData, t: FloatArray, paths: Lines) -> list[Chart]:
+    """The charts in their order; those without lines are left out."""
     of, how = data.reference, data.alignment
-    wanted = {
-        "position": ("divergence", f"Position error against {of}, {how}", "m"),
-        "rotation_deg": ("rotation", f"Rotation error against {of}, {how}", "°"),
-        "along": ("along", f"Ahead of {of}", "m"),
-        "across": ("across", f"To the left of {of}", "m"),
-        "up": ("above", f"Above {of}", "m"),
-        "heading_deg": ("heading", f"Heading error against {of}, to the left", "°"),
-    }
-    for column, (name, title, unit) in wanted.items():
-        lines = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
-        yield chart(GROUP, name, title, unit, numbered((data.reference, *data.names), lines))
 
+    def lines(values: Lines) -> Lines:
+        return numbered((of, *data.names), values)
 
-def _heights(lines: Mapping[str, FloatArray]) -> Charts:
-    heights = numbered(lines, {name: path[:, 2] for name, path in lines.items()})
-    yield chart(GROUP, "height", "Height above the reference's start", "m", heights)
+    def difference(name: str, title: str, unit: str, column: str) -> Chart | None:
+        table = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
+        return chart(name, title, unit, lines(table))
 
-
-def _consistency(comparison: Comparison, data: ComparisonData, t: FloatArray) -> Charts:
     reported = {n: r.reported_covariance for n, r in comparison.results.items()}
-    lines = {n: _at(t, data.t[n], of.nees) for n, of in reported.items() if of is not None}
-    if not lines:
-        return
-    hint = "the band holds 95 % of the poses of a consistent estimator, the dotted line is their median"
-    look = {"log": True, "band": nees_bounds(), "middle": nees_median(), "hint": hint}
-    yield chart("Consistency", "nees", "NEES", "", numbered((data.reference, *data.names), lines), **look)
+    nees = {n: _at(t, data.t[n], covariance.nees) for n, covariance in reported.items() if covariance is not None}
+    poses = expected(DEGREES_OF_FREEDOM, "poses of a consistent estimator") if nees else {}  # needs scipy
+    heights, medians = {n: path[:, 2] for n, path in paths.items()}, _pixels(comparison, t)
+    along = {"log": True, "smooth": True, "hint": "with landmarks triangulated along each path"}
+    groups = {
+        "Position and rotation": [
+            difference("divergence", f"Position error against {of}, {how}", "m", "position"),
+            difference("rotation", f"Rotation error against {of}, {how}", "°", "rotation_deg"),
+            difference("along", f"Ahead of {of}", "m", "along"),
+            difference("across", f"To the left of {of}", "m", "across"),
+            difference("above", f"Above {of}", "m", "up"),
+            difference("heading", f"Heading error against {of}, to the left", "°", "heading_deg"),
+            chart("height", "Height above the reference's start", "m", lines(heights)),
+        ],
+        "Consistency": [chart("nees", "NEES", "", lines(nees), **poses)],
+        "Pixels": [chart("reprojection", "Median reprojection error by frame", "px", lines(medians), **along)],
+    }
+    return grouped(groups)
 
 
-def _pixels(comparison: Comparison, t: FloatArray) -> Charts:
-    """Median error of each frame, with landmarks triangulated along the path."""
-    sequence = comparison.sequence
-    if sequence is None:
-        return
-    stamps = sequence.t - comparison.reference.trajectory.t[0]
-    names = [comparison.reference.name, *comparison.results]
-    lines = {}
+def _pixels(comparison: Comparison, t: FloatArray) -> Lines:
+    """Median error of each frame, px, with landmarks triangulated along the path."""
+    sequence, lines = comparison.sequence, {}
     for name, pixels in comparison.pixels.items():
-        if pixels.along is not None and len(pixels.along):
-            lines[name] = _at(t, stamps, median_by_frame(pixels.along, sequence.n_frames))
-    hint = "with landmarks triangulated along each path"
-    yield chart(
-        "Pixels",
-        "reprojection",
-        "Median reprojection error by frame",
-        "px",
-        numbered(names, lines),
-        log=True,
-        smooth=True,
-        hint=hint,
-    )
+        if sequence is not None and pixels.along is not None and len(pixels.along):
+            medians = compare.reprojection_by(pixels.along, "frame")["median"].reindex(range(sequence.n_frames))
+            lines[name] = _at(t, sequence.t - comparison.reference.trajectory.t[0], medians)
+    return lines
 
 
 def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> list[dict[str, Any]]:

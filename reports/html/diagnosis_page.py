@@ -1,14 +1,13 @@
 """Page of a diagnosis."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from matplotlib.figure import Figure
 
 from ..results.diagnosis import Found
 from ..tables.run_details import findings_table
-from .page import Grid, Page, Section, Sentences, render_page
-from .templates import picture
+from .page import Grid, Page, Section, Sentences, pictures
+from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
     "angular_rates": "About each axis of imu_T_cam, moving averages. The repaired rates follow visual odometry.",
@@ -22,7 +21,6 @@ CAPTIONS: Mapping[str, str] = {
 def render(found: Found, figures: Mapping[str, Figure]) -> str:
     """`report.html` of a diagnosis."""
     sequence, table = found.sequence, findings_table(found.findings)
-    pictures = [replace(picture(name, one), caption=CAPTIONS.get(name, "")) for name, one in figures.items()]
     unknown = [Sentences(found.not_identifiable, "unknown")] if found.not_identifiable else []
     return render_page(
         Page(
@@ -33,7 +31,7 @@ def render(found: Found, figures: Mapping[str, Figure]) -> str:
             table=Section("table", "Faults", [Grid(table, "plain findings")] if table.rows else []),
             sections=[
                 Section("unknown", "Not identifiable in this recording", unknown, "Not identifiable"),
-                Section("figures", "Figures", pictures),
+                Section("figures", "Figures", list(pictures(figures, CAPTIONS).values())),
             ],
             settings={"Recording": {"name": sequence.name, "source": sequence.source, "form": sequence.form}},
         )

@@ -1,35 +1,35 @@
-"""Model of a page: sentences (made in `phrases`), tables, figures and plots in sections, for the one template."""
+"""Model of a page: sentences (made in `phrases`), tables, figures and plots in sections, for `rendering`."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from base64 import b64encode
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
-from typing import Any, ClassVar
+from typing import Any
 
-from markupsafe import Markup
+from matplotlib.figure import Figure
 
-from ..figures.style import TRUTH
-from ..phrases.evidence import FIRST
-from ..results.metric import TERMS
+from ..figures.saving import EncodedFigure, encoded
 from ..tables.table import Table
-from .interactive import line_rules, policy, script
-from .plot_encoding import TRUTH_LINE, embedded_json
-from .templates import NO_SCRIPT, Picture, asset, environment
+
+LARGEST_SVG = 200_000
+"""bytes, from which on the PNG takes its place"""
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A table; `style` is main, plain or empty."""
+    """A table, below its title or not."""
 
-    shape: ClassVar[str] = "grid"
     table: Table
     style: str = "main"
+    """main, plain or empty"""
+    badges: Mapping[str, str] = field(default_factory=dict)
+    """class of a badge by the text of its cell"""
+    is_titled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Sentences:
     """A list."""
 
-    shape: ClassVar[str] = "sentences"
     texts: Sequence[str]
     style: str = "verdict"
 
@@ -38,16 +38,34 @@ class Sentences:
 class Note:
     """A paragraph in small letters, or a heading within a section."""
 
-    shape: ClassVar[str] = "note"
     text: str
     is_heading: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A still figure ready for an `img`."""
+
+    name: str
+    source: str
+    """a data URI"""
+    title: str
+    caption: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Figures side by side where there is room."""
+
+    pictures: Sequence[Picture]
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
     """Interactive plots: `charts` over time, or the images of `frame`."""
 
-    shape: ClassVar[str] = "live"
     what: str
 
 
@@ -55,7 +73,6 @@ class Live:
 class Folded:
     """Blocks under a title that folds them away, with a word (`badge`) beside it."""
 
-    shape: ClassVar[str] = "folded"
     title: str
     blocks: "Sequence[Block]"
     style: str = ""
@@ -63,7 +80,7 @@ class Folded:
     is_open: bool = False
 
 
-Block = Grid | Sentences | Note | Picture | Live | Folded
+Block = Grid | Sentences | Note | Picture | Pair | Live | Folded
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +100,7 @@ class Page:
     """Content of a page. Verdict and table come first, paths beside them, then the sections."""
 
     kind: str
-    """kind of result: report, comparison, diagnosis, bench"""
+    """kind of result: report, comparison, diagnosis, bench, reproduction"""
     title: str
     about: str
     """a sentence or two below the title"""
@@ -100,61 +117,29 @@ class Page:
     """see `plot_data.page_data`"""
     still_paths: Picture | None = None
     """in place of the paths where no script runs"""
+    terms: Iterable[str] = ()
+    """terms of the glossary beside those that tables link to and titles of charts have"""
 
 
-def render_page(page: Page) -> str:
-    """HTML of a page: one file that needs no other and makes no request. All text that comes from files is escaped."""
-    plots, keys = page.plots, {name: str(i) for i, name in enumerate(page.colors)}
-    styles = asset("report.css") + (asset("explore.css") if page.colors else "")
-    titles = {title: key for name, key in keys.items() for title in (name, f"{name} (reference)")}
-    sections = [section for section in (page.table, *page.sections) if section.blocks]
-    return (
-        environment()
-        .get_template("page.html")
-        .render(
-            page=page,
-            most=FIRST,
-            sections=sections,
-            css=Markup(styles),
-            glossary=TERMS if page.colors else {},
-            line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
-            classes={title: f"estimator-{key}" for title, key in titles.items()},
-            policy=Markup(NO_SCRIPT) if plots is None else policy(),
-            terms=_terms(page),
-            **({} if plots is None else _interactive(plots)),
-        )
-    )
+def pictures(figures: Mapping[str, Figure | EncodedFigure], captions: Mapping[str, str]) -> dict[str, Picture]:
+    """Figures by name, ready for a page; captions are by the beginning of a name, of which the longest counts."""
+    drawn = {}
+    for name, figure in figures.items():
+        beginning = max((start for start in captions if name.startswith(start)), key=len, default="")
+        drawn[name] = picture(name, figure, captions.get(beginning, ""))
+    return drawn
 
 
-def _terms(page: Page) -> dict[str, str]:
-    """Terms of the glossary that a table links to or the title of a chart has."""
-    tables = list(_tables([page.table, *page.sections]))
-    linked = {column.term for table in tables for column in table.columns}
-    linked |= {row.term for table in tables for row in table.rows}
-    titles = " ".join(chart["title"].lower() for chart in (page.plots or {}).get("charts", ()))
-    return {term: text for term, text in TERMS.items() if term in linked or term.lower() in titles}
-
-
-def _tables(holders: "Iterable[Section | Folded]") -> Iterator[Table]:
-    """Tables of sections and of what is folded away in them."""
-    for holder in holders:
-        yield from (block.table for block in holder.blocks if isinstance(block, Grid))
-        yield from _tables(block for block in holder.blocks if isinstance(block, Folded))
-
-
-def _interactive(plots: Mapping[str, Any]) -> dict[str, Any]:
-    """Properties of the plots that the template needs besides their data."""
-    numbered = list(enumerate(plots["charts"]))
-    shown = [(str(i), one["name"]) for i, one in enumerate(plots["estimators"]) if one["answered"]]
-    has = {key: any(one.get(key) for one in plots["estimators"]) for key in ("points", "covariance")}
-    has["band"] = any(one.get("covariance") for one in plots["estimators"] if one["name"] == plots["reference"])
-    return {
-        "script": script(),
-        "data": embedded_json(plots),
-        "groups": [(title, list(of)) for title, of in groupby(numbered, key=lambda item: item[1]["group"])],
-        "has": has,
-        "shown": shown if plots["truth"] is None else [*shown, (TRUTH_LINE, "truth")],
-    }
+def picture(name: str, figure: Figure | EncodedFigure, caption: str) -> Picture:
+    """The figure as SVG, or as PNG where that would be too large."""
+    svg = encoded(figure, "svg")
+    form, content = ("svg+xml", svg) if len(svg) <= LARGEST_SVG else ("png", encoded(figure, "png"))
+    if isinstance(figure, EncodedFigure):
+        title, (width, height) = figure.title, figure.size
+    else:
+        title, (width, height) = str(figure.get_label()), figure.get_size_inches()
+    source = f"data:image/{form};base64,{b64encode(content).decode('ascii')}"
+    return Picture(name, source, title.replace(r"\$", "$"), caption, round(100 * width), round(100 * height))
 
 
 def trust(name: str, verdict_on_it: str, reasons: Iterable[str], criteria: Table | None = None) -> Folded:

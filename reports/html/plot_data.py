@@ -1,159 +1,103 @@
 """Data of the plots on a run's page: paths, landmarks, covariances, observations and series."""
 
 from base64 import b64encode
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from fgbaseline.compare import chi_square_bounds, chi_square_quantile
 from fgbaseline.compare.divergence_onset import divergence_onset, divergence_threshold, worst_second
 from fgbaseline.compare.estimate_comparison import Result, Run
-from fgbaseline.data import Estimate, Excluded
+from fgbaseline.data import Excluded
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.tracking import Pictures
-from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import STATE
-from fgbaseline.reports.figures.panels import nees_bounds, nees_median
-from fgbaseline.reports.formatting import distance
-from fgbaseline.reports.tables.run_details import REASONS
 
+from ..figures.panels import DEGREES_OF_FREEDOM
+from ..figures.run_data import RunData, of_run
+from ..formatting import distance
+from ..tables.run_details import REASONS
 from .plot_encoding import (
     TRUTH_LINE,
-    Lines,
+    Chart,
     chart,
+    expected,
     flags,
     floats,
+    grouped,
     integers,
-    median_by_frame,
     numbered,
     pixels,
     position_covariances,
-    small_integers,
 )
-
-
-def charts(run: Run) -> list[dict[str, Any]]:
-    """The charts in their order: `name`, `title`, `unit`, `hint`, `log`, `band`, `middle`, `group` and `lines`.
-
-    `lines` has (T,) values by the number of the estimator in the run, as text; `bounds`, where there are any, how far
-    the band around such a line reaches to either side.
-    """
-    drawn = [*_errors(run), *_velocity_and_biases(run), *_pixels(run), *_consistency(run), *_cost(run)]
-    return [one for one in drawn if one is not None]
-
-
-def _errors(run: Run) -> Iterable[dict[str, Any] | None]:
-    away, group = f"from {run.reference}", "Divergence and errors"
-    yield chart(group, "divergence", f"Divergence {away}, unaligned", "m", _column(run, "divergence", "position"))
-    yield chart(group, "rotation", f"Rotation {away}, unaligned", "°", _column(run, "divergence", "rotation_deg"))
-    yield chart(group, "along", f"Ahead of {run.reference}", "m", _column(run, "divergence", "along"))
-    yield chart(group, "across", f"To the left of {run.reference}", "m", _column(run, "divergence", "across"))
-    yield chart(group, "above", f"Above {run.reference}", "m", _column(run, "divergence", "up"))
-    without = "difference from ground truth; all start at the true pose"
-    yield chart(group, "error", "Unaligned position error", "m", _column(run, "truth", "position"), hint=without)
-    yield chart(group, "error-rotation", "Unaligned rotation error", "°", _column(run, "truth", "rotation_deg"))
-    view, truth = TopView.of(run.problem), run.problem.sequence.truth
-    heights = {r.name: view.height(r.estimate.world_T_imu[:, :3, 3]) for r in run.answered}
-    along = {} if truth is None else {TRUTH_LINE: view.height(truth.world_T_imu[:, :3, 3])}
-    yield chart(group, "height", "Height above the start", "m", {**_numbered(run, heights), **along})
-
-
-def _velocity_and_biases(run: Run) -> Iterable[dict[str, Any] | None]:
-    """Charts of a run on raw inertial data; none without."""
-    inertial = {r.name: r.inertial for r in run.answered if r.inertial is not None}
-    group, truth = "Velocity and biases", run.problem.sequence.truth
-    errors = {name: each.errors["velocity"].to_numpy() for name, each in inertial.items() if each.errors is not None}
-    yield chart(group, "velocity", "Unaligned velocity error", "m/s", _numbered(run, errors))
-    away = {
-        name: each.divergence["velocity"].to_numpy() for name, each in inertial.items() if each.divergence is not None
-    }
-    yield chart(group, "velocity-divergence", f"Velocity from {run.reference}, unaligned", "m/s", _numbered(run, away))
-    hint = "the estimates, and three of their sigmas to either side"
-    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s²")):
-        true = None if truth is None else getattr(truth, name)
-        for i, axis in enumerate("xyz"):
-            values = _numbered(run, {key: each.values[f"{name}_{axis}"].to_numpy() for key, each in inertial.items()})
-            sigmas = _numbered(
-                run, {key: each.values[f"{name}_sigma_{axis}"].to_numpy() for key, each in inertial.items()}
-            )
-            bounds = {key: floats(3.0 * sigma) for key, sigma in sigmas.items() if np.isfinite(sigma).any()}
-            lines = {**values, **({} if true is None else {TRUTH_LINE: true[:, i]})}
-            title = f"{name.replace('_', ' ').capitalize()}, {axis}"
-            key = f"{name.replace('_', '-')}-{axis}"
-            yield chart(group, key, title, unit, lines, hint=hint, bounds=bounds, log=False)
-
-
-def _pixels(run: Run) -> Iterable[dict[str, Any] | None]:
-    medians = {
-        r.name: median_by_frame(r.reprojection, run.problem.n_frames) for r in run.answered if len(r.reprojection)
-    }
-    title = "Median reprojection error by frame"
-    hint = "over all observations of the landmarks that an estimator has"
-    yield chart("Pixels", "reprojection", title, "px", _numbered(run, medians), log=True, smooth=True, hint=hint)
-
-
-def _consistency(run: Run) -> Iterable[dict[str, Any] | None]:
-    group = "Consistency"
-    expected = "the band holds 95 % of the frames of a consistent estimator, the dotted line is their median"
-    of_truth = {r.name: r.nees for r in run.answered if r.nees is not None}
-    pose = {"log": True, "band": nees_bounds(), "middle": nees_median(), "hint": expected}
-    yield chart(group, "nees", "NEES", "", _numbered(run, of_truth), **pose)
-    beside = {r.name: r.evidence.difference.nees for r in run.answered if r.evidence.difference is not None}
-    title = f"Reference NEES, to {run.reference}"
-    yield chart(group, "nees-reference", title, "", _numbered(run, beside), **pose)
-    whole = {
-        r.name: r.inertial.nees["state"].to_numpy() for r in run.answered if r.inertial and r.inertial.nees is not None
-    }
-    dof = float(STATE)
-    bounds, middle = tuple(map(float, chi_square_bounds(dof))), float(chi_square_quantile(0.5, dof))
-    state = {"log": True, "band": bounds, "middle": middle, "hint": expected}
-    yield chart(group, "nees-state", "NEES of the state", "", _numbered(run, whole), **state)
-    innovations = _innovations(run)
-    if innovations is not None:
-        nis = {r.name: r.evidence.nis_per_degree for r in run.answered}
-        title, look = "NIS per degree of freedom", {"log": True, "smooth": True, "hint": expected}
-        yield chart(group, "nis", title, "", _numbered(run, nis), **look, **innovations)
-    for part in ("position", "rotation"):
-        tables = {r.name: r.evidence.sigma_ratio for r in run.answered}
-        ratio = {name: table[part].to_numpy() for name, table in tables.items() if table is not None}
-        title, hint = f"Sigma ratio of {part}, to {run.reference}", "expected above 1 for a filter"
-        yield chart(group, f"sigma-{part}", title, "", _numbered(run, ratio), log=True, middle=1.0, hint=hint)
-
-
-def _innovations(run: Run) -> dict[str, Any] | None:
-    """Band and median for as many rows as the median frame with observations has; None where no filter has any."""
-    seen = [r.estimate.innovations.degrees for r in run.answered if r.estimate.innovations is not None]
-    rows = np.concatenate([degrees[degrees > 0] for degrees in seen]) if seen else np.empty(0)
-    if len(rows) == 0:
-        return None
-    n = float(np.median(rows))
-    band = tuple(float(limit) / n for limit in chi_square_bounds(n))
-    return {"band": band, "middle": float(chi_square_quantile(0.5, n)) / n}
-
-
-def _cost(run: Run) -> Iterable[dict[str, Any] | None]:
-    T = run.problem.n_frames
-    spent = {r.name: 1e3 * r.estimate.seconds for r in run.answered if len(r.estimate.seconds) == T}
-    spent = {name: ms for name, ms in spent.items() if ms.any()}
-    interval = 1e3 * float(np.median(run.problem.sequence.dt))
-    look = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
-    yield chart("Runtime", "time", "Time per frame", "ms", _numbered(run, spent), middle=interval, **look)
-
-
-def _column(run: Run, table: str, column: str) -> Lines:
-    """A column of each estimator's errors; the reference is not compared with itself."""
-    read: Callable[[Result], Any] = {"divergence": lambda r: r.divergence, "truth": lambda r: r.truth}[table]
-    compared = [r for r in run.answered if table == "truth" or r.name != run.reference]
-    return _numbered(run, {r.name: read(r)[column].to_numpy() for r in compared if read(r) is not None})
-
-
-def _numbered(run: Run, lines: Lines) -> Lines:
-    return numbered(run.results, lines)
-
 
 EDGE = 8.0
 """px between the outermost observations and the frame drawn around them"""
+
+
+def charts(run: Run, data: RunData) -> list[Chart]:
+    """The charts of a run in their order; those without lines are left out.
+
+    Their lines have (T,) values by the number of the estimator in the run, as text.
+    """
+    reference, frames = run.reference, "frames of a consistent estimator"
+
+    def of(name: str, title: str, unit: str, column: str, **look: Any) -> Chart | None:
+        """Chart of a column of the series."""
+        return chart(name, title, unit, numbered(run.results, data.column(column)), **look)
+
+    heights = numbered(run.results, {name: path[:, 2] for name, path in data.paths.items()})
+    if data.truth is not None:
+        heights |= {TRUTH_LINE: data.truth[:, 2]}
+    unaligned = "difference from ground truth; all start at the true pose"
+    every = {"log": True, "smooth": True, "hint": "over all observations of the landmarks that an estimator has"}
+    pose, rows = expected(DEGREES_OF_FREEDOM, frames), data.nis_rows or 1.0
+    ratio = {"log": True, "middle": 1.0, "hint": "expected above 1 for a filter"}
+    times, interval = numbered(run.results, data.milliseconds()), 1e3 * float(np.median(run.problem.sequence.dt))
+    real_time = {"log": True, "smooth": True, "hint": "below the dotted line an estimator runs in real time"}
+    groups = {
+        "Divergence and errors": [
+            of("divergence", f"Divergence from {reference}, unaligned", "m", "divergence_position"),
+            of("rotation", f"Rotation from {reference}, unaligned", "°", "divergence_rotation_deg"),
+            of("along", f"Ahead of {reference}", "m", "divergence_along"),
+            of("across", f"To the left of {reference}", "m", "divergence_across"),
+            of("above", f"Above {reference}", "m", "divergence_up"),
+            of("error", "Unaligned position error", "m", "truth_position", hint=unaligned),
+            of("error-rotation", "Unaligned rotation error", "°", "truth_rotation_deg"),
+            chart("height", "Height above the start", "m", heights),
+        ],
+        "Velocity and biases": [
+            of("velocity", "Unaligned velocity error", "m/s", "truth_velocity"),
+            of("velocity-divergence", f"Velocity from {reference}, unaligned", "m/s", "divergence_velocity"),
+            *_biases(run, data),
+        ],
+        "Pixels": [of("reprojection", "Median reprojection error by frame", "px", "reprojection_median", **every)],
+        "Consistency": [
+            of("nees", "NEES", "", "nees", **pose),
+            of("nees-reference", f"Reference NEES, to {reference}", "", "nees_reference", **pose),
+            of("nees-state", "NEES of the state", "", "nees_state", **expected(float(STATE), frames)),
+            of("nis", "NIS per degree of freedom", "", "nis_per_row", smooth=True, **expected(rows, frames, per=rows)),
+            of("sigma-position", f"Sigma ratio of position, to {reference}", "", "sigma_ratio_position", **ratio),
+            of("sigma-rotation", f"Sigma ratio of rotation, to {reference}", "", "sigma_ratio_rotation", **ratio),
+        ],
+        "Runtime": [chart("time", "Time per frame", "ms", times, middle=interval, **real_time)],
+    }
+    return grouped(groups)
+
+
+def _biases(run: Run, data: RunData) -> Iterable[Chart | None]:
+    """Charts of the components; `bounds` is how far the band around a line reaches to either side."""
+    truth, hint = run.problem.sequence.truth, "the estimates, and three of their sigmas to either side"
+    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s²")):
+        true = None if truth is None else getattr(truth, name)
+        for i, axis in enumerate("xyz"):
+            lines = numbered(run.results, data.column(f"{name}_{axis}"))
+            if true is not None:
+                lines |= {TRUTH_LINE: true[:, i]}
+            sigmas = numbered(run.results, data.column(f"{name}_sigma_{axis}"))
+            bounds = {key: floats(3.0 * sigma) for key, sigma in sigmas.items()}
+            title, key = f"{name.replace('_', ' ').capitalize()}, {axis}", f"{name.replace('_', '-')}-{axis}"
+            yield chart(key, title, unit, lines, hint=hint, bounds=bounds, log=False)
 
 
 def page_data(run: Run, image_size: tuple[int, int] | None = None) -> dict[str, Any]:
@@ -161,51 +105,40 @@ def page_data(run: Run, image_size: tuple[int, int] | None = None) -> dict[str, 
 
     `image_size` is width and height, px, where they are known.
     """
-    view, sequence = TopView.of(run.problem), run.problem.sequence
-    axes = np.stack([view.ahead, view.left, view.up])
-    truth = sequence.truth
+    sequence, data = run.problem.sequence, of_run(run)
     return {
         "frames": sequence.n_frames,
         "step": "frame",
         "stamped": True,
         "axes": ["ahead", "left", "up"],
-        "t": floats(sequence.t - sequence.t[0]),
+        "t": floats(data.t),
         "reference": run.reference,
-        "estimators": [_estimator(run, r, axes) for r in run.results.values()],
-        "truth": None if truth is None else floats(truth.world_T_imu[:, :3, 3] @ axes.T),
+        "estimators": [_estimator(run, data, r) for r in run.results.values()],
+        "truth": None if data.truth is None else floats(data.truth),
         "camera": _camera(run, image_size),
         "observations": _observations(run),
         "reasons": {str(int(Excluded[key.upper().replace(" ", "_")])): text for key, text in REASONS.items()},
-        "charts": charts(run),
+        "charts": charts(run, data),
         "bookmarks": _bookmarks(run),
     }
 
 
-def _estimator(run: Run, result: Result, axes: FloatArray) -> dict[str, Any]:
+def _estimator(run: Run, data: RunData, result: Result) -> dict[str, Any]:
     """An estimator: path (T, 3), camera poses (T, 3, 4), position covariances (T, 6), landmarks, what it used."""
-    estimate = result.estimate
-    about: dict[str, Any] = {"name": result.name, "answered": result.answered}
+    estimate, name = result.estimate, result.name
+    about: dict[str, Any] = {"name": name, "answered": result.answered}
     if not result.answered:
         return about
-    cameras = estimate.world_T_imu @ run.problem.sequence.imu_T_cam
-    used = estimate.used
-    with np.errstate(invalid="ignore"):  # a landmark at infinity
-        points = estimate.landmarks.position @ axes.T
+    view = TopView.of(run.problem)
+    axes, poses, covariance = np.stack([view.ahead, view.left, view.up]), estimate.world_T_imu, estimate.covariance
     return about | {
-        "path": floats(estimate.world_T_imu[:, :3, 3] @ axes.T),
-        "cameras": floats(axes @ cameras[:, :3, :]),
-        "covariance": _position_covariance(estimate, axes),
+        "path": floats(data.paths[name]),
+        "cameras": floats(axes @ (poses @ run.problem.sequence.imu_T_cam)[:, :3, :]),
+        "covariance": None if covariance is None else floats(position_covariances(axes @ poses[:, :3, :3], covariance)),
         "landmarks": integers(estimate.landmarks.index),
-        "points": floats(points),
-        "used": flags(used) if used.any() else None,
+        "points": floats(data.landmarks.get(name, np.empty((0, 3)))),
+        "used": flags(estimate.used) if estimate.used.any() else None,
     }
-
-
-def _position_covariance(estimate: Estimate, axes: FloatArray) -> str | None:
-    """(T, 6) m^2: xx, xy, xz, yy, yz, zz; the covariance is of the right perturbation, so the body's axes turn it."""
-    if estimate.covariance is None:
-        return None
-    return floats(position_covariances(axes @ estimate.world_T_imu[:, :3, :3], estimate.covariance))
 
 
 def image_data(run: Run, images: Pictures) -> dict[str, list[str]]:
@@ -237,7 +170,7 @@ def _observations(run: Run) -> dict[str, Any] | None:
         "landmark": integers(observations.landmark),
         "pixel": pixel,
         "parts": parts,
-        "excluded": small_integers(run.problem.excluded),
+        "excluded": integers(run.problem.excluded, bits=8),
     }
 
 

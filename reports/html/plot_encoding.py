@@ -9,8 +9,9 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike
 
-from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
+
+from ..figures.panels import chi_square_limits
 
 FINEST = 16
 """parts of a pixel that observations are rounded to, unless the image is too large for that"""
@@ -24,14 +25,9 @@ def floats(values: ArrayLike) -> str:
     return _text(np.where(np.isfinite(single), single, np.nan).astype("<f4"))
 
 
-def integers(values: ArrayLike) -> str:
-    """Unsigned, 32 bits."""
-    return _text(np.asarray(values).astype("<u4"))
-
-
-def small_integers(values: ArrayLike) -> str:
-    """Unsigned, 8 bits."""
-    return _text(np.asarray(values).astype("u1"))
+def integers(values: ArrayLike, bits: int = 32) -> str:
+    """Unsigned, of 8 or 32 bits."""
+    return _text(np.asarray(values).astype(f"<u{bits // 8}"))
 
 
 def flags(values: ArrayLike) -> str:
@@ -66,17 +62,24 @@ TRUTH_LINE = "truth"
 OUTLIER = 10.0
 """factor by which one line is farther than every other, so that it alone flattens the others on a linear axis"""
 
-Lines = Mapping[str, FloatArray]
+Lines = dict[str, FloatArray]
+Chart = dict[str, Any]
+"""`group`, `name`, `title`, `unit`, `hint`, `log`, `smooth`, `band`, `middle`, `lines` by key and perhaps `bounds`"""
 
 
-def chart(group: str, name: str, title: str, unit: str, lines: Lines, **more: Any) -> dict[str, Any] | None:
+def grouped(charts: Mapping[str, Iterable[Chart | None]]) -> list[Chart]:
+    """The charts of all groups, those without lines left out."""
+    return [{"group": group, **one} for group, of in charts.items() for one in of if one is not None]
+
+
+def chart(name: str, title: str, unit: str, lines: Lines, **more: Any) -> Chart | None:
     """A chart; None where no line has a value. `smooth` lines jump from frame to frame: they are shown as medians."""
     known = {key: values for key, values in lines.items() if np.isfinite(values).any()}
     if not known:
         return None
     look = {"log": _needs_log_scale(known.values()), "band": None, "middle": None, "smooth": False, "hint": ""}
     packed = {key: floats(values) for key, values in known.items()}
-    return {"group": group, "name": name, "title": title, "unit": unit, "lines": packed, **look, **more}
+    return {"name": name, "title": title, "unit": unit, "lines": packed, **look, **more}
 
 
 def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
@@ -88,16 +91,17 @@ def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
     return len(largest) > 1 and largest[0] > OUTLIER * largest[1] > 0.0
 
 
+def expected(degrees: float, of: str, *, per: float = 1.0) -> dict[str, Any]:
+    """Look of a chart of a consistent estimator's chi-square with so many degrees of freedom, over `per`."""
+    low, median, high = chi_square_limits(degrees, per)
+    hint = f"the band holds 95 % of the {of}, the dotted line is their median"
+    return {"log": True, "band": (low, high), "middle": median, "hint": hint}
+
+
 def numbered(names: Iterable[str], lines: Lines) -> Lines:
     """Lines by the number of their name among `names`, as text."""
     number = {name: str(i) for i, name in enumerate(names)}
     return {number[name]: np.asarray(values, dtype=np.float64) for name, values in lines.items()}
-
-
-def median_by_frame(reprojection: Any, n_frames: int) -> FloatArray:
-    """Median error (T,) of each frame, px, from a table of `compare.reprojection`; NaN without an observation."""
-    median = compare.reprojection_by(reprojection, "frame")["median"]
-    return np.asarray(median.reindex(range(n_frames)).to_numpy(dtype=np.float64))
 
 
 def position_covariances(view_R_body: FloatArray, covariance: FloatArray) -> FloatArray:

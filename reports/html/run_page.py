@@ -9,7 +9,7 @@ from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data.tracking import Pictures
 
 from ..figures import EncodedFigure
-from ..figures.style import colors
+from ..figures.palette import colors
 from ..formatting import counted, number
 from ..phrases.run import verdict
 from ..phrases.tracks import track_sentences
@@ -22,17 +22,47 @@ from .page import (
     Live,
     Note,
     Page,
+    Picture,
     Section,
     Sentences,
     figure_blocks,
     folded,
-    render_page,
+    pictures,
     still_figures,
     trust,
 )
 from .plot_data import image_data, page_data
 from .plot_encoding import embedded_json
-from .templates import Picture, picture
+from .rendering import render_page
+
+CAPTIONS: Mapping[str, str] = {
+    "paths_overlaid": "Seen from above; all start at the same pose. Squares mark the ends.",
+    "paths_side_by_side": "The limits of all panels are equal; landmarks are green. Ground truth is dashed; without "
+    "it the reference is thin.",
+    "divergence": "Position and rotation difference from the reference, without alignment, and the position "
+    "difference along the reference's direction of travel, to its left and up.",
+    "error_to_truth": "Difference from ground truth in the same components, without alignment: all start at the true "
+    "pose.",
+    "height": "Along the up direction of the recording.",
+    "reprojection_over_time": "Above, the median error over all observations of the landmarks that an estimator has. "
+    "Below, all recorded observations of each frame, and which of them the mask excludes.",
+    "reprojection_distribution": "Solid over all observations of the landmarks that an estimator has, dotted over "
+    "those it used. Curves farther left are better.",
+    "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "
+    "below it conservative.",
+    "held_out": "Each half of a track is predicted from its other half along each trajectory. Trajectories whose "
+    "intervals overlap can still be separated: the table has the paired difference from the best.",
+    "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
+    "time-correlated. The sigma ratio of a filter is expected above 1.",
+    "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
+    "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, larger to its right.",
+    "image_regions": "Errors that grow towards an edge indicate distortion or a wrong rectification. All panels share "
+    "one logarithmic scale.",
+    "map_difference": "Landmarks are matched by index. Distances in the world include the drift of the "
+    "trajectories; those in the camera frames do not.",
+    "time_per_frame": "Below the dotted line an estimator runs in real time.",
+}
+"""captions by the names of figures"""
 
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
@@ -54,19 +84,20 @@ def render(
     """`report.html` of a run.
 
     `summary` is `summary.json` as a dict and gives the numbers, `figures` is what `figures.draw(run)` or
-    `figures.draw_and_write(run)` gave; `images` lie under the observations.
+    `figures.drawn_in_background(run, n)` gives; `images` lie under the observations.
     """
-    pictures = {name: picture(name, figure) for name, figure in figures.items()}
+    stills = pictures(figures, CAPTIONS)
     images = Pictures() if images is None else images
     plots = None
     if run.answered or run.problem.sequence.truth is not None:
         plots = page_data(run, images.size)
         if images.size is not None:
-            rest = len(embedded_json(plots)) + sum(len(each.source) for each in pictures.values()) + MARKUP_BYTES
+            rest = len(embedded_json(plots)) + sum(len(each.source) for each in stills.values()) + MARKUP_BYTES
             images.thin(max(0, PAGE_BYTES - rest) * 3 // 4)  # base64 has four letters for three bytes
         plots["images"] = image_data(run, images)
     sequence, problem = summary["sequence"], summary["problem"]
     table = Grid(tables.main_table(run, summary["estimators"]))
+    added = [Note(f"{name}: {caption}.") for name, caption in run.added.items()]
     remarks = [*sequence["remarks"], *problem["remarks"]]
     recording = {key: sequence[key] for key in ("name", "source", "form")}
     return render_page(
@@ -75,15 +106,15 @@ def render(
             title=run.problem.sequence.name,
             about=_about(run, sequence, problem),
             verdict=verdict(run),
-            table=Section("table", "Every estimator", [table, *_notes(run)], "Table"),
-            sections=_sections(run, summary, pictures, plots, images),
+            table=Section("table", "Every estimator", [table, *added], "Table"),
+            sections=_sections(run, summary, stills, plots, images),
             record=[Note("Remarks on the recording and the problem", is_heading=True), Sentences(remarks, "remarks")]
             if remarks
             else [],
             settings={"Recording": recording, "Settings": summary["settings"]},
             colors=colors(run.results, run.reference),
             plots=plots,
-            still_paths=pictures.get("paths_overlaid"),
+            still_paths=stills.get("paths_overlaid"),
         )
     )
 
@@ -91,22 +122,19 @@ def render(
 def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) -> str:
     length = sequence["path_length_m"]
     spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m"])]
+    kind = "observation" if run.problem.sequence.monocular else "stereo observation"
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
-        f"{counted(sequence['observations'], 'stereo observation')} of {counted(sequence['tracks'], 'track')}"
+        f"{counted(sequence['observations'], kind)} of {counted(sequence['tracks'], 'track')}"
         f"{' (after repair)' if problem['repairs'] else ''}. Problem: {problem['preset']}, "
         f"{number(problem['features'])} of the tracks."
     )
 
 
-def _notes(run: Run) -> list[Block]:
-    return [Note(f"{name}: {caption}.") for name, caption in run.added.items()]
-
-
 def _sections(
     run: Run,
     summary: Mapping[str, Any],
-    pictures: Mapping[str, Picture],
+    drawn: Mapping[str, Picture],
     plots: Mapping[str, Any] | None,
     images: Pictures,
 ) -> list[Section]:
@@ -114,13 +142,13 @@ def _sections(
     estimators = summary["estimators"]
     evidence, components = tables.evidence_table(run, estimators), details.components_table(estimators)
     excluded, events = details.exclusions_table(summary), details.events_tables(run)
-    bands = [p for name, p in pictures.items() if name.startswith(BAND_FIGURES)]
-    stills = figure_blocks(pictures, [n for n in pictures if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
+    bands = [p for name, p in drawn.items() if name.startswith(BAND_FIGURES)]
+    stills = figure_blocks(drawn, [n for n in drawn if not n.startswith((*EVIDENCE_FIGURES, *CHART_FIGURES))])
     beyond: list[Block] = [
         Grid(evidence.transposed("figure")),
-        *figure_blocks(pictures, ["held_out"]),
+        *figure_blocks(drawn, ["held_out"]),
         *([Folded("Errors with ±3-sigma bounds, for each estimator", bands)] if bands else []),
-        *figure_blocks(pictures, ["reprojection_classes", "image_regions", "map_difference"]),
+        *figure_blocks(drawn, ["reprojection_classes", "image_regions", "map_difference"]),
         *(folded(table) for table in details.long_tables(run)),
     ]
     live = plots is not None
@@ -131,7 +159,7 @@ def _sections(
     out: list[Block] = [*([Grid(excluded, "plain")] if excluded.rows else []), *map(folded, events)]
     return [
         Section("behind", "What stands behind the numbers", _behind(run, plots), "Findings"),
-        Section("over-time", "Over time", [Live("charts"), *figure_blocks(pictures, CHART_FIGURES)] if live else []),
+        Section("over-time", "Over time", [Live("charts"), *figure_blocks(drawn, CHART_FIGURES)] if live else []),
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
             "evidence",

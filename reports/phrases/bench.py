@@ -28,11 +28,10 @@ FIGURES = {
     "accuracy_against_time": "Time of an estimator per frame, on this machine, with the other workers running.",
     "scaling": "One mark per run. Dashed: the power of n that fits best, where sizes differ enough. Memory: peak of "
     "the whole process during an estimator, with about 200 MB of libraries.",
+    "nees_": "NEES of each frame, averaged over the runs. Band: 95 % of the frames of a consistent estimator. Errors "
+    "of consecutive frames are correlated, so a curve stays outside the band for a while.",
 }
-NEES = (
-    "NEES of each frame, averaged over the runs. Band: 95 % of the frames of a consistent estimator. Errors of "
-    "consecutive frames are correlated, so a curve stays outside the band for a while."
-)
+"""captions by the beginning of a figure's name"""
 
 
 def sentences(results: Results) -> list[str]:

@@ -27,15 +27,15 @@ def track_sentences(sequence: Sequence, size: tuple[float, float]) -> list[str]:
         f"{int(np.median(length))}, longest {int(length.max())}).",
         f"{number(float(per_frame.mean()))} recorded observations a frame on average, fewest in frame {fewest} "
         f"({int(per_frame[fewest])}).",
-        _sparse(o.pixel[:, :2], size),
+        _sparse(o.pixel[:, :2], size, "image" if sequence.monocular else "left image"),
     ]
 
 
-def _sparse(pixel: FloatArray, size: tuple[float, float]) -> str:
-    """Sentence on the cells of the image with few points (n, 2)."""
+def _sparse(pixel: FloatArray, size: tuple[float, float], image: str) -> str:
+    """Sentence on the cells of the `image`, by its name, with few points (n, 2)."""
     ends = np.array(size)
     cell = np.clip((3.0 * pixel / ends).astype(np.int64), 0, 2)
     share = np.bincount(3 * cell[:, 1] + cell[:, 0], minlength=9) / len(pixel)
     places = [f"{ROWS[k // 3]} {COLUMNS[k % 3]}" for k in np.flatnonzero(share < SPARSE / 9.0)]
     few = f"below {per_cent(SPARSE)} of an even share"
-    return f"Sparse cells of the 3 x 3 grid of the left image ({few}): {listed(places) or 'none'}."
+    return f"Sparse cells of the 3 x 3 grid of the {image} ({few}): {listed(places) or 'none'}."

@@ -161,7 +161,8 @@ def _mapped(study: Study) -> Claim:
 def _works(study: Study) -> Claim:
     now, features = study.recorded, study.recorded.features
     good = not now.breaks and now.reprojection < MAX_REPROJECTION
-    lost = f", and the printed {_lost(now)}, first at {now.first_lost}" if now.lost else ""
+    frames = f"{plural(now.lost, 'frame')}, first at {now.first_lost}"
+    lost = f", and the printed covariance is not positive definite at {frames}" if now.lost else ""
     return claim_on(
         study,
         "works",

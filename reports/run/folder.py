@@ -21,6 +21,7 @@ from ..html.run_page import render
 from ..results.documents import SUMMARY
 from ..results.reader import TRUTH
 from ..results.run import Summary, summarize
+from ..tables.csv_file import write_csv
 from ..tables.run import main_table, main_values, metrics_table
 from ..tables.table import latex, markdown
 
@@ -47,7 +48,8 @@ def write_numbers(run: Run, folder: Path) -> Summary:
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
-        _nine_digits(_series(run, result)).to_csv(folder / "series" / f"{name}.csv")
+        columns = {str(key): column.to_numpy() for key, column in _series(run, result).items()}
+        write_csv(folder / "series" / f"{name}.csv", {"frame": range(run.problem.n_frames), **columns}, "%.9g")
         if result.answered:
             write_tum(folder / "trajectories" / f"{name}.tum", sequence.t, result.estimate.world_T_imu, sequence.up)
             _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
@@ -69,16 +71,6 @@ def _title(run: Run) -> str:
     """Content of the main table: recording and reference."""
     against = "" if run.reference is None else f"; the reference is {run.reference}"
     return f"Estimators on {run.problem.sequence.name} ({counted(run.problem.n_frames, 'frame')}){against}."
-
-
-def _nine_digits(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with floats as text of nine digits, empty for NaN; faster than the formatting of pandas."""
-    text = {
-        str(name): [f"{value:.9g}" if value == value else "" for value in column.tolist()]
-        for name, column in table.items()
-        if column.dtype.kind == "f"
-    }
-    return table.assign(**text)
 
 
 def write_page(

@@ -12,7 +12,7 @@ from ..formatting import counted, interval, number
 from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
 from ..results.metric import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value
 from ..results.metrics import shown_in
-from .table import Cell, Column, Row, Table, figures, mark_best, words
+from .table import Cell, Column, Row, Table, mark_best, numbers, words
 
 Key: TypeAlias = tuple[str, str]
 """case and estimator"""
@@ -87,8 +87,8 @@ def ranking_tables(results: Results) -> Iterator[Table]:
     for metric in METRICS:
         rows = tuple(_ranked(row) for row in ranked if row["metric"] == metric.name)
         if rows:
-            names = (*figures("rank"), *words("estimator"), *figures("runs"))
-            columns = (*names, Column.flat(metric), *figures("above the first"), *words(""))
+            names = (*numbers("rank"), *words("estimator"), *numbers("runs"))
+            columns = (*names, Column.flat(metric), *numbers("above the first"), *words(""))
             yield Table(columns, rows, name="case", title=f"Ranked by {metric.heading}")
     headings = {metric.name: metric.heading for metric in METRICS}
     rows = tuple(
@@ -102,7 +102,7 @@ def ranking_tables(results: Results) -> Iterator[Table]:
         for row in records(overall(results))
     )
     if rows:
-        yield Table((*words("by"), *figures("cases", "mean rank", "first in")), rows, title="Over all cases")
+        yield Table((*words("by"), *numbers("cases", "mean rank", "first in")), rows, title="Over all cases")
 
 
 def _ranked(row: Mapping[str, Any]) -> Row:
@@ -128,7 +128,7 @@ def runs_table(results: Results, pages: str) -> Table:
         reasons = "; ".join(f"{row['estimator']} failed: {row['reason']}" for row in failed)
         link = "" if one.job.page == "none" else f"{pages}/{one.job.key}/report.html"
         rows.append(Row.of(one.name, size, f"{first['reference']} {first['trust']}", reasons, link=link))
-    columns = (*figures("size"), *words("reference", "failures"))
+    columns = (*numbers("size"), *words("reference", "failures"))
     return Table(columns, tuple(rows), name="run", title=counted(len(rows), "run"))
 
 

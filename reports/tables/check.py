@@ -7,9 +7,9 @@ from fgbaseline.compare.limits import Outcome
 from ..phrases.check import bound, change, number
 from ..results.check import Checked, Line
 from ..results.metrics import METRICS
-from .table import Row, Table, figures, words
+from .table import Row, Table, numbers, words
 
-FIGURES = ("value", "bound", "margin", "baseline", "change")
+NUMBERS = ("value", "bound", "margin", "baseline", "change")
 UNITS = {metric.key: metric.unit for metric in METRICS if metric.scale == 1.0 and "°" not in metric.unit}
 _METERS = ("ate", "ate_unaligned", "divergence")
 _PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
@@ -22,8 +22,8 @@ def check_table(checked: Checked, signs: Mapping[Outcome, str] | None = None) ->
     rows = []
     for line in checked.lines:
         outcome, texts = f"{signs[line.outcome]} {line.outcome}" if signs else line.outcome.value, cells(line)
-        rows.append(Row.of(outcome, *(texts[title] for title in (*names, *FIGURES)), status=line.outcome.value))
-    return Table((*words(*names), *figures(*FIGURES)), tuple(rows), name="limit")
+        rows.append(Row.of(outcome, *(texts[title] for title in (*names, *NUMBERS)), status=line.outcome.value))
+    return Table((*words(*names), *numbers(*NUMBERS)), tuple(rows), name="limit")
 
 
 def cells(line: Line) -> dict[str, str]:

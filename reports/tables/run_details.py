@@ -15,7 +15,7 @@ from fgbaseline.data.finding import Finding
 
 from ..formatting import NO_BREAK, RESOLUTION, counted, grouped, number, per_cent, quantity, resolved
 from ..results.documents import at
-from .table import Cell, Column, Row, Table, figures, words
+from .table import Cell, Column, Row, Table, numbers, words
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")
 MAX_DYNAMIC = 100
@@ -42,7 +42,7 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
         name = f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name
         limits = (f"{sign} {text(c.doubtful)}", f"{sign} {text(c.untrusted)}")
         rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
-    columns = (*figures("measured", "trusted if", "doubtful if"), *words("verdict", "remark"))
+    columns = (*numbers("measured", "trusted if", "doubtful if"), *words("verdict", "remark"))
     return Table(columns, tuple(rows), name="criterion")
 
 
@@ -52,7 +52,7 @@ def findings_table(findings: Iterable[Finding]) -> Table:
     for f in findings:
         status = "ok" if f.certainty == "counted" else f.certainty
         rows.append(Row.of(f.sentence, f.measure, quantity(f.before, f.unit), quantity(f.after, f.unit), status=status))
-    return Table((*words("measure"), *figures("before repair", "after")), tuple(rows), name="finding")
+    return Table((*words("measure"), *numbers("before repair", "after")), tuple(rows), name="finding")
 
 
 def terminal_findings(findings: Iterable[Finding]) -> Table:
@@ -62,7 +62,7 @@ def terminal_findings(findings: Iterable[Finding]) -> Table:
         certainty = "" if f.certainty == "counted" else f" ({f.certainty})"
         sizes = (quantity(x, f.unit).replace(NO_BREAK, " ") for x in (f.before, f.after))
         rows.append(Row.of(f.code, f"{f.sentence}{certainty}", f.measure, *sizes))
-    columns = (*words("description", "measure"), *figures("before repair", "after"))
+    columns = (*words("description", "measure"), *numbers("before repair", "after"))
     return Table(columns, tuple(rows), name="finding")
 
 
@@ -93,19 +93,20 @@ def _moved(run: Run) -> Table:
         Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
         for row in moved.head(MAX_DYNAMIC).to_dict("records")
     )
-    columns = figures("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
+    columns = numbers("observations", "speed, m/s", "chi-square", "of it, explained by a constant velocity")
     return Table(columns, rows, name="landmark", title=title)
 
 
 def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     """Bias and spread of uL, vL, uR and vR in `estimators` of `summary.json`, robust, of each that has any."""
     components = {name: e.get("components") or {} for name, e in estimators.items()}
+    seen = [r for r in PIXEL_ROWS if any((of.get(r) or {}).get("bias") is not None for of in components.values())]
     rows = tuple(
-        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in PIXEL_ROWS for key in ("bias", "spread"))))
+        Row(name, _numbers(*((of.get(row) or {}).get(key) for row in seen for key in ("bias", "spread"))))
         for name, of in components.items()
         if any(row.get("bias") is not None for row in of.values())
     )
-    columns = tuple(Column(title, row, "px") for row in PIXEL_ROWS for title in ("median", "1.4826 MAD"))
+    columns = tuple(Column(title, row, "px") for row in seen or PIXEL_ROWS for title in ("median", "1.4826 MAD"))
     caption = (
         "Measured minus predicted, over all observations of the landmarks that an estimator has. 1.4826 times the "
         "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
@@ -123,7 +124,7 @@ def exclusions_table(summary: Mapping[str, Any]) -> Table:
         if count
     )
     caption = "Decided once for all estimators, before any of them runs."
-    return Table(figures("observations", "of all"), rows, name="reason for exclusion", caption=caption)
+    return Table(numbers("observations", "of all"), rows, name="reason for exclusion", caption=caption)
 
 
 def events_tables(run: Run) -> list[Table]:
@@ -140,7 +141,7 @@ def _events(estimates: list[Estimate]) -> Table:
     rows = tuple(Row.of(kind, *_where(events), why) for (kind, why), events in islice(alike.items(), MAX_EVENTS))
     more = len(alike) - MAX_EVENTS
     caption = f"{f'And {number(more)} more. ' if more > 0 else ''}tables/events.csv has every event."
-    columns = (*figures("events", "frames", "landmarks"), *words("why"))
+    columns = (*numbers("events", "frames", "landmarks"), *words("why"))
     return Table(columns, rows, name="event", title=title, caption=caption)
 
 
@@ -160,9 +161,9 @@ def _frames(
     rows = []
     for name, table in tables.items():
         for row in table.to_dict("records"):
-            numbers = _numbers(*(int(row[key]) if key == "n" else row[key] for key in sizes.values()))
-            rows.append(Row(name, (*(Cell(str(row[key])) for key in classes.values()), *numbers)))
-    return Table((*words(*classes), *figures(*sizes)), tuple(rows), title=title)
+            cells = _numbers(*(int(row[key]) if key == "n" else row[key] for key in sizes.values()))
+            rows.append(Row(name, (*(Cell(str(row[key])) for key in classes.values()), *cells)))
+    return Table((*words(*classes), *numbers(*sizes)), tuple(rows), title=title)
 
 
 def _numbers(*values: object) -> tuple[Cell, ...]:

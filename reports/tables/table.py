@@ -52,8 +52,8 @@ class Cell(NamedTuple):
     note: str = ""
 
 
-def figures(*titles: str) -> tuple[Column, ...]:
-    """Columns of figures, aligned to the right."""
+def numbers(*titles: str) -> tuple[Column, ...]:
+    """Columns of numbers, aligned to the right."""
     return tuple(map(Column, titles))
 
 

@@ -43,8 +43,7 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
     patch.setattr(run, "figure_functions", blank)
-    for module in (run, comparison, drawing):
-        patch.setattr(module, "lay_out", lambda _: None)
+    patch.setattr(drawing, "lay_out", lambda _: None)
 
 
 def figures_left_out(patch: pytest.MonkeyPatch) -> None:

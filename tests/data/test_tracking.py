@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.formats.npz_writer import write_tracks
+from fgbaseline.data.observations import IntArray
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
 from fgbaseline.data.tracking.rig import CameraModel, Distortion, rectify
 from fgbaseline.data.tracking.sources.image_files import EightBits
@@ -300,7 +302,7 @@ def test_a_full_disk_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     """150 observations a frame, 7 frames a track, residuals to the true poses below 0.8 px in the median.
 
-    Above 5 px lie 2.5 %, nine tenths of them in frames 0 to 2 and 8, where all tracks disagree with the true poses.
+    Above 5 px lie 2 %, four fifths of them in frames 0 to 2 and 8, where all tracks disagree with the true poses.
     """
     folder = recordings("kitti_images/odometry_06_first51/calib.txt").parent
     found = track(folder)
@@ -312,14 +314,41 @@ def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     frame, pixel, n = o.frame[keep], o.pixel[keep], int(landmark.max()) + 1
     assert len(frame) / 51 >= 150
     assert len(frame) / n >= 7
-    measurement = StereoMeasurement(found.camera, 1.0, None)
+    error = residual_norms(found.camera, poses, frame, landmark, pixel)
+    assert np.median(error) < 0.8
+    assert np.mean(error > 5.0) < 0.02
+    assert np.mean(error[~np.isin(frame, (0, 1, 2, 8))] > 5.0) < 0.005
+    fitted = poses.copy()
+    for _ in range(3):
+        measurement = StereoMeasurement(found.camera, 1.0, None)
+        points = triangulate_tracks(measurement, fitted[frame], landmark, pixel, n).position
+        for k in (0, 1, 2, 8):
+            seen = frame == k
+            fitted[k] = nearest_pose(found.camera, fitted[k], points[landmark[seen]], three_rows(pixel[seen]).T)
+    assert np.abs(se3.log(se3.relative(np.stack([poses[0], fitted[0]])))).max() > 0.005
+    assert np.mean(residual_norms(found.camera, fitted, frame, landmark, pixel) > 5.0) < 0.003
+
+
+def residual_norms(
+    camera: StereoCamera, poses: FloatArray, frame: IntArray, landmark: IntArray, pixel: FloatArray
+) -> FloatArray:
+    """Norms (n,) of the residuals in uL, uR and v, px, with landmarks fitted to the poses; inf behind the camera."""
+    measurement, n = StereoMeasurement(camera, 1.0, None), int(landmark.max()) + 1
     points = triangulate_tracks(measurement, poses[frame], landmark, pixel, n).position
     seen = se3.transform(se3.inverse(poses[frame]), points[landmark])
-    error = np.linalg.norm(three_rows(pixel).T - found.camera.rows(seen.T).pixel, axis=0)
-    error = np.where(np.isfinite(error) & (seen[:, 2] > 0), error, np.inf)
-    assert np.median(error) < 0.8
-    assert np.mean(error > 5.0) < 0.025
-    assert np.mean(error[frame > 2] > 5.0) < 0.01
+    error = np.linalg.norm(three_rows(pixel).T - camera.rows(seen.T).pixel, axis=0)
+    return np.where(np.isfinite(error) & (seen[:, 2] > 0), error, np.inf)
+
+
+def nearest_pose(camera: StereoCamera, pose: FloatArray, points: FloatArray, rows: FloatArray) -> FloatArray:
+    """Pose near `pose` from which the points (n, 3) are seen in the rows (3, n), robustly."""
+
+    def residual(twist: FloatArray) -> FloatArray:
+        moved = se3.transform(se3.inverse(pose @ se3.exp(twist[None])[0]), points)
+        return np.asarray((rows - camera.rows(moved.T).pixel).ravel())
+
+    twist = least_squares(residual, np.zeros(6), loss="soft_l1").x
+    return np.asarray(pose @ se3.exp(twist[None])[0])
 
 
 def test_euroc_pairs_a_second_apart(recordings: Callable[[str], Path]) -> None:

@@ -283,7 +283,7 @@ def test_no_argument_is_ignored(recording: data.Sequence) -> None:
         (recording, of_samples, as_recorded, "diagnosis: a recording that is taken as it is has none"),
         (velocities, of_velocities, as_recorded, "diagnosis: a recording that is taken as it is has none"),
         (recording, None, late, "settings: a shift is one of body velocities"),
-        (one_camera, None, masked, "settings: the mask predicts by stereo"),
+        (one_camera, None, masked, "settings: a mask of one camera needs the diagnosis"),
     ):
         with pytest.raises(InputError, match=sentence):
             diagnosis.calibrated(sequence, diagnosis=found, settings=settings)

@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data.write_tum(place / "truth.tum", 0.1 * np.arange(60), poses)
     poses[:, 2, 3] = 0.01 * np.arange(60.0)
     data.write_tum(place / "mine.tum", 0.1 * np.arange(60), poses)
+    data.write_tum(place / "later.tum", 1e3 + 0.1 * np.arange(60), poses)
     (place / "broken.tum").write_text("0 0 0 0 0 0 0 1\n1 here 0 0 0 0 0 1\n")
     (place / "run").mkdir()
     (place / "run" / "summary.json").write_text("{")
@@ -69,6 +70,11 @@ def test_help_and_faults_of_files_load_nothing_heavy(folder: Path) -> None:
 
 def test_a_comparison_on_the_terminal_loads_numpy_and_rich(folder: Path) -> None:
     assert loaded(COMMAND, "compare", folder / "truth.tum", folder / "mine.tum") == {"numpy", "rich"}
+
+
+def test_poses_without_partners_are_refused_before_what_draws_is_imported(folder: Path) -> None:
+    given = ["compare", folder / "truth.tum", folder / "later.tum", "--out", folder / "none"]
+    assert loaded(COMMAND, *given) <= {"numpy"}
 
 
 def test_its_page_loads_no_pandas_no_scipy_and_no_gtsam(folder: Path) -> None:

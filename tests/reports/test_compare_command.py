@@ -178,12 +178,24 @@ def test_stamps_and_poses_that_are_no_numbers_are_refused_with_their_line(
         assert f"{k}.tum: line 6" in err
 
 
-@pytest.mark.parametrize("text", ["{}", "[", '{"reference": [], "estimators": {}}'])
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("{}", "it is not the summary of a run"),
+        ("[", "summary.json: this is not JSON"),
+        ('{"reference": [], "estimators": {}}', "it is not the summary of a run"),
+    ],
+)
 def test_a_file_that_is_no_summary_is_refused(
-    made: Path, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    made: Path,
+    text: str,
+    fault: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "summary.json").write_text(text)
     code, _, err = in_process(f"compare . {made / 'mine.tum'}", capsys)
     assert code == 2
-    assert "it is not the summary of a run" in err
+    assert fault in err

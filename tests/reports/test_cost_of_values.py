@@ -14,7 +14,7 @@ from fgbaseline.data.problem import WRONG_MATCH
 from fgbaseline.data.problem_export import write_problem
 from fgbaseline.data.simulate import Simulation, Velocities, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.figures.panels import moving_sum
+from fgbaseline.reports.figures.diagnosis import moving_mean
 
 from ..builders.commands import fgbaseline
 from ..builders.mutated_files import good_recording, good_trajectory
@@ -94,14 +94,15 @@ def test_a_comparison_ends_whatever_both_are_stamped_in(factor: float, tmp_path:
 
 
 @pytest.mark.parametrize("width", [1, 2, 5, 8, 31, 40])
-def test_a_moving_sum_is_the_convolution_with_ones(width: int) -> None:
-    values = np.random.default_rng(0).normal(size=40)
-    np.testing.assert_allclose(moving_sum(values, width), np.convolve(values, np.ones(width), "same"), atol=1e-12)
+def test_a_moving_mean_is_the_convolution_with_ones_over_how_many_there_are(width: int) -> None:
+    values, ones = np.random.default_rng(0).normal(size=40), np.ones(width)
+    expected = np.convolve(values, ones, "same") / np.convolve(np.ones(40), ones, "same")
+    np.testing.assert_allclose(moving_mean(values, width), expected, atol=1e-12)
 
 
-def test_a_moving_sum_over_more_than_there_is_is_the_sum() -> None:
-    np.testing.assert_allclose(moving_sum(np.ones(7), 1e18), 7.0)
-    np.testing.assert_allclose(moving_sum(np.ones(7), np.inf), 7.0)
+def test_a_moving_mean_over_more_than_there_is_is_the_mean() -> None:
+    np.testing.assert_allclose(moving_mean(np.arange(7.0), 1e18), 3.0)
+    np.testing.assert_allclose(moving_mean(np.arange(7.0), np.inf), 3.0)
 
 
 def with_stamps(problem: Problem, factor: float) -> Problem:

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.style import in_style, stacked_panels, title_and_legend
+from fgbaseline.reports.figures.legend import title_and_legend
+from fgbaseline.reports.figures.style import in_style, stacked_panels
 
 AWAY = 0.02
 """of the figure's width or height, from where constrained layout has an edge of a panel"""

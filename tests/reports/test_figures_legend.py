@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.run import draw_for_paper
-from fgbaseline.reports.figures.run_data import of_folder, of_run
+from fgbaseline.reports.figures.run_data import of_folder
 from fgbaseline.reports.figures.style import PAPER, in_style, label
 from fgbaseline.reports.run.folder import write_numbers
 
@@ -90,9 +90,7 @@ def test_estimators_with_the_same_map_of_the_image_are_side_by_side() -> None:
     figure = drawn_ten()["image_regions"]
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
     assert titles == [label(name, "isam2") for name in NAMES]
-    medians = of_run(ten()).observed
-    assert medians is not None
-    table = medians.classes["ekf"]
+    table = ten().results["ekf"].evidence.patterns
     regions = table[table["by"] == "region"].set_index("of")["median"]
     shown = figure.axes[1].images[0].get_array()
     assert shown is not None

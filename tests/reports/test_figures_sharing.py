@@ -15,9 +15,14 @@ def small_run() -> Run:
     return run_of(problem, answer(problem, "ekf"))
 
 
+def drawn_by(processes: int) -> dict[str, figures.EncodedFigure]:
+    with figures.drawn_in_background(small_run(), processes) as drawn:
+        return drawn()
+
+
 @cache
 def drawn_by_one() -> dict[str, figures.EncodedFigure]:
-    return figures.draw_and_write(small_run())
+    return drawn_by(1)
 
 
 def test_one_process_writes_what_draw_draws() -> None:
@@ -29,6 +34,6 @@ def test_one_process_writes_what_draw_draws() -> None:
 
 
 def test_three_processes_write_the_same_bytes_in_the_same_order() -> None:
-    shared = figures.draw_and_write(small_run(), 3)
+    shared = drawn_by(3)
     assert list(shared) == list(drawn_by_one())
     assert shared == drawn_by_one()

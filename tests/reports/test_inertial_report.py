@@ -24,7 +24,7 @@ from fgbaseline.reports.figures.evidence import velocity_and_biases
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style
-from fgbaseline.reports.html.plot_data import charts
+from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.estimator import EstimatorSummary, InertialEstimatorSummary
 from fgbaseline.reports.results.metric import INERTIAL_TERMS
@@ -134,7 +134,7 @@ def single(text: str) -> np.ndarray:
 
 def test_charts_have_the_biases_within_three_sigmas_beside_the_truth() -> None:
     run = inertial_run()
-    drawn = {one["name"]: one for one in charts(run)}
+    drawn = {one["name"]: one for one in page_data(run)["charts"]}
     estimate, truth = run.results["joint-ekf"].estimate, run.problem.sequence.truth
     assert truth is not None
     assert estimate.state_covariance is not None
@@ -146,8 +146,13 @@ def test_charts_have_the_biases_within_three_sigmas_beside_the_truth() -> None:
             np.testing.assert_allclose(single(one["lines"]["truth"]), getattr(truth, name)[:, i], rtol=1e-5)
             np.testing.assert_allclose(single(one["bounds"]["0"]), 3.0 * sigma[:, i], rtol=1e-5)
     assert {"velocity", "velocity-divergence", "nees-state"} <= drawn.keys()
-    assert "truth" not in {one["name"]: one for one in charts(inertial_run("poses"))}["gyroscope-bias-x"]["lines"]
-    assert not any("bounds" in one or one["group"] == "Velocity and biases" for one in charts(standard_run()))
+    assert (
+        "truth"
+        not in {one["name"]: one for one in page_data(inertial_run("poses"))["charts"]}["gyroscope-bias-x"]["lines"]
+    )
+    assert not any(
+        "bounds" in one or one["group"] == "Velocity and biases" for one in page_data(standard_run())["charts"]
+    )
 
 
 def test_a_figure_of_each_estimator_has_the_errors_between_three_sigmas() -> None:

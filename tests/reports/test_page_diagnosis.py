@@ -62,6 +62,8 @@ def test_six_sentences_stand_on_top_and_the_rest_is_folded_away() -> None:
         (0.02, "m/s", "0.0200\N{NO-BREAK SPACE}m/s"),
         (0.793, "°", "0.793°"),
         (0.361, "px", "0.361\N{NO-BREAK SPACE}px"),
+        (0.35, "m/s^2", "0.350\N{NO-BREAK SPACE}m/s^2"),
+        (0.00112, "rad/s/sqrt(Hz)", "0.00112\N{NO-BREAK SPACE}rad/s/sqrt(Hz)"),
         (1.06, "recorded over seen", "1.06"),
         (12.0, "frames", "12"),
     ],

@@ -13,7 +13,7 @@ from PIL import Image
 
 from fgbaseline.diagnosis import diagnose
 from fgbaseline.reports import figures
-from fgbaseline.reports.figures.style import (
+from fgbaseline.reports.figures.palette import (
     DARK_GROUND,
     DASHES,
     ESTIMATOR_COLORS,
@@ -24,8 +24,8 @@ from fgbaseline.reports.figures.style import (
     on_dark,
 )
 from fgbaseline.reports.html import comparison_page, diagnosis_page
-from fgbaseline.reports.html.interactive import policy
 from fgbaseline.reports.html.plot_encoding import embedded_json, floats
+from fgbaseline.reports.html.rendering import policy
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.diagnosis import found_by
 

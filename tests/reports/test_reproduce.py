@@ -80,10 +80,13 @@ def test_claims_are_tested_and_equal_in_both_forms(reproduced: Path) -> None:
     verdicts = {(c["recording"], c["code"]): c for c in found["claims"]}
     mapping = verdicts["<b>drive&", "mapping"]
     assert mapping["verdict"] == "holds in part"
-    assert "equal to the last bit" in mapping["measured"]
+    assert "the trajectories are bitwise equal" in mapping["measured"]
     assert "with W = 0 the filter fails" in verdicts["<b>drive&", "low noise"]["measured"]
     assert not verdicts["<b>drive&", "works"]["simulated"]
     assert verdicts["velocities", "works"]["simulated"]
+    for recording in found["recordings"]:
+        lost, measured = recording["stages"][0]["lost"], verdicts[recording["name"], "works"]["measured"]
+        assert ("the printed covariance is not positive definite at" in measured) == (lost > 0)
     assert not verdicts["velocities", "prediction"]["simulated"]
     assert verdicts["03.npz", "recording"]["verdict"] == "cannot tell"
     assert verdicts["10.npz", "recording"]["verdict"] == "cannot tell"

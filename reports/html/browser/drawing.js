@@ -46,15 +46,18 @@ function thinned(line, [first, last], pixels) {
   return frames;
 }
 
+// The median of those values that are finite; NaN without any.
+function median(values) {
+  const known = values.filter(Number.isFinite).sort((a, b) => a - b);
+  const half = known.length >> 1;
+  return known.length % 2 ? known[half] : (known[half - 1] + known[half]) / 2;
+}
+
 // Medians of a line over the frames around every `half`-th frame between two ends, which are among them: [frame, value].
 function runningMedian(line, [first, last], half) {
   const frames = Array.from({ length: Math.floor((last - first) / half) + 1 }, (_, i) => first + i * half);
   if (frames[frames.length - 1] !== last) frames.push(last);
-  return frames.map(k => {
-    const around = Array.from(line.subarray(Math.max(0, k - half), k + half + 1)).filter(Number.isFinite).sort((a, b) => a - b);
-    const middle = around.length >> 1;
-    return [k, around.length % 2 ? around[middle] : around.length ? (around[middle - 1] + around[middle]) / 2 : NaN];
-  });
+  return frames.map(k => [k, median(Array.from(line.subarray(Math.max(0, k - half), k + half + 1)))]);
 }
 
 const SAMPLES = 200;  // places of two lines that are compared

@@ -110,18 +110,12 @@ class FrameView {
   summarize(seen, key) {
     const name = key ? trajectories.get(key).name : "";
     const of = fate => seen.filter(one => one.fate === fate);
-    const middle = some => {
-      const errors = some.map(one => one.error).filter(Number.isFinite).sort((a, b) => a - b);
-      const half = errors.length >> 1;
-      if (errors.length === 0) return NaN;
-      return errors.length % 2 ? errors[half] : (errors[half - 1] + errors[half]) / 2;
-    };
     const parts = [`${seen.length} observation${seen.length === 1 ? "" : "s"}`];
     const kinds = { used: `used by ${name}`, rejected: name ? `in the problem, not used by ${name}` : "in the problem", excluded: "excluded by the mask" };
     for (const [fate, text] of Object.entries(kinds)) {
       const some = of(fate);
       if (some.length === 0) continue;
-      const error = middle(some);
+      const error = median(some.map(one => one.error));
       const errors = Number.isFinite(error) ? ` (median error ${quantity(error, "px")})` : "";
       parts.push(`${some.length} ${text}${errors}`);
     }

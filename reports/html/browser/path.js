@@ -5,6 +5,8 @@ const CHI = Math.sqrt(5.991);  // 95 % of a plane's two degrees of freedom
 const ACROSS = 1.96;  // sigmas: 95 % of one degree of freedom
 const EDGES = 400;  // points of an edge of the band
 
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
 // a^T P b of the packed covariance xx, xy, xz, yy, yz, zz.
 const times = (P, a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2] * b[2]
   + P[1] * (a[0] * b[1] + a[1] * b[0]) + P[2] * (a[0] * b[2] + a[2] * b[0]) + P[4] * (a[1] * b[2] + a[2] * b[1]);
@@ -12,21 +14,15 @@ const times = (P, a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2]
 class PathView {
   constructor(place) {
     this.place = place.querySelector(".plot");
-    this.words = place.querySelector(".view");
     this.svg = svg("svg", { tabindex: "0", role: "application", "aria-label": place.dataset.label });
     this.place.append(this.svg);
-    this.solid = false;
-    this.landmarks = false;
-    this.ellipses = false;
-    this.band = false;
-    this.follow = false;
-    this.factor = 1;
+    Object.assign(this, { solid: false, landmarks: false, ellipses: false, band: false, follow: false, factor: 1 });
     this.reference = [...trajectories.values()].find(trajectory => isReference(trajectory.key));
     this.apart = new Map();  // displaced paths by key
     this.extent = this.bounds();
+    this.center = this.extent.low.map((value, i) => (value + this.extent.high[i]) / 2);
     this.reset();
-    this.buttons(place);
-    this.listen();
+    new PathControls(this, place);
     whenResized(this.place, () => this.draw());
     onShown.push(() => this.draw());
     onFrame.push(() => (this.follow ? this.draw() : this.drawCursor()));
@@ -71,28 +67,19 @@ class PathView {
     this.upright = !this.solid && high[1] - low[1] > 1.2 * (high[0] - low[0]);
   }
 
-  // Rows of the rotation into the picture: to the right, up, and towards the eye.
-  axes() {
-    const turn = this.turn + (this.upright ? Math.PI / 2 : 0);
-    const [c, s] = [Math.cos(turn), Math.sin(turn)];
-    const [ct, st] = [Math.cos(this.tilt), Math.sin(this.tilt)];
-    return [[c, s, 0], [-s * st, c * st, ct], [s * ct, -c * ct, st]];
-  }
-
+  // The axes of the picture, to the right and up, its scale in px/m, and where a position is in it.
   prepare() {
-    const width = this.width;
-    const height = this.height;
-    const { low, high } = this.extent;
-    const [right, up] = this.axes();
-    const middle = (this.follow && this.here()) || low.map((value, i) => (value + high[i]) / 2);
-    const spread = axis => axis.reduce((sum, a, i) => sum + Math.abs(a) * (high[i] - low[i]), 0) || 1;
-    const fit = Math.min((width - 40) / spread(right), (height - 64) / spread(up));
+    const turn = this.turn + (this.upright ? Math.PI / 2 : 0);
+    const [c, s, ct, st] = [Math.cos(turn), Math.sin(turn), Math.cos(this.tilt), Math.sin(this.tilt)];
+    const [right, up] = [[c, s, 0], [-s * st, c * st, ct]];
+    const size = this.extent.high.map((value, i) => value - this.extent.low[i]);
+    const spread = axis => dot(axis.map(Math.abs), size) || 1;
+    const fit = Math.min((this.width - 40) / spread(right), (this.height - 64) / spread(up));
     const m = this.zoom * Math.min(fit, 1e6);
-    this.scale = m;
-    const x0 = width / 2 + this.pan[0] - m * right.reduce((sum, a, i) => sum + a * middle[i], 0);
-    const y0 = (height - 16) / 2 + this.pan[1] + m * up.reduce((sum, a, i) => sum + a * middle[i], 0);
-    this.right = right;
-    this.up = up;
+    const middle = (this.follow && this.here()) || this.center;
+    const x0 = this.width / 2 + this.pan[0] - m * dot(right, middle);
+    const y0 = (this.height - 16) / 2 + this.pan[1] + m * dot(up, middle);
+    Object.assign(this, { right, up, scale: m });
     this.project = (p, i) => [
       x0 + m * (right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2]),
       y0 - m * (up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2]),
@@ -254,90 +241,14 @@ class PathView {
     this.cursor.replaceChildren(...parts);
   }
 
-  nearest(event) {
-    const box = this.svg.getBoundingClientRect();
-    const [px, py] = [event.clientX - box.left, event.clientY - box.top];
-    let best = null;
-    let least = 22 ** 2;
-    for (const trajectory of this.shown()) {
-      const path = this.path(trajectory);
-      for (let k = 0; k < run.frames; k++) {
-        if (!Number.isFinite(path[3 * k])) continue;
-        const [x, y] = this.project(path, 3 * k);
-        const away = (x - px) ** 2 + (y - py) ** 2;
-        if (away < least) [least, best] = [away, { trajectory, frame: k }];
-      }
-    }
-    return best;
-  }
-
-  showNearest(event) {
-    const near = this.nearest(event);
-    if (near === null) return hideHint();
-    const { trajectory, frame } = near;
-    const errors = ["divergence", "error"].flatMap(name => {
-      const chart = charts.find(one => one.name === name);
-      const line = chart && chart.lines.get(trajectory.key);
-      return line ? [[`${quantity(line[frame], "m")} from ${name === "error" ? "the truth" : run.reference}`, null]] : [];
-    });
-    return showHint(event, [[trajectory.name, trajectory.key], [momentOf(frame), null], ...errors]);
-  }
-
-  change(how) {
-    how();
-    this.draw();
-  }
-
-  listen() {
-    let from = null;
-    let moved = false;
-    this.svg.addEventListener("pointerdown", event => {
-      from = [event.clientX, event.clientY];
-      moved = false;
-    });
-    this.svg.addEventListener("pointermove", event => {
-      if (from === null) return this.showNearest(event);
-      const [dx, dy] = [event.clientX - from[0], event.clientY - from[1]];
-      if (!moved && Math.hypot(dx, dy) < 4) return undefined;
-      if (!moved) this.svg.setPointerCapture(event.pointerId);
-      moved = true;
-      from = [event.clientX, event.clientY];
-      hideHint();
-      return this.change(() => this.drag(dx, dy));
-    });
-    const end = () => { from = null; };
-    this.svg.addEventListener("pointerup", end);
-    this.svg.addEventListener("pointercancel", end);
-    this.svg.addEventListener("pointerleave", hideHint);
-    this.svg.addEventListener("click", event => {
-      const near = moved ? null : this.nearest(event);
-      if (near) goTo(near.frame);
-    });
-    this.svg.addEventListener("wheel", event => {
-      if (!event.ctrlKey && document.activeElement !== this.svg) return;
-      event.preventDefault();
-      this.change(() => this.magnify(Math.exp(-0.0015 * event.deltaY)));
-    }, { passive: false });
-    this.svg.addEventListener("keydown", event => {
-      const steps = { ArrowLeft: [-30, 0], ArrowRight: [30, 0], ArrowUp: [0, -30], ArrowDown: [0, 30] };
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (steps[event.key]) this.change(() => this.drag(...steps[event.key]));
-      else if (event.key === "+" || event.key === "=") this.change(() => this.magnify(1.3));
-      else if (event.key === "-") this.change(() => this.magnify(1 / 1.3));
-      else if (event.key === "0") this.change(() => this.reset());
-      else return;
-      event.preventDefault();
-    });
-  }
-
   drag(dx, dy) {
-    if (!this.solid) {
-      if (this.follow) this.stopFollowing();
-      this.pan = [this.pan[0] + dx, this.pan[1] + dy];
+    if (this.solid) {
+      this.turn -= 0.008 * dx;
+      this.tilt = Math.max(-1.57, Math.min(1.57, this.tilt + 0.008 * dy));
       return;
     }
-    this.turn -= 0.008 * dx;
-    this.tilt = Math.max(-1.57, Math.min(1.57, this.tilt + 0.008 * dy));
+    if (this.follow) this.stopFollowing();
+    this.pan = [this.pan[0] + dx, this.pan[1] + dy];
   }
 
   magnify(factor) {
@@ -347,40 +258,8 @@ class PathView {
 
   // The picture stays where it is when it no longer follows the cursor.
   stopFollowing() {
-    const { low, high } = this.extent;
-    const from = low.map((value, i) => (value + high[i]) / 2);
-    const moved = (this.here() || from).map((value, i) => value - from[i]);
-    const along = axis => this.scale * axis.reduce((sum, a, i) => sum + a * moved[i], 0);
-    this.pan = [this.pan[0] - along(this.right), this.pan[1] + along(this.up)];
+    const moved = (this.here() || this.center).map((value, i) => value - this.center[i]);
+    this.pan = [this.pan[0] - this.scale * dot(this.right, moved), this.pan[1] + this.scale * dot(this.up, moved)];
     this.follow = false;
-    press(this.followButton, false);
-  }
-
-  buttons(place) {
-    this.followButton = place.querySelector('[data-do="follow"]');
-    const factor = place.querySelector("select");
-    factor.closest("label").hidden = !this.reference || trajectories.size < 2;
-    factor.addEventListener("change", () => this.change(() => {
-      this.factor = Number(factor.value);
-      this.apart.clear();
-    }));
-    for (const button of place.querySelectorAll("button")) {
-      const what = button.dataset.do;
-      button.addEventListener("click", () => {
-        if (["solid", "landmarks", "ellipses", "band", "follow"].includes(what)) {
-          this[what] = !this[what];
-          press(button, this[what]);
-          if (what === "solid") {
-            this.reset();
-            this.words.textContent = this.solid ? "In 3D." : "From above.";
-          }
-          if (what === "follow") this.pan = [0, 0];
-        } else if (what === "larger") {
-          press(button, place.classList.toggle("large"));
-        } else if (what === "reset") this.reset();
-        else this.magnify(what === "in" ? 1.4 : 1 / 1.4);
-        this.draw();
-      });
-    }
   }
 }
