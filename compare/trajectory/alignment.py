@@ -74,9 +74,14 @@ class Alignment(Displayed):
         return moved
 
     @property
+    def method(self) -> str:
+        """Kind of the alignment in words: 'SE(3)-aligned'."""
+        return _CAPTIONS[self.kind]
+
+    @property
     def caption(self) -> str:
         """Alignment for a table's caption: 'SE(3)-aligned over all 120 poses'."""
-        said = _CAPTIONS[self.kind]
+        said = self.method
         if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
             said += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
         if self.kind is Align.SIM3:

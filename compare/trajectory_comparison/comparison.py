@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from fgbaseline.data import Sequence
 
 
+ASSUMED_UP = "assumed"
+"""source of the up direction where no option, file, run or recording gives one"""
+
+
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Result(Displayed):
     """Values of one estimate."""
@@ -64,6 +68,8 @@ class Result(Displayed):
     """smallest difference that the files resolve, by its unit, `m` and `°`"""
     notes: dict[str, str]
     """why values are missing, by key"""
+    up_deviation: float | None = None
+    """deg, angle between the up that its file states, after alignment, and that of the comparison"""
 
     @property
     def name(self) -> str:

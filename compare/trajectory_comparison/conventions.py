@@ -50,8 +50,13 @@ class Resolved:
 
     @property
     def up(self) -> FloatArray | None:
-        """(3,) what points up in its world, where the format defines it."""
+        """(3,) what points up in its world, where the file or its format defines it."""
         return self.source.up if isinstance(self.source, ParsedTrajectory) else None
+
+    @property
+    def up_stated(self) -> bool:
+        """Whether the file itself states `up`."""
+        return isinstance(self.source, ParsedTrajectory) and self.source.up_stated
 
     @property
     def landmarks(self) -> Landmarks | None:

@@ -22,7 +22,9 @@ class Entry(Displayed):
     covariance: FloatArray | None = None
     """(n, 6, 6) of the right perturbation of each pose"""
     up: FloatArray | None = None
-    """(3,) what points up in its world, where the format of its file defines it"""
+    """(3,) what points up in its world, where its file or the format of the file defines it"""
+    up_stated: bool = False
+    """whether the file itself states `up`"""
     remarks: tuple[str, ...] = ()
     """findings on its file: each completes a sentence that begins with its name"""
     trust: "Trust | None" = None

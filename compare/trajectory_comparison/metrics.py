@@ -13,7 +13,7 @@ from fgbaseline.compare.trajectory.ate_rpe import absolute_error_columns, relati
 from fgbaseline.compare.trajectory.divergence import divergence_columns
 from fgbaseline.compare.trajectory.drift import drift_rates
 from fgbaseline.compare.trajectory.error_decomposition import share_intervals
-from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
 from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.ranking import ranking_of, spread
 from fgbaseline.compare.trajectory_comparison.resolution import position_resolution, rotation_resolution_deg
@@ -54,13 +54,13 @@ class PairedEntries(NamedTuple):
 
 def pair_entries(entries: Entries, settings: Settings) -> PairedEntries:
     """Pairs of poses of all estimates. Raises InputError where one has too few in common with the reference."""
-    up, up_from = _up(entries, settings)
     everything = [entries.reference, *entries.estimates]
     settings = replace(
         settings,
         align=str(settings.align or (Align.NONE if entries.one_world else Align.SE3)),
         deltas=tuple(settings.deltas or _usual(everything)),
     )
+    up, up_from = _up(entries, settings)
     if settings.align == Align.YAW:
         _require_one_up(entries, up)
     matched = {e.name: matched_poses(entries.reference, e, up, settings) for e in entries.estimates}
@@ -109,7 +109,7 @@ def _by_observations(
 def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
     """Direction (3,) of up in the reference's world, and its source.
 
-    Sources in order: the option, the format of the reference, the run, the recording, +z.
+    Sources in order: the option, the reference's file or its format, the run, the recording, an estimate's file, +z.
     """
     if settings.up is not None:
         up = np.asarray(settings.up, dtype=np.float64)
@@ -117,11 +117,24 @@ def _up(entries: Entries, settings: Settings) -> tuple[FloatArray, str]:
             raise InputError(f"up: expected a direction such as 0,0,1, got {settings.up}")
         return up / np.linalg.norm(up), "--up"
     if entries.reference.up is not None:
-        return entries.reference.up, "KITTI's camera frame"
+        by_file = f"the file of {entries.reference.name}"
+        return entries.reference.up, by_file if entries.reference.up_stated else "KITTI's camera frame"
     if entries.up is not None:
         return entries.up, "the run"
     found = _up_by_recording(entries.problem, entries.reference.trajectory)
-    return (np.array([0.0, 0.0, 1.0]), "by default") if found is None else (found, "the recording")
+    if found is not None:
+        return found, "the recording"
+    for entry in entries.estimates:
+        if entry.up is not None and entry.up_stated:
+            return _aligned_up(entries.reference, entry, entry.up, settings), f"the file of {entry.name}"
+    return np.array([0.0, 0.0, 1.0]), ASSUMED_UP
+
+
+def _aligned_up(reference: Entry, entry: Entry, up: FloatArray, settings: Settings) -> FloatArray:
+    """Up (3,) of an estimate's world in the reference's; an alignment by yaw assumes that they are equal."""
+    if settings.align in (Align.NONE, Align.YAW):
+        return up
+    return np.asarray(matched_poses(reference, entry, up, settings)[0].alignment.rotation @ up)
 
 
 def _up_by_recording(problem: "Problem | None", path: Trajectory) -> FloatArray | None:
@@ -133,17 +146,19 @@ def _up_by_recording(problem: "Problem | None", path: Trajectory) -> FloatArray 
 
 
 def _require_one_up(entries: Entries, up: FloatArray) -> None:
-    """Raises InputError where up of the recording is another direction in the world of an estimate."""
-    if entries.problem is None:
-        return
+    """Raises InputError where up is another direction in the world of an estimate, by its file or the recording."""
     for entry in entries.estimates:
-        there = _up_by_recording(entries.problem, entry.trajectory)
-        apart = 0.0 if there is None else float(np.rad2deg(np.arccos(np.clip(there @ up, -1.0, 1.0))))
+        there = entry.up if entry.up_stated else _up_by_recording(entries.problem, entry.trajectory)
+        apart = 0.0 if there is None else _angle_deg(there, up)
         if apart > TILT:
             raise InputError(
                 f"{entry.trajectory.source or entry.name}: up in its world is {apart:.0f} degrees off that of "
                 f"{entries.reference.name}, which a yaw alignment cannot mend; ask for --align se3 or first-pose"
             )
+
+
+def _angle_deg(a: FloatArray, b: FloatArray) -> float:
+    return float(np.rad2deg(np.arccos(np.clip(a @ b, -1.0, 1.0))))
 
 
 def _usual(entries: list[Entry]) -> tuple[Delta, ...]:
@@ -190,6 +205,9 @@ def _compared(paired: PairedEntries, entry: Entry, paths: Mapping[str, FloatArra
         resolution={"m": position_resolution(*positions), "°": rotation_resolution_deg(*positions)},
         map=_or_note("map", notes, lambda: _map(entries, entry, paths, matched)),
         notes=notes,
+        up_deviation=_angle_deg(matched.alignment.rotation @ entry.up, up)
+        if entry.up is not None and entry.up_stated
+        else None,
     )
 
 

@@ -57,7 +57,7 @@ class Settings:
     align_first: int | None = None
     """number of pairs of poses to align over; None for all"""
     up: tuple[float, float, float] | None = None
-    """up in the reference's world; None for that of the run or `sequence`, else +z"""
+    """up in the reference's world; None for that of the files, the run or `sequence`, else +z"""
     association: str = "nearest"
     tolerance: float | None = None
     """largest time difference of a pair, s; None for that of the association"""

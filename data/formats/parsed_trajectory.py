@@ -51,7 +51,9 @@ class ParsedTrajectory:
     covariance_numbers: FloatArray | None = None
     """(n, 12), (n, 36) as written in text, or (n, 6, 6) of the right perturbation"""
     up: FloatArray | None = None
-    """(3,) unit vector that points up in the world of the poses, if the format defines it"""
+    """(3,) unit vector that points up in the world of the poses, if a comment or the format defines it"""
+    up_stated: bool = False
+    """whether a comment of the file states `up`"""
     landmarks: Landmarks | None = None
     """landmarks in the world of the poses, if the source has them"""
     remarks: tuple[str, ...] = ()

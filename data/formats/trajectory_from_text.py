@@ -18,6 +18,8 @@ from .trajectory_text import TrajectoryText
 
 UP_OF_CAMERA = (0.0, -1.0, 0.0)
 """in the world of KITTI's poses: the left camera's frame 0, x right, y down, z forward"""
+ROUNDING = 1e-12
+"""deviation of a unit vector's length from 1"""
 STEPS = (0.01, 0.1, 1.0, 10.0, 100.0)
 """m, steps of positions that are rounded to decimal digits"""
 MIN_STEPS = 1e4
@@ -38,7 +40,10 @@ def parse_text(text: TrajectoryText) -> ParsedTrajectory:
     if columns.remark:
         remarks.append(columns.remark)
     line, pose = numbers[kept], pose[kept]
-    file = ParsedTrajectory(text.name, text.source, np.empty((0, 3)), None, line, remarks=tuple(remarks))
+    up = _stated_up(lines)
+    file = ParsedTrajectory(
+        text.name, text.source, np.empty((0, 3)), None, line, up=up, up_stated=up is not None, remarks=tuple(remarks)
+    )
     if stamp is not None:
         file, kept = _with_stamps(file, lines, columns, kept, stamp[kept], pose[:, :n_pose])
         pose, line = pose[kept], line[kept]
@@ -46,7 +51,8 @@ def parse_text(text: TrajectoryText) -> ParsedTrajectory:
     if columns.matrix:
         poses = kitti_poses(pose[:, :12], line)
         position, rotation = poses[:, :3, 3], poses[:, :3, :3]
-        return replace(file, position=position, rotation=rotation, up=_up_of_camera(position, rotation))
+        up = _up_of_camera(position, rotation) if file.up is None else file.up
+        return replace(file, position=position, rotation=rotation, up=up)
     if columns.length in METERS:
         pose = _in_meters(pose, METERS[columns.length], columns)
         file = replace(file, remarks=(*file.remarks, f"its positions are in {columns.length} and are given in m"))
@@ -167,6 +173,23 @@ def _covariance_remark(columns: Columns) -> tuple[str, ...]:
     if len(columns.covariance) == 12:
         return ("its covariances are read as OpenVINS writes them: rotation in the body, then position in the world",)
     return ("its covariances are read as in ROS: position, then rotation, both in the world",)
+
+
+def _stated_up(lines: Lines) -> FloatArray | None:
+    """Unit vector (3,) of a comment `# up x y z` above the data. Raises InputError where it is no direction."""
+    for comment in lines.comments:
+        word, *rest = comment.replace(",", " ").split()
+        if word.rstrip(":=").lower() != "up" or len(rest) != 3:
+            continue
+        try:
+            up = np.array(rest, dtype=np.float64)
+        except ValueError:
+            continue  # the words of a sentence
+        length = float(np.linalg.norm(up))
+        if not (np.isfinite(length) and length > 0.0):
+            raise InputError(f"its comment '# {comment}' gives no direction; write up as x y z, such as 0 0 1")
+        return up if abs(length - 1.0) < ROUNDING else np.asarray(up / length)  # ours comes back bit by bit
+    return None
 
 
 def _up_of_camera(position: FloatArray, rotation: FloatArray) -> FloatArray | None:

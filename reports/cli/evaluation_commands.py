@@ -27,7 +27,8 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
 @click.option(
     "--up",
     type=XYZ,
-    help="Up in the reference's world.  [default: 0,-1,0 in KITTI files; else by the run or --sequence, else 0,0,1]",
+    help="Up in the reference's world.  [default: by a file's comment '# up x y z', KITTI's format, the run or "
+    "--sequence, else 0,0,1]",
 )
 @choice("--association", "nearest", "interpolated", what="Association of poses by time, each at most once.")
 @click.option("--tolerance", type=float, metavar="S", help="Largest time difference of a pair.  [default: 0.01]")

@@ -71,7 +71,7 @@ def compare_trajectories(
         estimates: One trajectory, several, or several by name.
         align: Alignment of each estimate; by default "none" against a run, which has the same world, else "se3".
         align_first: Number of poses to align over; by default all.
-        up: Up in the reference's world; by default that of its format, run or `sequence`, else (0, 0, 1).
+        up: Up in the reference's world; by default that of its file, format, run or `sequence`, else (0, 0, 1).
         association: Whether poses are paired by the nearest stamp, or interpolated.
         tolerance: Largest time difference of a pair, s; by default 0.01.
         offset: Added to the stamps of the estimates, s.

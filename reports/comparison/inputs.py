@@ -99,7 +99,8 @@ def in_one_body(
     """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
     times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
-        Entry(each.trajectory(times), each.landmarks, each.covariance, each.up, each.remarks) for each in every
+        Entry(each.trajectory(times), each.landmarks, each.covariance, each.up, each.up_stated, each.remarks)
+        for each in every
     ]
     bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
     if settings.lever_arm is not None and bodies[0] != bodies[1]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fgbaseline.compare.columns import Columns
-from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
 from fgbaseline.compare.trajectory_comparison.metrics import PairedEntries, compare_paired, pair_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
@@ -137,9 +137,10 @@ class ComparisonReport(NotebookResult, Comparison):
             write_csv(folder / "relative" / f"{name}.csv", _by_delta(motions), "%.9g")
         for name, result in self.results.items():
             _write_series(result, folder / "series" / f"{name}.csv")
+        up = None if self.up_from == ASSUMED_UP else self.up
         paths = [self.reference.trajectory, *(result.matched.estimate for result in self.results.values())]
         for path in paths:
-            write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body)
+            write_tum(folder / "trajectories" / f"{path.name}.tum", path.t, path.world_T_body, up)
         write_csv(folder / "table.csv", main_columns(self, self.by_name))
         write_csv(folder / "metrics.csv", metrics_columns(self, self.by_name))
         for file, text in {

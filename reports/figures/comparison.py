@@ -96,7 +96,7 @@ def errors(data: ComparisonData, style: Style = SCREEN) -> Figure:
     axes[-1].set_xlabel("time, s" if data.stamped else "frame")
     nearest = [f"{safe_text(name)} {rmse:.3g} m" for name, rmse in data.rmse.items()]
     each = ", ".join(nearest) if sum(map(len, nearest)) < TITLE_ROOM else f"nearest {nearest[0]}"
-    title = f"Difference from {safe_text(data.reference)}" + (f" (RMSE: {each})" if nearest else "")
+    title = f"Errors against {safe_text(data.reference)}, {data.alignment}" + (f" (RMSE: {each})" if nearest else "")
     title_and_legend(figure, title, handles, style)
     return figure
 
@@ -118,7 +118,7 @@ def growth(data: ComparisonData, style: Style = SCREEN) -> Figure:
         axes[1].set_ylabel("heading, °")
         axes[1].axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
     axes[-1].set_xlabel("path length of the reference so far, m")
-    title_and_legend(figure, f"How the difference grows along the trajectory, {data.alignment}", handles, style)
+    title_and_legend(figure, f"Position and heading error over the path length, {data.alignment}", handles, style)
     return figure
 
 
@@ -134,7 +134,8 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
             _boxes(panel, names, data.colors, motions, column)
             panel.set(xlabel=f"over {delta}: {column.removesuffix('_deg')}, {unit}", xlim=(0.0, None))
-    title_and_legend(figure, f"Errors of the motion between {data.pairs} of poses", style=style)
+    over = " and ".join(data.relative)
+    title_and_legend(figure, f"Relative errors (RPE) over {over}, {data.pairs}", style=style)
     return figure
 
 
@@ -180,9 +181,9 @@ def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
 
 EACH: Captioned = {
     "paths": (paths, "Trajectories from above, {alignment} to {reference}."),
-    "errors": (errors, "Position and rotation difference from {reference} over time, {alignment}."),
-    "growth": (growth, "Difference from {reference} over its path length, {alignment}."),
-    "relative": (relative, "Errors of the motion between {pairs} of poses; boxes hold the middle half, whiskers 90 %."),
+    "errors": (errors, "Position and rotation error against {reference} over time, {alignment}."),
+    "growth": (growth, "Position and heading error against {reference} over its path length, {alignment}."),
+    "relative": (relative, "Relative errors (RPE), {pairs}; boxes hold the middle half, whiskers 90 %."),
     "segments": (segments, "Segment errors ({lengths})."),
     "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
 }

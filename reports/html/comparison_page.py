@@ -1,6 +1,6 @@
 """Page of a comparison."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from matplotlib.figure import Figure
@@ -9,7 +9,7 @@ from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..figures.comparison_data import of_comparison
 from ..figures.saving import EncodedFigure
-from ..formatting import counted, number
+from ..formatting import counted, listed, number
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables.comparison import comparison_table
@@ -21,7 +21,8 @@ from .rendering import render_page
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
     "errors": "Differences of paired poses along the reference's direction of travel, to its left and up.",
-    "growth": "Difference over the path length; a heading to the left is positive.",
+    "growth": "Errors over the path length; a heading to the left is positive. An alignment over many poses "
+    "spreads the error over all of them: growth is seen with --align first-pose.",
     "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. Relative errors do not "
     "depend on alignment or earlier errors.",
     "segments": "Mean over all segments of a length, per meter.",
@@ -39,6 +40,7 @@ STILLS = ("paths", "errors")
 
 def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure | EncodedFigure]) -> str:
     """`report.html` of a comparison."""
+    settings = {name: value for name, value in summary.settings.items() if value is not None}
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
     drawn = pictures(figures, CAPTIONS)
@@ -50,7 +52,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     grid = Grid(
         replace(
             table,
-            name="figure",
+            name="metric",
             caption=f"{table.caption} Best of a row in bold.",
             rows=tuple(_with_intervals_below(row) for row in table.rows),
         )
@@ -73,13 +75,13 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                 ),
                 Section(
                     "evidence",
-                    "Relative errors, segments, pixels and map",
+                    _beyond_title(drawn, bool(bands)),
                     [*beyond, *folded],
                     "Beyond the trajectories",
                 ),
                 Section("stills", "Still figures", [still_figures(stills)] if stills else []),
             ],
-            settings={"Missing values": notes, "Files": sources, "Settings": summary.settings},
+            settings={"Missing values": notes, "Files": sources, "Settings": settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=drawn.get("paths"),
@@ -90,11 +92,21 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
 def _about(summary: Summary) -> str:
     reference = summary.reference
     lasting = "" if reference.duration_s is None else f" in {number(reference.duration_s)} s"
+    paired = all(e.pairing.pairs == e.poses == reference.poses for e in summary.estimates.values())
+    interpolated = "" if paired else " Between the poses of an estimate, lines are interpolated."
     pixels = "" if summary.sequence is None else f" Reprojection is of the observations of {summary.sequence}."
     return (
-        f"The reference has {counted(reference.poses, 'pose')}{lasting} along {number(reference.path_m)} m.{pixels} "
-        "Charts and trajectories are interpolated between the poses of an estimate."
+        f"The reference has {counted(reference.poses, 'pose')}{lasting} along {number(reference.path_m)} m.{pixels}"
+        f"{interpolated}"
     )
+
+
+def _beyond_title(names: Iterable[str], has_bands: bool) -> str:
+    """Title of the section below the charts, from the figures that it has."""
+    of = {"relative": "relative errors", "segments": "segment errors", "map": "map", "reprojection": "reprojection"}
+    parts = [text for beginning, text in of.items() if any(name.startswith(beginning) for name in names)]
+    title = listed([*parts, *(["±3-sigma bounds"] if has_bands else [])])
+    return title[:1].upper() + title[1:]
 
 
 def _with_intervals_below(row: Row) -> Row:

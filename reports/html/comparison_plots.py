@@ -108,13 +108,13 @@ def _charts(comparison: Comparison, data: ComparisonData, t: FloatArray, paths: 
     heights, medians = {n: path[:, 2] for n, path in paths.items()}, _pixels(comparison, t)
     along = {"log": True, "smooth": True, "hint": "with landmarks triangulated along each path"}
     groups = {
-        "Differences": [
-            difference("divergence", f"Distance from {of}, {how}", "m", "position"),
-            difference("rotation", f"Rotation from {of}, {how}", "°", "rotation_deg"),
+        "Position and rotation": [
+            difference("divergence", f"Position error against {of}, {how}", "m", "position"),
+            difference("rotation", f"Rotation error against {of}, {how}", "°", "rotation_deg"),
             difference("along", f"Ahead of {of}", "m", "along"),
             difference("across", f"To the left of {of}", "m", "across"),
             difference("above", f"Above {of}", "m", "up"),
-            difference("heading", f"Heading from {of}, to the left", "°", "heading_deg"),
+            difference("heading", f"Heading error against {of}, to the left", "°", "heading_deg"),
             chart("height", "Height above the reference's start", "m", lines(heights)),
         ],
         "Consistency": [chart("nees", "NEES", "", lines(nees), **poses)],

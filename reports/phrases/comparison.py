@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
-from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison
+from fgbaseline.compare.trajectory_comparison.metrics import TILT
 from fgbaseline.compare.trajectory_comparison.samples import samples
 
 from ..formatting import counted, grouped, listed, number, per_cent
@@ -23,12 +24,15 @@ def caption(comparison: Comparison) -> str:
     """Association, alignment, up and the kind of interval: stands under every table."""
     names = grouped((result.matched.caption, result.name) for result in comparison.results.values())
     parts = [text if len(names) == 1 else f"{listed(those)}: {text}" for text, those in names.items()]
-    up = ", ".join(f"{x:.3g}" for x in (np.round(comparison.up, 6) + 0.0))
     name = comparison.reference.name
     return (
-        f"Compared with {name}: {'. '.join(parts)}. Up is ({up}) in the world of {name} ({comparison.up_from}). "
-        "Brackets: 95 % intervals (block bootstrap)."
+        f"Compared with {name}: {'. '.join(parts)}. Up is {_shown_up(comparison)} in the world of {name} "
+        f"({comparison.up_from}). Brackets: 95 % intervals (block bootstrap)."
     )
+
+
+def _shown_up(comparison: Comparison) -> str:
+    return f"({', '.join(f'{x:.3g}' for x in (np.round(comparison.up, 6) + 0.0))})"
 
 
 def verdict(comparison: Comparison) -> list[str]:
@@ -39,6 +43,7 @@ def verdict(comparison: Comparison) -> list[str]:
         _reported_covariances,
         position_rmse,
         maximum_errors,
+        _up_direction,
         file_resolution,
         _file_remarks,
         error_decompositions,
@@ -74,6 +79,25 @@ def _reference(comparison: Comparison) -> list[str]:
     if trust is None:
         return [f"The reference, {name}, is taken as given: its file has no information on its accuracy."]
     return [reference_sentence(name, trust)]
+
+
+def _up_direction(comparison: Comparison) -> list[str]:
+    """States that up is assumed, or contradicted by the file of an estimate."""
+    name = comparison.reference.name
+    if comparison.up_from == ASSUMED_UP:
+        return [
+            f"Up is not known from these files; {_shown_up(comparison)} in the world of {name} is assumed "
+            "(--up sets it).",
+            "View, height, left, above and heading depend on it.",
+        ]
+    if comparison.up_from == "--up":
+        return []
+    return [
+        f"The file of {result.name} states another up direction: after alignment it is {result.up_deviation:.0f}° off "
+        f"that of the comparison ({comparison.up_from})."
+        for result in comparison.results.values()
+        if result.up_deviation is not None and result.up_deviation > TILT
+    ]
 
 
 def _file_remarks(comparison: Comparison) -> list[str]:

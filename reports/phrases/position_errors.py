@@ -31,13 +31,19 @@ def position_rmse(comparison: Comparison) -> list[str]:
         share = f" ({per_cent(others[0].rmse / path)} of the path length, {number(path)} m)" if path > 0 else ""
         first, *rest = (f"{result.name} {_rmse(result)}" for result in others)
         each = listed([f"{first}{share}", *rest])
-        return [f"Position RMSE against {name}: {each}.", *_order(comparison), *by_products]
+        return [f"Position RMSE against {_reference(comparison)}: {each}.", *_order(comparison), *by_products]
     each = listed(
         f"{r.name} {_rmse(r)} over {counted(len(r.matched), 'pose')} "
         f"({per_cent(coverage(comparison, r))} of {name}'s time)"
         for r in others
     )
     return [*_over_common(comparison), f"Position RMSE over all poses of each estimate: {each}.", *by_products]
+
+
+def _reference(comparison: Comparison) -> str:
+    """The reference, and the alignment of all estimates to it."""
+    alignment = next(iter(comparison.results.values())).matched.alignment
+    return f"{comparison.reference.name}, {alignment.method}"
 
 
 def _over_common(comparison: Comparison) -> list[str]:
@@ -48,7 +54,8 @@ def _over_common(comparison: Comparison) -> list[str]:
         return [f"Not ranked, too few poses in common: {listed([*ranking.rivals, *apart])}."]
     each = listed(f"{n} {number(ranking.rmse(n))} m" for n in ranking.rivals)
     having = "the others have" if apart else "all have"
-    text = f"Position RMSE against {name} over the {counted(ranking.moments, 'pose')} that {having}: {each}."
+    common = f"over the {counted(ranking.moments, 'pose')} that {having}"
+    text = f"Position RMSE against {_reference(comparison)}, {common}: {each}."
     missing = [f"Not ranked, too few poses in common with {name}: {listed(apart)}."] if apart else []
     return [text, *_order(comparison), *missing]
 
@@ -116,8 +123,9 @@ def error_decompositions(comparison: Comparison) -> list[str]:
                 others += 1
                 continue
             each.append(
-                f"of {result.name} {_share(result, 'heading')} from heading and {_share(result, 'scale')} from scale "
-                f"(least-squares scale {1.0 + 0.01 * result.shares.scale_percent:.4f})"
+                f"of {result.name}, {_share(result, 'heading')} is from heading, {_share(result, 'scale')} from scale "
+                f"(least-squares scale {1.0 + 0.01 * result.shares.scale_percent:.4f}) and "
+                f"{per_cent(max(result.shares.noise, 0.0))} from the rest"
             )
     below = f"heading and scale have less than {per_cent(NOTABLE_SHARE)} each"
     if others:

@@ -233,7 +233,7 @@ class Up(Part):
     """The direction that points up in the world of the reference."""
 
     direction: tuple[float, float, float]
-    source: Annotated[str, Field(description="from where it is known: an option, a format, a run, a recording")]
+    source: Annotated[str, Field(description="its source: an option, a file, a format, a run, a recording, or assumed")]
 
 
 class Summary(Document):

@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from fgbaseline.data import Estimate, write_tum
 from fgbaseline.data.tracking import Pictures
 
 from .. import figures
+from ..formatting import counted
 from ..html.run_page import render
 from ..results.documents import SUMMARY
 from ..results.reader import TRUTH
@@ -43,26 +44,33 @@ def write_run(run: Run, folder: Path, processes: int = 1, pictures: Pictures | N
 def write_numbers(run: Run, folder: Path) -> Summary:
     """Writes all files except figures and page; returns the summary."""
     summary = summarize(run)
+    sequence, truth = run.problem.sequence, run.problem.sequence.truth
     for name in ("trajectories", "landmarks", "series", "tables"):
         (folder / name).mkdir()
     for name, result in run.results.items():
         columns = {str(key): column.to_numpy() for key, column in _series(run, result).items()}
         write_csv(folder / "series" / f"{name}.csv", {"frame": range(run.problem.n_frames), **columns}, "%.9g")
         if result.answered:
-            write_tum(folder / "trajectories" / f"{name}.tum", run.problem.sequence.t, result.estimate.world_T_imu)
+            write_tum(folder / "trajectories" / f"{name}.tum", sequence.t, result.estimate.world_T_imu, sequence.up)
             _write_landmarks(folder / "landmarks" / f"{name}.csv", run, result.estimate)
-    truth = run.problem.sequence.truth
     if truth is not None:
-        write_tum(folder / TRUTH, run.problem.sequence.t, truth.world_T_imu)
+        write_tum(folder / TRUTH, sequence.t, truth.world_T_imu, sequence.up if truth.up is None else truth.up)
     _write_tables(run, folder / "tables")
     metrics_table(summary).to_csv(folder / "metrics.csv", index=False)
     content = summary.content
     main_values(content["estimators"]).to_csv(folder / "table.csv")
-    table = main_table(run, content["estimators"]).transposed("figure")
+    table = main_table(run, content["estimators"]).transposed("metric")
+    table = replace(table, caption=f"{_title(run)} {table.caption}")
     (folder / "table.md").write_text(markdown(table), encoding="utf-8")
     (folder / "table.tex").write_text(latex(table), encoding="utf-8")
     (folder / SUMMARY).write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return summary
+
+
+def _title(run: Run) -> str:
+    """Content of the main table: recording and reference."""
+    against = "" if run.reference is None else f"; the reference is {run.reference}"
+    return f"Estimators on {run.problem.sequence.name} ({counted(run.problem.n_frames, 'frame')}){against}."
 
 
 def write_page(
@@ -130,6 +138,7 @@ def _write_tables(run: Run, folder: Path) -> None:
     """
     if run.trust.criteria:
         criteria = pd.DataFrame([asdict(c) | {"verdict": c.verdict.name.lower()} for c in run.trust.criteria])
+        criteria = criteria.rename(columns={"doubtful": "trusted_limit", "untrusted": "doubtful_limit"})
         criteria.to_csv(folder / "trust.csv", index=False, float_format="%.6g")
     of_each: dict[str, Callable[[Result], pd.DataFrame | None]] = {
         "events": lambda r: pd.DataFrame(r.estimate.events),

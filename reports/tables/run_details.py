@@ -59,7 +59,7 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
             f"{'=' if limit == 0.0 and not c.at_least else sign} {text(limit)}" for limit in (c.doubtful, c.untrusted)
         )
         rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
-    columns = (*numbers("measured", "trusted", "doubtful"), *words("verdict", "remark"))
+    columns = (*numbers("measured", "trusted if", "doubtful if"), *words("verdict", "remark"))
     return Table(columns, tuple(rows), name="criterion")
 
 

@@ -119,14 +119,15 @@ class Table:
         return ((group, list(rows)) for group, rows in groupby(self.rows, key=lambda row: row.group))
 
     def transposed(self, name: str = "") -> "Table":
-        """A row for each column, under the titles of their groups, and a column for each row."""
+        """A row for each column, under the titles of their groups, and a column for each row; the caption follows."""
         columns = tuple(Column(_name(row)) for row in self.rows)
         cells = [row.cells or (Cell(DASH),) * len(self.columns) for row in self.rows]
         rows = tuple(
             Row(column.heading, tuple(of[i] for of in cells), group=column.group, term=column.term)
             for i, column in enumerate(self.columns)
         )
-        return replace(self, columns=columns, rows=rows, name=name)
+        caption = self.caption.replace("Best of a column", "Best of a row")
+        return replace(self, columns=columns, rows=rows, name=name, caption=caption)
 
 
 def mark_best(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:
@@ -235,18 +236,22 @@ def _grown(columns: Sequence[_Width], room: int) -> list[int]:
 
 
 def markdown(table: Table) -> str:
-    """The table in Markdown, its caption below; rows of a group begin with its title."""
+    """The table in Markdown, its caption and notes below; rows of a group begin with its title."""
     grouped = any(row.group for row in table.rows)
     first = ["", ""] if grouped else [table.name]
     align = [*(":--" for _ in first), *(":--" if column.words else "--:" for column in table.columns)]
     lines: list[Sequence[str]] = [[*first, *(md(column.heading) for column in table.columns)], align]
     for row in table.rows:
         cells = [f"**{md(cell.text)}**" if cell.best else md(cell.text) for cell in row.cells]
+        cells = [
+            f"{text} <sup>{cell.note}</sup>" if cell.note else text for text, cell in zip(cells, row.cells, strict=True)
+        ]
         if row.reason and not row.cells:
             cells = [md(row.reason), *[""] * (len(table.columns) - 1)]
         lines.append([*([md(row.group)] if grouped else []), md(_name(row)), *cells])
     caption = ["", md(table.caption)] if table.caption else []
-    return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), *caption, ""])
+    notes = ["", *(f"- <sup>{mark}</sup> {md(text)}." for mark, text in table.notes)] if table.notes else []
+    return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), *caption, *notes, ""])
 
 
 def html(table: Table) -> str:
@@ -262,7 +267,7 @@ def html(table: Table) -> str:
 
 
 def latex(table: Table) -> str:
-    """The table in LaTeX (booktabs), a group of lines for each group of rows; the best of a column in bold."""
+    """The table in LaTeX (booktabs), a group of lines for each group of rows, the notes below; the best in bold."""
     n = len(table.columns)
     body: list[str] = []
     for group, rows in table.by_group:
@@ -270,9 +275,12 @@ def latex(table: Table) -> str:
             body += [r"\midrule", rf"\multicolumn{{{n + 1}}}{{l}}{{\emph{{{tex(group)}}}}} \\"]
         for row in rows:
             cells = [rf"\textbf{{{tex(cell.text)}}}" if cell.best else tex(cell.text) for cell in row.cells]
+            marks = [rf"\textsuperscript{{{cell.note}}}" if cell.note else "" for cell in row.cells]
+            cells = [text + mark for text, mark in zip(cells, marks, strict=True)]
             if row.reason and not row.cells:
                 cells = [rf"\multicolumn{{{n}}}{{l}}{{{tex(row.reason)}}}"]
             body.append(" & ".join([rf"\quad {tex(_name(row))}", *cells]) + r" \\")
+    notes = [rf"\textsuperscript{{{mark}}} {tex(text)}." for mark, text in table.notes]
     return "\n".join(
         [
             r"% needs \usepackage{booktabs}",
@@ -285,6 +293,7 @@ def latex(table: Table) -> str:
             *body,
             r"\bottomrule",
             r"\end{tabular}",
+            *([r"\par\smallskip\footnotesize", *notes] if notes else []),
             r"\end{table}",
             "",
         ]

@@ -108,7 +108,7 @@ def test_an_estimate_that_lost_track_half_way_is_ranked_over_what_both_have(lost
     assert list(result.ranking.rivals) == ["whole", "lost"]
     assert result.results["whole"].rmse > result.results["lost"].rmse
     said = " ".join(result.verdict)
-    assert "Position RMSE against gt over the 100 poses that all have: whole " in said
+    assert "Position RMSE against gt, not aligned, over the 100 poses that all have: whole " in said
     assert "Larger position RMSE than whole, by paired bootstrap: lost (" in said
     assert "100 poses (49.7 % of gt's time)" in said
     estimates = result.summary.estimates

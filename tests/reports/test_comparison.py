@@ -71,7 +71,7 @@ def test_three_lines_give_tables_and_figures(files: Path) -> None:
     assert set(result.figures()) == {"paths", "errors", "growth", "relative", "segments"}
     assert set(result.metrics.columns) == {"estimate", "metric", "value", "low", "high"}
     assert result.verdict[0].startswith("The reference, truth, is taken as given")
-    assert any(sentence.startswith("Position RMSE against truth: near ") for sentence in result.verdict)
+    assert any(sentence.startswith("Position RMSE against truth, SE(3)-aligned: near ") for sentence in result.verdict)
 
 
 def test_the_figures_of_the_table_are_evos(files: Path) -> None:

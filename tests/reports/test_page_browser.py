@@ -318,7 +318,7 @@ def test_a_comparison_is_clicked_through_as_a_run_is(chromium: Any, compared: st
     opened.page.uncheck('#estimators-shown input[value="1"]')
     assert opened.count("#path-view svg .estimator-1") == opened.count("#over-time .line.estimator-1") == 0
     opened.unfold_values()
-    row = opened.text("#values tr:has-text('Distance from truth')").split("\t")
+    row = opened.text("#values tr:has-text('Position error against truth')").split("\t")
     at_ten = six().results["steady"].divergence["position"][10]
     assert row[2] == f"{at_ten:#.3g}"
     assert (opened.said, opened.asked) == ([], [compared])
