@@ -35,7 +35,7 @@ coverage: install
 	$(BIN)/coverage combine --quiet
 	rm -f out/coverage/data.*
 	$(BIN)/coverage json --quiet --fail-under 0
-	$(BIN)/python -m benchmarks.branches --at-least 92
+	$(BIN)/python -m benchmarks.branch_coverage --at-least 92
 	$(BIN)/coverage report
 
 # Small errors put into compare and ekf, some in each module: do the tests notice? docs/mutants.md is written anew.
@@ -75,7 +75,7 @@ BENCH_FLAGS :=
 bench: install
 	$(BIN)/python -m benchmarks.performance --recordings $(RECORDINGS) --runs $(BENCH_RUNS) \
 	  --figure docs/images/growth.png $(BENCH_FLAGS)
-	$(BIN)/python -m benchmarks.waiting $(if $(BENCH_FLAGS),--runs 1,--write) \
+	$(BIN)/python -m benchmarks.latency $(if $(BENCH_FLAGS),--runs 1,--write) \
 	  $(addprefix --recording ,$(wildcard $(RECORDINGS)/03.npz))
 
 lint: install

@@ -25,13 +25,13 @@ from rich.table import Table
 
 from fgbaseline import compare, data, diagnosis
 from fgbaseline.data import Estimate, Problem, Sequence, Status, estimator_names
-from fgbaseline.data.solving import solve_all
-from fgbaseline.diagnosis import Calibration
+from fgbaseline.data.estimator_runner import solve_all
+from fgbaseline.diagnosis import AsRecordedSettings
 
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))
 KITTI_07 = ("ece276a_2020/0027.npz", "ground_truth/kitti_odometry_07.txt")
 """a recording without truth, and its truth: poses of the left camera"""
-POSED = {"diagnosed": None, "as recorded": Calibration()}
+POSED = {"diagnosed": None, "as recorded": AsRecordedSettings()}
 """the settings of `diagnosis.calibrated`"""
 FIRST = ("dead-reckoning", "isam2", "isam2-online", "batch")
 """in this order, so that iSAM2 runs once"""

@@ -28,9 +28,9 @@ from rich.table import Table
 
 from fgbaseline import compare, diagnosis, ekf, smoother
 from fgbaseline.data import Estimate, HuberKernel, Problem, Sequence, Truth
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.diagnosis import Calibration, NoiseSettings
+from fgbaseline.data.velocity_increments import Shift
+from fgbaseline.diagnosis import AsRecordedSettings, NoiseSettings
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearization
 from fgbaseline.reports.figures.palette import ESTIMATOR_COLORS
@@ -61,7 +61,7 @@ class Study:
         drive = self.drive
         return diagnosis.calibrated(
             sequence,
-            settings=Calibration(
+            settings=AsRecordedSettings(
                 noise=NoiseSettings(drive.sigma_pixel, drive.sigma_linear, drive.sigma_angular),
                 shift=Shift.AFTER,
                 mask=MaskSettings() if self.preset_mask else EVERYTHING,

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from fgbaseline.data.tracking import StereoTracker, TrackerSettings
-from fgbaseline.data.tracking.rig import rectify
+from fgbaseline.data.tracking.rectification import rectify
 from fgbaseline.data.tracking.sources import ImageRecording, open_recording
 
 CALLS = (

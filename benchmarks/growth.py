@@ -15,9 +15,9 @@ import numpy as np
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data import Problem, Status, find_estimator
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.diagnosis import Calibration, NoiseSettings
+from fgbaseline.data.velocity_increments import Shift
+from fgbaseline.diagnosis import AsRecordedSettings, NoiseSettings
 
 from .subprocess_cost import StoppedError, apart, forget_peak, memory, peak_memory
 
@@ -99,7 +99,7 @@ def measured(quick: bool = False) -> list[Point]:
 def posed(drive: Simulation) -> Problem:
     """The problem of a drive with the noise that it has: nothing is diagnosed."""
     noise = NoiseSettings(drive.sigma_pixel, drive.sigma_linear, drive.sigma_angular)
-    return diagnosis.calibrated(simulate(drive), settings=Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(drive), settings=AsRecordedSettings(noise, shift=Shift.AFTER))
 
 
 def _size(axis: str, problem: Problem) -> float:

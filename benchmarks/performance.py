@@ -19,7 +19,7 @@ from pathlib import Path
 
 import click
 
-from . import docs_table, filters, growth, growth_figure, long_run, reader_cost, reference_speed, rest_of_run
+from . import docs_table, filters, growth, growth_figure, long_run, reader_cost, reference_speed, run_overhead
 from .claim_table import Row, table
 
 PLACE = Path("docs/performance.md")
@@ -35,7 +35,7 @@ def parts(recording: Path | None, runs: int, quick: bool) -> Iterator[tuple[str,
         yield "filters", lambda: filters.rows(recording, runs)
     yield "reference_speed", lambda: reference_speed.rows(recording, runs, drive)
     if recording is not None:
-        yield "rest_of_run", lambda: rest_of_run.rows(recording, runs)
+        yield "rest_of_run", lambda: run_overhead.rows(recording, runs)
     yield "reader_cost", lambda: reader_cost.rows(runs)
     yield "long_run", lambda: long_run.rows(run)
 
@@ -76,7 +76,7 @@ def main(recordings: Path, runs: int, quick: bool, wanted: bool | None, figure: 
     recording: Path | None = recordings / RECORDING
     if not (recordings / RECORDING).is_file():
         recording = None
-        notes.append(f"{RECORDING} is not in {recordings}: filters, rest_of_run and isam2 on it are left out.")
+        notes.append(f"{RECORDING} is not in {recordings}: filters, run_overhead and isam2 on it are left out.")
     if quick:
         notes.append("A quick run, on small sizes: for trying, and no verdict.")
     rows: list[Row] = []

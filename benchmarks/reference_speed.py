@@ -15,9 +15,9 @@ import numpy as np
 
 from fgbaseline import data, diagnosis, smoother
 from fgbaseline.data import Estimate, Problem, Status
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.diagnosis import Calibration, NoiseSettings
+from fgbaseline.data.velocity_increments import Shift
+from fgbaseline.diagnosis import AsRecordedSettings, NoiseSettings
 
 from .claim_table import Row, row, table
 from .gtsam_time import INCREMENTAL, OTHER, gtsam_timed
@@ -94,7 +94,7 @@ def long_drive(frames: int, seed: int) -> Problem:
         seed=seed,
     )
     noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
-    return diagnosis.calibrated(simulate(simulation), settings=Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(simulation), settings=AsRecordedSettings(noise, shift=Shift.AFTER))
 
 
 def solved(problem: Problem) -> Estimate:

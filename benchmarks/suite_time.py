@@ -17,8 +17,8 @@ import click
 import numpy as np
 
 from .claim_table import Row, table
-from .revision import BEFORE, environment
-from .waiting import ONE_THREAD
+from .installed_revision import BEFORE, environment
+from .latency import ONE_THREAD
 
 WANTED = 0.6
 RECORDINGS = "FGBASELINE_RECORDINGS"

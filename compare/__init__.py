@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .reference_trust import Criterion, Trust, Verdict, trust
     from .residuals.cost import cost
     from .residuals.held_out_tracks import HeldOutErrors, held_out_errors, held_out_ranking
-    from .residuals.patterns import residual_patterns
     from .residuals.reprojection import (
         component_summary,
         reprojection,
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
         reprojection_summary,
         used_by_all,
     )
+    from .residuals.residual_classes import residual_patterns
     from .residuals.whitening import evaluated_rows, track_chi_square, whitened_summary
     from .statistics.block_bootstrap import error_statistics
     from .statistics.chi_square import chi_square_bounds, chi_square_quantile, p_value, share_inside_bounds
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
         travel_direction_misfit,
         world_rotation_from_positions,
     )
-    from .trajectory.path import distance_traveled
+    from .trajectory.path_length import distance_traveled
     from .trajectory.segments import SegmentErrors, segment_errors
     from .trajectory.time_offset import TimeOffset, time_offset
 else:
@@ -111,7 +111,7 @@ else:
             "landmarks.map_difference": "map_by_depth map_difference",
             "residuals.cost": "cost",
             "residuals.held_out_tracks": "HeldOutErrors held_out_errors held_out_ranking",
-            "residuals.patterns": "residual_patterns",
+            "residuals.residual_classes": "residual_patterns",
             "residuals.reprojection": "component_summary reprojection reprojection_by reprojection_summary used_by_all",
             "residuals.whitening": "evaluated_rows track_chi_square whitened_summary",
             "statistics.block_bootstrap": "error_statistics",
@@ -133,7 +133,7 @@ else:
             "trajectory.frame_conventions": "BodyRotation body_rotation has_conjugated_orientations "
             "least_rotation_misfit length_unit rmse_of_inverse_poses travel_direction_misfit "
             "world_rotation_from_positions",
-            "trajectory.path": "distance_traveled",
+            "trajectory.path_length": "distance_traveled",
             "trajectory.segments": "SegmentErrors segment_errors",
             "trajectory.time_offset": "TimeOffset time_offset",
             "reference_trust": "Criterion Trust Verdict trust",

@@ -21,7 +21,7 @@ from pydantic_core import ErrorDetails
 
 from fgbaseline.geometry import InputError
 
-from .formats.named_file import FilePath, shown
+from .formats.file_errors import FilePath, shown
 from .toml_text import toml_values
 
 SHOWN = 60

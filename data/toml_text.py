@@ -6,7 +6,7 @@ from typing import Any
 
 from fgbaseline.geometry import InputError
 
-from .formats.named_file import FilePath, reading, regular_file
+from .formats.file_errors import FilePath, reading, regular_file
 
 
 def toml_values(path: FilePath) -> dict[str, Any]:

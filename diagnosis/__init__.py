@@ -2,10 +2,8 @@
 
 from fgbaseline.data.problem import NoiseSettings
 
-from .calibrated import Calibration, calibrated
+from .calibrated import AsRecordedSettings, calibrated
 from .conventions.units import Units, unit_findings
-from .estimation.pipeline import diagnose, known_units
-from .estimation.result import Diagnosis
 from .findings.json_report import to_json
 from .findings.track_statistics import TrackStatistics, track_statistics
 from .findings.velocity_findings import findings_of, not_identifiable
@@ -18,9 +16,11 @@ from .repair_overrides.settings import Repairs, read_repairs
 from .repair_overrides.template import repairs_text
 from .repairs.repaired_sequence import Repaired, repair
 from .tracks.recording_faults import unusable
+from .velocity_diagnosis.pipeline import diagnose, known_units
+from .velocity_diagnosis.result import Diagnosis
 
 __all__ = [
-    "Calibration",
+    "AsRecordedSettings",
     "Diagnosis",
     "InertialDiagnosis",
     "NoiseSettings",

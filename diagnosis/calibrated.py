@@ -5,30 +5,30 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.problem import NoiseSettings, Problem
 from fgbaseline.data.problem.velocity_gaps import inflate_gap_covariance
 from fgbaseline.data.sequence import Sequence, require_scale
+from fgbaseline.data.velocity_increments import Shift, dead_reckoned_path, increments
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import HuberKernel, InputError
 
-from .estimation.pipeline import diagnose
-from .estimation.result import Diagnosis
 from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
 from .inertial.result import InertialDiagnosis
 from .monocular.problem import as_recorded_monocular, monocular_problem
-from .repair_overrides.application import mask_settings, override_sentences, with_given_units, with_overrides
+from .repair_overrides.applied_overrides import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
-from .repairs.dropout import averaged_over_dropouts, dropout_intervals
 from .repairs.repaired_sequence import repair
+from .repairs.visual_dropouts import averaged_over_dropouts, dropout_intervals
 from .tracks.observation_mask import MaskSettings, choose_features, exclusions
+from .velocity_diagnosis.pipeline import diagnose
+from .velocity_diagnosis.result import Diagnosis
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class AsRecordedSettings:
     """Settings of a problem whose recording is taken as recorded, without a diagnosis."""
 
     noise: NoiseSettings = field(default_factory=NoiseSettings)
@@ -46,7 +46,7 @@ def calibrated(
     features: int | None = None,
     *,
     diagnosis: Diagnosis | InertialDiagnosis | None = None,
-    settings: Calibration | None = None,
+    settings: AsRecordedSettings | None = None,
     repairs: Repairs | None = None,
     processes: int = 1,
 ) -> Problem:
@@ -83,12 +83,12 @@ def calibrated(
         sequence = diagnosis.sequence
         if diagnosis.sigmas is not None or repairs is not None:
             return _diagnosed(diagnosis, features, repairs or Repairs())
-    problem = inflate_gap_covariance(_as_recorded(sequence, features, settings or Calibration()))
-    if diagnosis is None or not diagnosis.cannot_tell:
+    problem = inflate_gap_covariance(_as_recorded(sequence, features, settings or AsRecordedSettings()))
+    if diagnosis is None or not diagnosis.failure_reason:
         return problem
     return replace(
         problem,
-        remarks=(f"not diagnosed: {diagnosis.cannot_tell}", *problem.remarks),
+        remarks=(f"not diagnosed: {diagnosis.failure_reason}", *problem.remarks),
         findings=findings_of(diagnosis),
         repairs=rescalings(diagnosis),
     )
@@ -98,7 +98,7 @@ def _inertial(
     sequence: Sequence,
     features: int | None,
     diagnosis: Diagnosis | InertialDiagnosis | None,
-    settings: Calibration | None,
+    settings: AsRecordedSettings | None,
     repairs: Repairs | None,
     processes: int,
 ) -> Problem:
@@ -130,7 +130,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     inflation = 1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel
     white = f" ({inflation:.1f} times that from frame to frame)" if inflation > 1.0 else ""
     remarks = (
-        *((f"not diagnosed: {found.cannot_tell}",) if found.cannot_tell else ()),
+        *((f"not diagnosed: {found.failure_reason}",) if found.failure_reason else ()),
         f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px{white}, {noise.linear_velocity:.3f} m/s and "
         f"{noise.angular_velocity:.4f} rad/s",
     )
@@ -140,7 +140,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     return replace(
         inflate_gap_covariance(_with_outlier_noise(_bridged(problem, diagnosis, noise), diagnosis)),
         pixel_inflation=inflation,
-        diagnosed=not found.cannot_tell,
+        diagnosed=not found.failure_reason,
         findings=findings_of(found, track_statistics(found, repaired if repairs == Repairs() else None)),
         repairs=(*override_sentences(repairs), *rescalings(found), *repaired.repairs),
     )
@@ -185,7 +185,7 @@ def _with_outlier_noise(problem: Problem, diagnosis: Diagnosis) -> Problem:
     return replace(problem, increment_covariance=problem.increment_covariance + added[:, :, None] * np.eye(6))
 
 
-def _as_recorded(sequence: Sequence, features: int | None, settings: Calibration) -> Problem:
+def _as_recorded(sequence: Sequence, features: int | None, settings: AsRecordedSettings) -> Problem:
     noise, shift = settings.noise, settings.shift
     excluded = exclusions(sequence, dead_reckoned_path(increments(sequence, shift)), settings.mask)
     remarks = (

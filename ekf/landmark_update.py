@@ -11,15 +11,15 @@ import numpy as np
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import predict, squared_norm
+from fgbaseline.geometry import FloatArray, MeasurementModel, se3
+from fgbaseline.geometry.measurement import mahalanobis_squared, predict
 from fgbaseline.geometry.monocular import require_stereo
 
 
 class IndependentLandmarks:
     """Means (m, 3), m, and covariances (m, 3, 3), m^2, of m independent landmarks in the world frame."""
 
-    def __init__(self, problem: Problem, measurement: StereoMeasurement) -> None:
+    def __init__(self, problem: Problem, measurement: MeasurementModel) -> None:
         m = len(problem.features)
         prior = problem.landmark_prior
         self.measurement = measurement
@@ -73,7 +73,7 @@ class IndependentLandmarks:
         """(n,) r^T (H Sigma H^T + V)^-1 r of residuals (n, 3) with Jacobians (n, 3, 3) of known landmarks."""
         half = np.linalg.solve(np.swapaxes(self.root_information[row], 1, 2), np.swapaxes(H, 1, 2))
         S = np.swapaxes(half, 1, 2) @ half + np.diag(self.measurement.row_variance)
-        return squared_norm(residual, S)
+        return mahalanobis_squared(residual, S)
 
     def covariance(self) -> FloatArray:
         """Covariances (m, 3, 3), m^2; NaN for landmarks without an observation."""

@@ -29,7 +29,7 @@ class BodyState(NamedTuple):
         return BodyState(self.pose @ se3.exp_one(delta[:POSE]), self.additive + delta[POSE:])
 
 
-class Prediction(NamedTuple):
+class PredictedState(NamedTuple):
     """Predicted state with the transition and the noise of its error."""
 
     body: BodyState
@@ -51,8 +51,8 @@ class MotionModel(Protocol):
     covariance: FloatArray
     """(n, n) of the start"""
 
-    def predict(self, k: int, body: BodyState) -> Prediction:
-        """Prediction of frame k + 1 from the state of frame k."""
+    def predict(self, k: int, body: BodyState) -> PredictedState:
+        """PredictedState of frame k + 1 from the state of frame k."""
         ...
 
 
@@ -66,9 +66,9 @@ class VelocityMotion:
         self.transition = se3.adjoint(se3.inverse(self.step))
         self.noise = problem.increment_covariance
 
-    def predict(self, k: int, body: BodyState) -> Prediction:
-        """Prediction of frame k + 1 from the state of frame k."""
-        return Prediction(BodyState(body.pose @ self.step[k], body.additive), self.transition[k], self.noise[k])
+    def predict(self, k: int, body: BodyState) -> PredictedState:
+        """PredictedState of frame k + 1 from the state of frame k."""
+        return PredictedState(BodyState(body.pose @ self.step[k], body.additive), self.transition[k], self.noise[k])
 
 
 class InertialMotion:
@@ -79,13 +79,13 @@ class InertialMotion:
         self.start = BodyState(pose, np.concatenate([start.velocity, start.bias]))
         self.covariance = start.covariance
 
-    def predict(self, k: int, body: BodyState) -> Prediction:
-        """Prediction of frame k + 1 from the state of frame k."""
+    def predict(self, k: int, body: BodyState) -> PredictedState:
+        """PredictedState of frame k + 1 from the state of frame k."""
         velocity, biases = body.additive[:3], body.additive[3:]
         motion = self.imu.motion(k, biases[:3], biases[3:])
         pose, velocity = strapdown.predict(body.pose, velocity, motion, self.imu.gravity_vector)
         F, Q = strapdown.world_axes(motion, body.pose[:3, :3], pose[:3, :3])
-        return Prediction(BodyState(pose, np.concatenate([velocity, biases])), F, Q)
+        return PredictedState(BodyState(pose, np.concatenate([velocity, biases])), F, Q)
 
 
 def motion_model(problem: Problem) -> MotionModel:

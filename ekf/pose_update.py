@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
-from fgbaseline.geometry import FloatArray, StereoMeasurement
-from fgbaseline.geometry.measurement import predict, squared_norm
+from fgbaseline.geometry import FloatArray, MeasurementModel
+from fgbaseline.geometry.measurement import mahalanobis_squared, predict
 
 from .motion_model import POSE
 
@@ -27,11 +27,13 @@ class PoseInnovation(NamedTuple):
     def nis_per_observation(self, covariance: FloatArray) -> FloatArray:
         """NIS (n,) of each observation alone, r^T (H Sigma H^T + V)^-1 r, for three rows and a Sigma (n, n)."""
         H = self.jacobian
-        return squared_norm(self.residual, H @ covariance[:POSE, :POSE] @ np.swapaxes(H, 1, 2) + np.diag(self.variance))
+        return mahalanobis_squared(
+            self.residual, H @ covariance[:POSE, :POSE] @ np.swapaxes(H, 1, 2) + np.diag(self.variance)
+        )
 
 
 def pose_innovation(
-    measurement: StereoMeasurement,
+    measurement: MeasurementModel,
     cam_T_imu: FloatArray,
     world_T_imu: FloatArray,
     points: FloatArray,
@@ -39,7 +41,7 @@ def pose_innovation(
 ) -> PoseInnovation:
     """Innovation of world points (n, 3) observed at pixels (n, 4) from a pose (4, 4) (equation 13).
 
-    Its rows are those of `StereoMeasurement.documented_innovation`.
+    Its rows are those of `MeasurementModel.documented_innovation`.
     """
     predicted = predict(measurement.camera, cam_T_imu, world_T_imu, points)
     residual, rows, variance = measurement.documented_innovation(pixel, predicted.pixel)

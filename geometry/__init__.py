@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import se3, so3, strapdown
     from .errors import FgbaselineError, InputError
-    from .measurement import HuberKernel, StereoMeasurement
+    from .measurement import HuberKernel, MeasurementModel
     from .monocular import Camera, MonocularCamera
     from .so3 import FloatArray
     from .stereo import StereoCamera, disparity
@@ -19,7 +19,7 @@ else:
             "so3": "so3 FloatArray",
             "strapdown": "strapdown",
             "errors": "FgbaselineError InputError",
-            "measurement": "HuberKernel StereoMeasurement",
+            "measurement": "HuberKernel MeasurementModel",
             "monocular": "Camera MonocularCamera",
             "stereo": "StereoCamera disparity",
         },
@@ -31,9 +31,9 @@ __all__ = [
     "FloatArray",
     "HuberKernel",
     "InputError",
+    "MeasurementModel",
     "MonocularCamera",
     "StereoCamera",
-    "StereoMeasurement",
     "disparity",
     "se3",
     "so3",

@@ -24,7 +24,7 @@ import numpy as np
 from . import se3, so3
 from .monocular import Camera, MonocularCamera
 from .so3 import FloatArray
-from .stereo import PIXEL_ROWS, StereoCamera, StereoRows
+from .stereo import PIXEL_ROWS, PredictedRows, StereoCamera
 
 STEREO_ROWS = ("uL", "uR", "v")
 """components of the measurement vector of a rectified pair, in this order"""
@@ -41,7 +41,7 @@ def three_rows(pixel: FloatArray) -> FloatArray:
     return np.stack([pixel[..., 0], pixel[..., 2], v], axis=-1)
 
 
-def squared_norm(residual: FloatArray, covariance: FloatArray) -> FloatArray:
+def mahalanobis_squared(residual: FloatArray, covariance: FloatArray) -> FloatArray:
     """Squared Mahalanobis norms r^T C^-1 r (n,) of residuals (n, r), px, with covariances (n, r, r), px^2.
 
     r is 3, or 2 for one camera.
@@ -100,7 +100,7 @@ class HuberKernel:
 
 
 @dataclass(frozen=True, slots=True)
-class StereoMeasurement:
+class MeasurementModel:
     """Measurement model of a stereo pair or one camera: intrinsics, noise and robust kernel."""
 
     camera: Camera
@@ -129,7 +129,7 @@ class StereoMeasurement:
         scale = np.ones(len(MONOCULAR_ROWS)) if self.monocular else EQUALIZING_SCALE
         return np.asarray(scale / np.sqrt(self.variance), dtype=np.float64)
 
-    def measured(self, pixel: FloatArray) -> FloatArray:
+    def rows_of(self, pixel: FloatArray) -> FloatArray:
         """Rows (..., r) of pixels or residuals uL, vL, uR, vR (..., 4)."""
         return pixel[..., :2] if self.monocular else three_rows(pixel)
 
@@ -139,7 +139,7 @@ class StereoMeasurement:
 
     def whitened(self, residual: FloatArray) -> FloatArray:
         """Whitened residuals (..., r) of the rows, in sigmas, from residuals of uL, vL, uR, vR (..., 4), px."""
-        return np.asarray(self.measured(residual) * self.whitening_scale, dtype=np.float64)
+        return np.asarray(self.rows_of(residual) * self.whitening_scale, dtype=np.float64)
 
     def weight(self, squared: FloatArray) -> FloatArray:
         """Kernel weights of squared whitened norms (...); 1 without a kernel."""
@@ -173,7 +173,7 @@ class StereoMeasurement:
             return DocumentedInnovation(pixel - predicted[:, rows], rows, np.full(4, self.variance))
         return DocumentedInnovation(three_rows(pixel) - predicted, [0, 1, 2], self.row_variance)
 
-    def with_variance(self, variance: float) -> "StereoMeasurement":
+    def with_variance(self, variance: float) -> "MeasurementModel":
         """Model with another variance V, px^2."""
         return replace(self, variance=variance)
 
@@ -194,7 +194,7 @@ class Prediction:
     """n world points as observed from one pose, in r rows each."""
 
     camera: Camera
-    rows: StereoRows
+    rows: PredictedRows
     cam_T_imu: FloatArray
     """(4, 4)"""
     imu_T_world: FloatArray

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .errors import FgbaselineError
 from .so3 import FloatArray
-from .stereo import MIN_DEPTH, StereoCamera, StereoRows
+from .stereo import MIN_DEPTH, PredictedRows, StereoCamera
 
 UNIT_LENGTH = 0.1
 """m, in place of a baseline, as the unit of tolerances: the baseline of a small stereo rig"""
@@ -42,13 +42,13 @@ class MonocularCamera:
         """Smallest depth (m) of a point in front of the camera."""
         return MIN_DEPTH * UNIT_LENGTH
 
-    def rows(self, q: FloatArray) -> StereoRows:
+    def rows(self, q: FloatArray) -> PredictedRows:
         """Rows uL and v of points q (3, ...) or (4, ...) in the camera frame; see `StereoCamera.rows`."""
         near = 1.0 / q[2]
         slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
-        return StereoRows(np.stack([self.fu * slope[0] + self.cu, self.fv * slope[1] + self.cv]), slope, near)
+        return PredictedRows(np.stack([self.fu * slope[0] + self.cu, self.fv * slope[1] + self.cv]), slope, near)
 
-    def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
+    def row_derivatives(self, seen: PredictedRows, along: FloatArray) -> FloatArray:
         """Directional derivatives (2, k, ...) of the rows; see `StereoCamera.row_derivatives`."""
         x, y, _ = seen.normalized
         by_u, by_v = self.fu * seen.inverse_z, self.fv * seen.inverse_z

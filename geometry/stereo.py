@@ -28,7 +28,7 @@ MIN_DEPTH = 0.5
 camera plane the Jacobian is unbounded."""
 
 
-class StereoRows(NamedTuple):
+class PredictedRows(NamedTuple):
     """Predicted rows of points, with what their derivatives need; coordinates first, then the points (...).
 
     r is 3, or 2 for one camera.
@@ -68,7 +68,7 @@ class StereoCamera:
         """Smallest depth (m) of a point in front of the camera: `MIN_DEPTH` baselines."""
         return MIN_DEPTH * self.baseline
 
-    def rows(self, q: FloatArray) -> StereoRows:
+    def rows(self, q: FloatArray) -> PredictedRows:
         """Rows of points q (3, ...) in the left camera frame, m, or of homogeneous points (4, ...).
 
         Points behind the camera are projected by the same formula, as in the source paper. Divides by zero at z = 0.
@@ -81,9 +81,9 @@ class StereoCamera:
         pixel[0] = self.fu * slope[0] + self.cu
         pixel[1] = pixel[0] - (self.fu * self.baseline) * slope[2]
         pixel[2] = self.fv * slope[1] + self.cv
-        return StereoRows(pixel, slope, near)
+        return PredictedRows(pixel, slope, near)
 
-    def row_derivatives(self, seen: StereoRows, along: FloatArray) -> FloatArray:
+    def row_derivatives(self, seen: PredictedRows, along: FloatArray) -> FloatArray:
         """Directional derivatives (3, k, ...) of the rows along k directions `along` (3 or 4, k, ...), m.
 
         `along[i]` is the derivative of coordinate i of q w.r.t. each of the k parameters. Three coordinates suffice for

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .measurement import StereoMeasurement
+from .measurement import MeasurementModel
 from .monocular import Camera, MonocularCamera
 from .ray_intersection import PointStart, ray_intersections
 from .so3 import FloatArray
@@ -72,7 +72,7 @@ class _Observed(NamedTuple):
 
 
 def triangulate_tracks(
-    measurement: StereoMeasurement,
+    measurement: MeasurementModel,
     world_T_cam: FloatArray,
     row: NDArray[np.int64],
     pixel: FloatArray,
@@ -153,7 +153,7 @@ def _nearest_observations(row: NDArray[np.int64], pixel: FloatArray, n_points: i
 
 
 def _sorted(
-    measurement: StereoMeasurement,
+    measurement: MeasurementModel,
     world_T_cam: FloatArray,
     row: NDArray[np.int64],
     pixel: FloatArray,
@@ -175,14 +175,14 @@ def _sorted(
     along[:3, :2], constant[:3] = turned[:, :2], turned[:, 2]
     along[:3, 2] = (back @ (reference[:, :3, 3:] - pose[:, :3, 3:]))[:, :, 0].T
     along[3, 2] = 1.0
-    return _Observed(row, _starts(row), constant, along, np.ascontiguousarray(measurement.measured(pixel[order]).T))
+    return _Observed(row, _starts(row), constant, along, np.ascontiguousarray(measurement.rows_of(pixel[order]).T))
 
 
 def _starts(row: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate([[True], row[1:] != row[:-1]]))
 
 
-def _linearized(measurement: StereoMeasurement, observed: _Observed, q: FloatArray) -> FloatArray:
+def _linearized(measurement: MeasurementModel, observed: _Observed, q: FloatArray) -> FloatArray:
     """Cost and normal equations (16, m) of points q (3, m).
 
     Rows: cost; upper triangle of J^T W J row by row, each row followed by its entry of J^T W r; upper triangle of the

@@ -8,7 +8,7 @@ from typing import Protocol
 from fgbaseline.data.display import LINES, cut
 from fgbaseline.data.formats.atomic_folder import atomic_folder
 from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
 
 from .tables.table import Table, html
 

@@ -29,7 +29,7 @@ class GraphBuilder:
         self.observations = problem.observations()
         self.frame: list[int] = self.observations.frame.tolist()
         """frame of each observation"""
-        self._rows: list[list[float]] = problem.measurement.measured(self.observations.pixel).tolist()
+        self._rows: list[list[float]] = problem.measurement.rows_of(self.observations.pixel).tolist()
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
         self.online = FrameStates.unknown(problem)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray, IntArray
-from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, MeasurementModel, se3
 
 from ..residuals.whitening import evaluated_rows
 from ..statistics.chi_square import p_value
@@ -38,7 +38,7 @@ class _Observations(NamedTuple):
     Coordinates are separate arrays, several times as fast as stacks of small matrices.
     """
 
-    measurement: StereoMeasurement
+    measurement: MeasurementModel
     turn: FloatArray
     """rotation of cam_T_world (3, 3, n)"""
     shift: FloatArray
@@ -113,7 +113,7 @@ def _observations_of(problem: Problem, estimate: Estimate, rows: pd.DataFrame, r
         np.take(cam_T_world[:, :3], frame, axis=2),
         np.take(cam_T_world[:, 3], frame, axis=1),
         row,
-        np.ascontiguousarray(problem.measurement.measured(pixel).T),
+        np.ascontiguousarray(problem.measurement.rows_of(pixel).T),
         seconds - (np.bincount(row, weights=seconds) / count)[row],
     )
 

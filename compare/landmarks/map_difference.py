@@ -9,7 +9,7 @@ from fgbaseline.geometry import se3
 
 from ..consistency.covariance import is_positive_definite
 from ..consistency.reference_nees import difference_covariance
-from ..residuals.patterns import DEPTHS, depth_classes
+from ..residuals.residual_classes import DEPTHS, depth_classes
 from ..statistics.chi_square import mahalanobis_squared
 
 MIN_WITH_SIGMAS = 10

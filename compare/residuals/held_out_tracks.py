@@ -18,7 +18,7 @@ import pandas as pd
 from fgbaseline.data import HeldOut, Sequence
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray, IntArray
-from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from .reprojection import NEAR
@@ -105,7 +105,7 @@ def cross_prediction_errors(
     late = position >= (count[piece] + 1) // 2
     world_T_cam, pixel = (path @ sequence.imu_T_cam)[o.frame[chosen]], o.pixel[chosen]
     error = np.full(len(piece), np.inf)
-    measurement = StereoMeasurement(sequence.camera, pixel_variance, HuberKernel())
+    measurement = MeasurementModel(sequence.camera, pixel_variance, HuberKernel())
     for seen in (~late, late):
         points = triangulate_tracks(measurement, world_T_cam[seen], piece[seen], pixel[seen], n)
         p_cam = se3.transform(se3.inverse(world_T_cam[~seen]), points.position[piece[~seen]])

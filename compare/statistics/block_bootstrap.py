@@ -14,7 +14,7 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, InputError
 
-from .block_draws import CONFIDENCE, BlockDraws, draw_blocks, percentile_interval
+from .bootstrap_resampling import CONFIDENCE, BlockDraws, draw_blocks, percentile_interval
 from .descriptive import mean, quantile, without_nan
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.geometry import FloatArray, InputError
 
 from .block_bootstrap import MAX_BLOCKS, MIN_BLOCKS, REPETITIONS, block_length
-from .block_draws import CONFIDENCE, draw_blocks, percentile_interval
+from .bootstrap_resampling import CONFIDENCE, draw_blocks, percentile_interval
 
 
 @dataclass(frozen=True, slots=True)

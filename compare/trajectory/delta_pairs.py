@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from .path import distance_traveled
+from .path_length import distance_traveled
 
 ROUNDING = 1e-9
 """share of a delta: slack for steps that add up to it exactly but for rounding"""

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, so3
 
-from ..columns import Columns, to_frame
+from ..column_tables import Columns, to_frame
 from ..statistics.descriptive import summarized
 from .alignment import Align, Alignment, align, align_se3
 from .association import MatchedTrajectories
-from .path import along_track_frame, distance_traveled
+from .path_length import along_track_frame, distance_traveled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray
 
 from ..statistics.block_bootstrap import MAX_BLOCKS, MIN_BLOCKS, REPETITIONS, Bounded, block_length
-from ..statistics.block_draws import CONFIDENCE, draw_blocks, percentile_interval
+from ..statistics.bootstrap_resampling import CONFIDENCE, draw_blocks, percentile_interval
 from .alignment import Align
 from .association import MatchedTrajectories
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.block_bootstrap import ErrorStatistics
 from fgbaseline.compare.statistics.paired_bootstrap import RmseDifference
 from fgbaseline.compare.trajectory.association import MatchedTrajectories
@@ -13,7 +13,7 @@ from fgbaseline.compare.trajectory.drift import Rate
 from fgbaseline.compare.trajectory.error_decomposition import ErrorDecomposition, ShareIntervals
 from fgbaseline.compare.trajectory.segments import SegmentErrors
 from fgbaseline.compare.trajectory.time_offset import TimeOffset
-from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.compare.trajectory_comparison.ranking import Ranking
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data.display import Displayed

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Association, CovarianceState, MatchedTrajectories
-from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray, InputError

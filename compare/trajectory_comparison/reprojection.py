@@ -8,7 +8,7 @@ import pandas as pd
 
 from fgbaseline import compare
 from fgbaseline.compare import Alignment, MatchedTrajectories
-from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.formats.ground_truth import match_stamps

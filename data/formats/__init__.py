@@ -3,15 +3,15 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .columns import Order
-    from .euroc_writer import write_euroc
     from .ground_truth import BodyFrame, attach_truth
     from .kitti import read_times, write_kitti
     from .landmark_file import read_landmarks
     from .npz_writer import write_npz
     from .parsed_trajectory import ParsedTrajectory
     from .recording import read
+    from .trajectory_columns import Order
     from .trajectory_npz import write_trajectory_npz
+    from .trajectory_opening import TrajectoryFormat
     from .trajectory_reader import (
         read_euroc,
         read_kitti,
@@ -20,16 +20,15 @@ if TYPE_CHECKING:
         read_trajectory_file,
         read_tum,
     )
-    from .trajectory_text import TrajectoryFormat
-    from .tum_writer import write_tum
+    from .trajectory_writers import write_euroc, write_tum
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
     __getattr__ = lazy_names(
         __name__,
         {
-            "columns": "Order",
-            "euroc_writer": "write_euroc",
+            "trajectory_columns": "Order",
+            "trajectory_writers": "write_euroc write_tum",
             "ground_truth": "BodyFrame attach_truth",
             "kitti": "read_times write_kitti",
             "landmark_file": "read_landmarks",
@@ -37,10 +36,9 @@ else:
             "parsed_trajectory": "ParsedTrajectory",
             "recording": "read",
             "trajectory_npz": "write_trajectory_npz",
-            "trajectory_text": "TrajectoryFormat",
+            "trajectory_opening": "TrajectoryFormat",
             "trajectory_reader": "read_euroc read_kitti read_pose_covariances read_trajectory "
             "read_trajectory_file read_tum",
-            "tum_writer": "write_tum",
         },
     )
 

@@ -9,7 +9,7 @@ from typing import IO
 
 from fgbaseline.geometry import InputError
 
-from .named_file import FilePath, shown, writing
+from .file_errors import FilePath, shown, writing
 
 _EXISTS = "the file exists; choose another, or replace it with --force"
 _NO_LINKS = (errno.EPERM, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)

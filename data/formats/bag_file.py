@@ -9,7 +9,7 @@ from typing import Any
 
 from fgbaseline.geometry import InputError
 
-from .named_file import FilePath, shown
+from .file_errors import FilePath, shown
 
 MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 """first bytes of ROS 1 bags, and of the two storage formats of ROS 2"""

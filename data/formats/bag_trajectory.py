@@ -9,10 +9,10 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..time_unit import TimeUnit
 from .bag_file import Bag, open_bag_file
-from .named_file import shown
+from .file_errors import shown
 from .parsed_trajectory import ParsedTrajectory
-from .stamped_poses import require_rising, rotations_of_quaternions
 from .stamps import stamps_of
+from .trajectory_checks import require_rising, rotations_of_quaternions
 
 TYPES = (
     "nav_msgs/Odometry",

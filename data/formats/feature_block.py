@@ -24,7 +24,7 @@ from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
 from ..finding import Finding
 from ..observations import IntArray, Observations
 from .array_stream import ArrayStream
-from .one_camera import require_one_kind
+from .monocular_observations import require_one_kind
 
 MOST_EQUAL = 0.01
 """share of the entries whose four rows may be equal by chance"""

@@ -14,7 +14,7 @@ from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Truth
 from ..time_unit import COARSE, lost_digits
 from ..wording import per_cent
-from .fields import finite_stamps
+from .field_checks import finite_stamps
 
 MOST_REPEATED = 0.05
 """share of the frames that may repeat the stamp before (one always may); with more, the stamps lost their digits"""

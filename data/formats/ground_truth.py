@@ -14,12 +14,12 @@ from ..problem.inertial import imu_intervals
 from ..sequence import Sequence, Truth
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
-from .columns import Order
 from .common_time_unit import units_in_common
-from .inertial_truth import inertial_truth, with_state
-from .named_file import FilePath, reading, shown
+from .file_errors import FilePath, reading, shown
+from .inertial_ground_truth import inertial_truth, with_state
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .quaternion_order import STEP, fits_clearly_better, in_words
+from .trajectory_columns import Order
 from .trajectory_reader import read_trajectory_file
 
 BodyFrame = Literal["camera", "imu"]

@@ -20,7 +20,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY, ImuNoise, ImuSamples
 from ..sequence import Truth
-from .fields import positive
+from .field_checks import positive
 from .imu_samples import RawSamples, imu_samples
 from .npz_archive import NpzArchive
 

@@ -10,10 +10,10 @@ from ..finding import Finding
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence
 from ..wording import per_cent, plural
+from .file_errors import FilePath
 from .imu_csv import read_imu_csv
 from .imu_samples import RawSamples
 from .imu_yaml import ImuCalibration
-from .named_file import FilePath
 
 MIN_FRAMES = 2
 FACTORS = (1.0, 1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9)

@@ -8,11 +8,11 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..imu import ImuNoise
 from ..time_unit import TimeUnit
-from .columns import names_of
+from .file_errors import FilePath, reading, regular_file
 from .imu_samples import RawSamples, imu_samples
-from .named_file import FilePath, reading, regular_file
 from .number_table import Lines, numbers_of, read_lines
 from .stamps import Stamps, likely_seconds, stamps_of
+from .trajectory_columns import names_of
 
 GYROSCOPE = re.compile(r"(w_rs_s|gyro\w*|gyr|angular_?velocity|angular_?rate|omega|w|g|rot\w*)[._]?([xyz])")
 ACCELEROMETER = re.compile(r"(a_rs_s|accel\w*|acc|linear_?acceleration|specific_?force|a|f)[._]?([xyz])")

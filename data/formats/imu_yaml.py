@@ -7,9 +7,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..imu import ASSUMED_NOISE, STANDARD_GRAVITY, ImuNoise
-from .fields import positive
+from .field_checks import positive
+from .file_errors import FilePath, reading
 from .imu_arrays import assumed_noise
-from .named_file import FilePath, reading
 from .yaml_file import pose, read_yaml
 
 KEYS = {

@@ -7,10 +7,10 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from ..observations import IntArray
 from ..time_unit import TimeUnit
 from .atomic_write import atomic_write
-from .named_file import FilePath, reading, regular_file
+from .file_errors import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
-from .stamped_poses import require_rising, writable
 from .stamps import no_unit, possible_units, stamps_of
+from .trajectory_checks import require_rising, writable
 
 NUMBERS = 12
 ROTATION_TOLERANCE = 1e-3

@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.geometry import InputError
 
 from ..estimate import Landmarks
-from .named_file import FilePath, reading, regular_file
+from .file_errors import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width, split
 
 COLUMNS = ("id", "x", "y", "z")

@@ -11,8 +11,8 @@ from ..observations import IntArray
 from ..sequence import Sequence
 from .atomic_write import atomic_write
 from .feature_block import CHUNK, UNOBSERVED
+from .file_errors import FilePath
 from .imu_arrays import imu_arrays, state_truth_arrays
-from .named_file import FilePath
 from .npz_member import write_member
 from .observation_list import ObservationPieces, write_observations
 

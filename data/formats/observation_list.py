@@ -15,9 +15,9 @@ import numpy as np
 from fgbaseline.geometry import FgbaselineError, InputError
 
 from ..observations import IntArray, Observations
+from .monocular_observations import require_one_kind
 from .npz_archive import NpzArchive
 from .npz_member import write_member
-from .one_camera import require_one_kind
 
 FRAME, LANDMARK, PIXEL = "observation_frame", "observation_landmark", "observation_pixel"
 LARGEST_INDEX = 2**40

@@ -14,10 +14,10 @@ from ..estimate import Landmarks
 from ..observations import IntArray
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
-from .columns import Order
 from .pose_covariances import pose_covariances
 from .quaternion_order import xyzw
 from .stamps import Stamps, no_unit
+from .trajectory_columns import Order
 
 STRAIGHT = 1e-3
 """share of the extent of a path: a path whose deviation from a straight line is smaller does not bend"""

@@ -4,7 +4,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from .columns import Order
+from .trajectory_columns import Order
 
 STEP = 20
 """poses between two whose rotation is compared"""

@@ -10,11 +10,11 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..sequence import Sequence, require_scale
 from ..time_unit import TimeUnit, in_seconds
+from .file_errors import FilePath, reading, regular_file, shown
 from .ground_truth import BodyFrame, attach_truth
 from .imu_attachment import attach_imu, read_imu
 from .imu_yaml import NO_CALIBRATION, calibration_or_assumed
 from .mat_file import MatFile
-from .named_file import FilePath, reading, regular_file, shown
 from .npz_archive import NpzArchive
 from .trajectory_reader import read_extrinsic
 from .ucsd_ece276a import NO_VELOCITIES, read_course

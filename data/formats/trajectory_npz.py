@@ -13,12 +13,12 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 
 from ..observations import BoolArray
 from .atomic_write import atomic_write
+from .file_errors import FilePath
 from .frame_stamps import read_stamps
 from .kitti import EXACT, ROTATION_TOLERANCE, nearest_rotations
-from .named_file import FilePath
 from .npz_archive import NpzArchive
 from .npz_member import write_member
-from .stamped_poses import writable
+from .trajectory_checks import writable
 
 KEYS = {"t": "world_T_body", "time_stamps": "ground_truth"}
 """stamps and poses: ours, and those of a recording"""

@@ -1,7 +1,7 @@
 """Reads trajectories: TUM, EuRoC, KITTI and other CSV, npz, and topics of bags.
 
-The format is detected from the content, never from the file name: `trajectory_text` opens a file, `columns` recognizes
-its columns, and `trajectory_from_text` parses its lines.
+The format is detected from the content, never from the file name: `trajectory_opening` opens a file,
+`trajectory_columns` recognizes its columns, and `trajectory_text_parser` parses its lines.
 """
 
 from dataclasses import replace
@@ -14,13 +14,12 @@ from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
 from ..wording import plural
 from .bag_trajectory import read_bag_trajectory
-from .columns import Order
-from .named_file import FilePath, reading, regular_file
+from .file_errors import FilePath, reading, regular_file
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
-from .trajectory_from_text import parse_text
+from .trajectory_columns import Order
 from .trajectory_npz import read_trajectory_npz
-from .trajectory_text import (
+from .trajectory_opening import (
     OpenedTrajectory,
     TrajectoryArchive,
     TrajectoryFormat,
@@ -28,6 +27,7 @@ from .trajectory_text import (
     TrajectoryTopic,
     open_trajectory,
 )
+from .trajectory_text_parser import parse_text
 
 
 def read_trajectory(

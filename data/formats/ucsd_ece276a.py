@@ -24,13 +24,13 @@ from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera,
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from .feature_block import read_features
-from .fields import extrinsic, positive, vectors
+from .field_checks import extrinsic, positive, vectors
 from .frame_stamps import read_stamps
 from .imu_arrays import FORCE, RATE, STAMPS, read_imu_arrays, read_state_truth
 from .imu_attachment import attach_imu
+from .monocular_observations import IGNORED_BASELINE, is_of_one_camera
 from .npz_archive import NpzArchive
 from .observation_list import FRAME, read_observation_list
-from .one_camera import IGNORED_BASELINE, is_of_one_camera
 
 OWN_KEYS = frozenset({"ground_truth", "landmarks", "up_imu", STAMPS, FRAME})
 VELOCITY_KEYS = frozenset({"linear_velocity", "angular_velocity", "rotational_velocity"})

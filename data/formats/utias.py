@@ -21,7 +21,7 @@ from ..finding import Finding
 from ..observations import Observations
 from ..sequence import Sequence, Truth
 from .feature_block import read_features_by_frame
-from .fields import extrinsic, positive, vectors
+from .field_checks import extrinsic, positive, vectors
 from .frame_stamps import read_stamps
 from .mat_file import MatFile
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .named_file import FilePath, reading, regular_file
+from .file_errors import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
-from .stamped_poses import require_rising
 from .stamps import likely_seconds, stamps_of
+from .trajectory_checks import require_rising
 
 
 def read_velocity_csv(path: FilePath, t: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -6,9 +6,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from .fields import extrinsic
+from .field_checks import extrinsic
+from .file_errors import FilePath, regular_file
 from .kitti import nearest_rotations
-from .named_file import FilePath, regular_file
 
 MOST_BYTES = 2**20
 FEW_DIGITS = 1e-3

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel
 
 from ..dataframes import plot_over_time
 from ..display import Displayed
@@ -151,12 +151,12 @@ class Problem(Displayed):
         return self.sequence.n_frames
 
     @property
-    def measurement(self) -> StereoMeasurement:
+    def measurement(self) -> MeasurementModel:
         """The measurement model, with noise and kernel."""
-        return StereoMeasurement(self.sequence.camera, self.pixel_variance, self.kernel)
+        return MeasurementModel(self.sequence.camera, self.pixel_variance, self.kernel)
 
     @property
-    def mapping_measurement(self) -> StereoMeasurement:
+    def mapping_measurement(self) -> MeasurementModel:
         """The measurement model with the noise for mapping landmarks along given poses."""
         return self.measurement.with_variance(self.mapping_pixel_variance or self.pixel_variance)
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, disparity
 
-from ..motion import Shift, back_project, dead_reckoned_path, increments
 from ..observations import IntArray, Observations
 from ..sequence import Sequence, require_scale
+from ..velocity_increments import Shift, back_project, dead_reckoned_path, increments
 from ..wording import plural
 from .definition import Excluded, LandmarkMode, LandmarkPrior, Problem
 

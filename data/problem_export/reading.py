@@ -8,8 +8,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError, MonocularCamera, StereoCamera
 
-from ..formats.fields import extrinsic, positive, time_stamps
-from ..formats.named_file import FilePath, reading, regular_file
+from ..formats.field_checks import extrinsic, positive, time_stamps
+from ..formats.file_errors import FilePath, reading, regular_file
 from ..formats.npz_archive import NpzArchive
 from ..observations import IntArray, Observations
 from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem

@@ -14,9 +14,9 @@ from fgbaseline.geometry import FloatArray
 
 from ..axis_conventions import axes_matrix
 from ..imu import ImuNoise, ImuSamples
-from .path import Path
 from .random_streams import RandomStream, generator
 from .settings import Simulation
+from .simulated_path import Path
 
 DEGREE = 5
 RAMP = 4.0

@@ -5,8 +5,8 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 from ..observations import IntArray
-from .path import Path
 from .settings import WorldName
+from .simulated_path import Path
 
 _SLOT = 4.0
 """s between the appearance of objects"""

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from .path import Path
+from .simulated_path import Path
 
 STEP = 0.1
 """m between the stations of a road"""

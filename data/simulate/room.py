@@ -4,8 +4,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3
 
-from .path import Path
 from .rig import Rig
+from .simulated_path import Path
 
 _MARGIN = np.array([3.0, 3.0, 1.4])
 """m between the path and the walls, floor and ceiling"""

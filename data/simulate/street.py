@@ -9,7 +9,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3
 
 from ..observations import BoolArray, IntArray
-from .path import Path
+from .simulated_path import Path
 from .street_objects import StreetObjects
 
 _LANE = 1.6

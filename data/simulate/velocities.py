@@ -5,9 +5,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3
 
 from ..axis_conventions import axes_matrix
-from .path import Path
 from .random_streams import RandomStream, generator
 from .settings import Simulation
+from .simulated_path import Path
 
 
 def true_velocities(path: Path, t: FloatArray, settings: Simulation) -> FloatArray:

@@ -1,7 +1,7 @@
 """Front end: from images of a pair or of one camera to tracks, with OpenCV (extra `fgbaseline[images]`)."""
 
 from .monocular_tracker import MonocularTracker
-from .pictures import Picture, Pictures
+from .page_images import Picture, Pictures
 from .pipeline import TrackedRecording, opened_images, track, track_images
 from .settings import TrackerSettings
 from .sources import Cameras, ImageOptions, has_images

@@ -7,7 +7,7 @@ exposure changes from frame to frame.
 import numpy as np
 
 from .opencv import opencv
-from .rig import Image
+from .rectification import Image
 
 COARSE = 4
 """px of the image in one of the coarse image in which mean and deviation are taken"""

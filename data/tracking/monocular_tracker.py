@@ -15,7 +15,7 @@ from .corners import detect_corners
 from .local_contrast import equalized
 from .opencv import opencv
 from .optical_flow import OpticalFlow
-from .rig import Image
+from .rectification import Image
 from .settings import TrackerSettings
 from .stereo_tracker import CONFIDENCE, MIN_POINTS, Tracks
 

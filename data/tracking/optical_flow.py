@@ -8,7 +8,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..observations import BoolArray
 from .opencv import opencv
-from .rig import Image
+from .rectification import Image
 from .settings import TrackerSettings
 
 

@@ -10,15 +10,15 @@ from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera,
 from ..estimate import Progress
 from ..formats.ground_truth import attach_truth
 from ..formats.imu_attachment import attach_imu
-from ..formats.inertial_truth import inertial_truth
+from ..formats.inertial_ground_truth import inertial_truth
 from ..formats.npz_writer import write_npz, write_tracks
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from ..wording import plural
 from .monocular_tracker import MonocularTracker
-from .pictures import Pictures
+from .page_images import Pictures
 from .prediction import rotation_between
-from .rig import Image, rectify
+from .rectification import Image, rectify
 from .settings import TrackerSettings
 from .sources import ImageOptions, ImageRecording, open_recording
 from .sources.image_recording import TruthFile

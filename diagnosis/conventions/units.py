@@ -18,15 +18,15 @@ from math import log10
 import numpy as np
 
 from fgbaseline.data.finding import AS_GIVEN, Finding
-from fgbaseline.data.motion import zero_order_hold
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.time_unit import TimeUnit, rescaled_time, usual
+from fgbaseline.data.velocity_increments import zero_order_hold
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
-from .jumps import FAR_BLIND, among_neighbors
+from .neighbor_deviation import FAR_BLIND, among_neighbors
 from .rate_units import CALIBRATED, DEGREE, doubt_of_rate_unit, measured, of_no_unit
-from .rig import BASELINES, camera_distance, usual_rig
+from .rig_plausibility import BASELINES, camera_distance, usual_rig
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)

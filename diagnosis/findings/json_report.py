@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
-from ..estimation.result import Diagnosis
+from ..velocity_diagnosis.result import Diagnosis
 from .track_statistics import TrackStatistics, track_statistics
 from .velocity_findings import findings_of, not_identifiable
 
@@ -31,14 +31,14 @@ def to_json(
     tracks = tracks or track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks) if findings is None else findings
     report = header(diagnosis.sequence) | {
-        "cannot_tell": diagnosis.cannot_tell or None,
+        "cannot_tell": diagnosis.failure_reason or None,
         "findings": [asdict(finding) for finding in findings],
         "not_identifiable": list(not_identifiable(diagnosis)),
     }
     report |= _velocities(diagnosis) | _noise(diagnosis) | _tracks(tracks)
     notes: dict[str, str] = {}
     clean: dict[str, Any] = _without_nan(
-        report, "", notes, diagnosis.cannot_tell or "the recording does not determine it"
+        report, "", notes, diagnosis.failure_reason or "the recording does not determine it"
     )
     if clean["cannot_tell"] is None:
         notes["cannot_tell"] = "everything was determined, except for what not_identifiable lists"

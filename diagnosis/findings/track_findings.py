@@ -9,7 +9,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import per_cent, plural
 
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY
-from .phrases import spans
+from .frame_spans import spans
 from .track_statistics import MIN_USABLE, MOVING_LINKS, TrackStatistics
 
 MIN_WRONG = 0.10

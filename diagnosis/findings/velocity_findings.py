@@ -6,17 +6,17 @@ import numpy as np
 
 from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix, twist_in_imu_axes
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.motion import Shift, zero_order_hold
+from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.data.wording import listed, noun, number, per_cent, plural, signed, vector
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
 from ..conventions.units import LABELS, unit_findings
-from ..estimation.result import Diagnosis
 from ..noise.calibration_fit import SIGNIFICANT
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
 from ..tracks.image_size import intrinsics_findings
-from .phrases import spans
+from ..velocity_diagnosis.result import Diagnosis
+from .frame_spans import spans
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
 
@@ -93,8 +93,8 @@ def _extrinsic_inverse(before: float, after: float) -> Finding:
 
 def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Parameters that the recording does not determine, one sentence each."""
-    if diagnosis.cannot_tell:
-        return (f"Nothing about the velocities: {diagnosis.cannot_tell}.",)
+    if diagnosis.failure_reason:
+        return (f"Nothing about the velocities: {diagnosis.failure_reason}.",)
     sentences = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
     if not diagnosis.timing.identifiable:
         sentences.append("A time offset between velocities and images: that needs turns that both show.")

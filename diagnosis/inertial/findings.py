@@ -9,18 +9,18 @@ from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 
-from ..estimation.result import Diagnosis
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
-from ..monocular.start import EXCITED, MonocularStart
+from ..monocular.initial_state import EXCITED, MonocularStart
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
 from ..tracks.image_size import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
+from ..velocity_diagnosis.result import Diagnosis
 from .baseline_unit import baseline_findings
+from .imu_spikes import NOUNS, spike_findings
 from .result import InertialDiagnosis
 from .sensor_axes import axes_findings
 from .sensor_findings import sensor_findings
-from .spikes import NOUNS, spike_findings
 from .units import imu_unit_findings
 
 MIN_DROPPED = 0.001

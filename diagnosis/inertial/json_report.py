@@ -26,7 +26,7 @@ def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | N
             "noise": imu.noise.densities.tolist(),
             "gravity": imu.gravity,
         },
-        "cannot_tell": found.cannot_tell or None,
+        "cannot_tell": found.failure_reason or None,
         "findings": [asdict(finding) for finding in findings],
         "start": _start(found),
         "sensors": _sensors(found),

@@ -9,20 +9,20 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 
-from ..conventions.rig import usual_rig
+from ..conventions.rig_plausibility import usual_rig
 from ..conventions.units import Units, rescaled
-from ..inertial_initialization.path import InertialPath, inertial_path
-from ..inertial_initialization.start import Start, inertial_start
+from ..inertial_initialization.inertial_path import InertialPath, inertial_path
+from ..inertial_initialization.initial_state import Start, inertial_start
 from ..monocular.pipeline import diagnose_monocular
 from ..noise.calibration_fit import fit_windows
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.recording_faults import unusable
 from ..tracks.track_segments import repeated
 from .baseline_unit import baseline_unit
+from .imu_spikes import without_spikes
 from .result import InertialDiagnosis
 from .sensor_axes import in_imu_axes, sensor_axes
 from .sensors import sensor_checks
-from .spikes import without_spikes
 from .units import imu_units, rescaled_samples
 
 BEGINNING = 3.0
@@ -95,7 +95,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
     )
     first = inertial_start(sequence, seen, imu, max(seen.pixel_sigma, np.finfo(float).tiny))
     if first is None:
-        return replace(found, cannot_tell=no_start(seen))
+        return replace(found, failure_reason=no_start(seen))
     path = inertial_path(sequence, seen, imu, first)
     fit = fit_windows(sequence, seen, path.twist(sequence), processes)
     pixel = seen.pixel_sigma * path.inflation if fit is None else fit.sigmas.pixel

@@ -13,8 +13,8 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
-from ..conventions.rig import usual_rig
-from ..inertial_initialization.start import Start
+from ..conventions.rig_plausibility import usual_rig
+from ..inertial_initialization.initial_state import Start
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, choose_features, exclusions
@@ -35,7 +35,7 @@ def inertial_problem(found: InertialDiagnosis, features: int | None) -> Problem:
     """
     sequence = found.sequence
     if found.start is None or found.path is None:
-        raise InputError(f"{_source(sequence)}: {found.cannot_tell or 'no start is found'}")
+        raise InputError(f"{_source(sequence)}: {found.failure_reason or 'no start is found'}")
     path = found.path.states.pose
     tracks = repaired_tracks(sequence, path, MaskSettings(), TrackRepairs(), found.pixel)
     repaired = replace(

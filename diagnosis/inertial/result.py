@@ -10,16 +10,16 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 
-from ..inertial_initialization.path import InertialPath
-from ..inertial_initialization.start import Start
-from ..monocular.start import MonocularStart
+from ..inertial_initialization.inertial_path import InertialPath
+from ..inertial_initialization.initial_state import Start
+from ..monocular.initial_state import MonocularStart
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
 from ..repairs.repaired_sequence import RepairedTracks
 from .baseline_unit import BaselineUnit
+from .imu_spikes import Spikes
 from .sensor_axes import SensorAxes
 from .sensors import SensorChecks
-from .spikes import Spikes
 from .units import ImuUnits
 
 
@@ -30,7 +30,7 @@ class InertialDiagnosis(Displayed):
     sequence: Sequence
     """recording in rad/s, m/s^2 and m, in the axes of imu_T_cam"""
     recorded: Sequence
-    cannot_tell: str = ""
+    failure_reason: str = ""
     """reason for which no start is found, in a sentence without its full stop; empty otherwise"""
     units: ImuUnits = field(default_factory=ImuUnits)
     axes: SensorAxes = field(default_factory=SensorAxes)

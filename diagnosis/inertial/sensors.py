@@ -8,10 +8,10 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, so3
 
 from ..conventions.robust_regression import regress
-from ..inertial_initialization.path import InertialPath
-from ..inertial_initialization.start import Start
+from ..inertial_initialization.inertial_path import InertialPath
+from ..inertial_initialization.initial_state import Start
 from ..odometry.stereo_odometry import Odometry
-from .rest_noise import RestNoise, rest_noise
+from .stationary_noise import RestNoise, rest_noise
 from .units import mean_rates
 
 MIN_INTERVALS = 20

@@ -14,7 +14,7 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from .states import Motions, RelativePoses, States, motions_between
-from .track_terms import KeyframeTracks
+from .structureless_factors import KeyframeTracks
 
 STATE = strapdown.STATE
 GYROSCOPE_BIAS_SIGMA = 0.1

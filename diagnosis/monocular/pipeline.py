@@ -5,17 +5,17 @@ from dataclasses import replace
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.rig import doubt_of_position, is_far
+from ..conventions.rig_plausibility import doubt_of_position, is_far
+from ..inertial.imu_spikes import without_spikes
 from ..inertial.result import InertialDiagnosis
 from ..inertial.sensor_axes import in_imu_axes
 from ..inertial.sensors import sensor_checks
-from ..inertial.spikes import without_spikes
 from ..inertial.units import imu_units, rescaled_samples
 from ..odometry.monocular_odometry import monocular_odometry
 from ..tracks.recording_faults import unusable
 from ..tracks.track_segments import repeated
+from .initial_state import monocular_start
 from .sensor_axes import monocular_axes
-from .start import monocular_start
 from .track_mask import monocular_tracks, used
 
 
@@ -46,6 +46,6 @@ def diagnose_monocular(recorded: Sequence) -> InertialDiagnosis:
     try:
         start = monocular_start(used(sequence, tracks), imu)
     except ValueError as error:
-        return replace(found, cannot_tell=str(error), sensors=sensor_checks(sequence, seen))
+        return replace(found, failure_reason=str(error), sensors=sensor_checks(sequence, seen))
     sensors = sensor_checks(sequence, seen, start=start.start)
     return replace(found, start=start.start, monocular=start, sensors=sensors)

@@ -10,7 +10,7 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
-from ..conventions.rig import doubt_of_position, is_far
+from ..conventions.rig_plausibility import doubt_of_position, is_far
 from ..inertial.findings import inertial_findings, inertial_repairs, scale_findings
 from ..inertial.problem import imu_remarks, problem_of
 from ..inertial.result import InertialDiagnosis
@@ -18,7 +18,7 @@ from ..inertial.units import imu_unit_findings, imu_units, require_si
 from ..odometry.monocular_odometry import monocular_odometry
 from ..tracks.image_size import intrinsics_findings
 from ..tracks.recording_faults import unusable
-from .start import monocular_start
+from .initial_state import monocular_start
 from .track_mask import repaired
 
 SHORTEST = 3
@@ -36,7 +36,7 @@ def monocular_problem(found: InertialDiagnosis, features: int | None) -> Problem
     """
     sequence, start, tracks = found.sequence, found.monocular, found.tracks
     if start is None or tracks is None:
-        raise InputError(f"{sequence.source or sequence.name}: {found.cannot_tell or 'no start is found'}")
+        raise InputError(f"{sequence.source or sequence.name}: {found.failure_reason or 'no start is found'}")
     remarks = (
         f"pixel noise {'estimated from the recording' if found.pixel_found else 'assumed'}: {found.pixel:.2f} px",
         *imu_remarks(sequence),

@@ -18,9 +18,9 @@ from fgbaseline.geometry import FloatArray
 from ..conventions.axes import angular_axes
 from ..inertial.sensor_axes import MIN_INTERVALS, SensorAxes, in_imu_axes
 from ..inertial.units import mean_rates
-from ..inertial_initialization.track_terms import KeyframeTracks
+from ..inertial_initialization.structureless_factors import KeyframeTracks
 from ..odometry.stereo_odometry import Odometry
-from .window import FIRST_PIXEL, gyroscope_biases, spread_keyframes, states_at
+from .initialization_window import FIRST_PIXEL, gyroscope_biases, spread_keyframes, states_at
 from .window_tracks import keyframe_tracks, squared_residuals, window_points
 
 SPAN, WINDOWS = 4.0, 4

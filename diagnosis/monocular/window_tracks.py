@@ -6,11 +6,11 @@ import numpy as np
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.measurement import predict
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
-from ..inertial_initialization.track_terms import KeyframeTracks
+from ..inertial_initialization.structureless_factors import KeyframeTracks
 
 MIN_OBSERVATIONS = 3
 """observations of a track among the keyframes"""
@@ -43,7 +43,7 @@ def keyframe_tracks(sequence: Sequence, frames: IntArray, sigma: float) -> Keyfr
     _, row, count = np.unique(o.landmark[chosen], return_inverse=True, return_counts=True)
     chosen = chosen[count[row] >= MIN_OBSERVATIONS]
     point = np.unique(o.landmark[chosen], return_inverse=True)[1].astype(np.int64)
-    model = StereoMeasurement(sequence.camera, sigma**2, HuberKernel())
+    model = MeasurementModel(sequence.camera, sigma**2, HuberKernel())
     return KeyframeTracks(model, sequence.imu_T_cam, place[o.frame[chosen]], point, o.pixel[chosen])
 
 
@@ -63,7 +63,7 @@ def squared_residuals(tracks: KeyframeTracks, pose: FloatArray, points: FloatArr
     for i, world_T_imu in enumerate(pose):
         at = np.flatnonzero(tracks.keyframe == i)
         seen = predict(model.camera, cam_T_imu, world_T_imu, points[tracks.point[at]])
-        residual = (model.measured(tracks.pixel[at]) - seen.pixel) * model.whitening_scale
+        residual = (model.rows_of(tracks.pixel[at]) - seen.pixel) * model.whitening_scale
         squared[at] = np.where(seen.depth > model.camera.min_depth, np.sum(residual**2, axis=1), np.nan)
     return squared
 

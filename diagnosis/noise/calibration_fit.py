@@ -9,9 +9,9 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
-from ..windows.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
-from ..windows.residuals import N_CALIBRATION
-from ..windows.selection import spread_spans, unbroken_spans, windows_of
+from ..window_adjustment.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
+from ..window_adjustment.residuals import N_CALIBRATION
+from ..window_adjustment.selection import spread_spans, unbroken_spans, windows_of
 from .correlated_noise import Inflation, inflation_of
 
 ROUNDS = 6

@@ -14,8 +14,8 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, so3
 
-from ..windows.bundle_adjustment import fit_each_window
-from ..windows.residuals import MISALIGNMENT, SCALE, Window, WindowData
+from ..window_adjustment.bundle_adjustment import fit_each_window
+from ..window_adjustment.residuals import MISALIGNMENT, SCALE, Window, WindowData
 
 LOOSE = 30.0
 """factor on the velocity noise for fits that the cameras dominate"""

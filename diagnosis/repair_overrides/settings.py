@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, field_validator
 
 from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.data.time_unit import TimeUnit
 from fgbaseline.data.toml_file import is_finite_number, read_toml
 

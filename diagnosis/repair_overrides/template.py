@@ -8,10 +8,10 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray
 
 from ..conventions.axes import Axes
-from ..estimation.result import Diagnosis
 from ..repairs.repaired_sequence import repair
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset, significant_scale
 from ..tracks.observation_mask import MaskSettings
+from ..velocity_diagnosis.result import Diagnosis
 
 
 def repairs_text(diagnosis: Diagnosis) -> str:
@@ -23,8 +23,8 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
     mask, sigmas = MaskSettings(), diagnosis.sigmas or NoiseSettings()
     yield f"# Repairs of {diagnosis.sequence.name.splitlines()[0]}, as the diagnosis found them, for run --repairs."
     yield "# A key that is left out is left to the diagnosis; 'as-recorded' in place of a value turns its repair off."
-    if diagnosis.cannot_tell:
-        yield f"# Nothing could be found out: {' '.join(diagnosis.cannot_tell.split())}."
+    if diagnosis.failure_reason:
+        yield f"# Nothing could be found out: {' '.join(diagnosis.failure_reason.split())}."
     yield ""
     yield f"extrinsic_inverted = {str(diagnosis.inverted).lower()}  # of imu_T_cam, before anything else"
     yield "replace_outliers = true  # velocity samples that contradict cameras and neighbors; false: as recorded"

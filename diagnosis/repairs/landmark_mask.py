@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
@@ -36,13 +36,13 @@ def exclude_landmarks(
     world_T_cam = (world_T_imu @ sequence.imu_T_cam)[o.frame]
     _, row = np.unique(o.landmark, return_inverse=True)
     row = row.astype(np.int64)
-    result, model = excluded.copy(), StereoMeasurement(sequence.camera, sigma**2, HuberKernel())
+    result, model = excluded.copy(), MeasurementModel(sequence.camera, sigma**2, HuberKernel())
     result[chosen[_moving(model, world_T_cam, row, o)[row]]] = Excluded.MOVING
     result[chosen[_undetermined(model, world_T_cam, row, o)[row]]] = Excluded.GEOMETRY
     return result
 
 
-def _moving(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
+def _moving(model: MeasurementModel, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
     """Mask (m,) of dynamic landmarks."""
     piece, n_pieces = _pieces(row, o.frame)
     position = triangulate_tracks(model, world_T_cam, piece, o.pixel, n_pieces).position
@@ -66,7 +66,7 @@ def _pieces(row: IntArray, frame: IntArray) -> tuple[IntArray, int]:
     return first[row] + np.minimum(place * count[row] // length[row], count[row] - 1), int(count.sum())
 
 
-def _undetermined(model: StereoMeasurement, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
+def _undetermined(model: MeasurementModel, world_T_cam: FloatArray, row: IntArray, o: Observations) -> BoolArray:
     """Mask (m,) of landmarks with an undetermined distance, or behind a camera."""
     position, information = triangulate_tracks(model, world_T_cam, row, o.pixel, int(row.max()) + 1)
     depth = se3.transform(se3.inverse(world_T_cam), position[row])[:, 2]

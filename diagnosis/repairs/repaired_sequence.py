@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.data.axis_conventions import twist_in_imu_axes
-from fgbaseline.data.motion import dead_reckoned_path, zero_order_hold
 from fgbaseline.data.observations import Observations
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence, Truth
+from fgbaseline.data.velocity_increments import dead_reckoned_path, zero_order_hold
 from fgbaseline.data.wording import signed, vector
 from fgbaseline.geometry import FloatArray, so3
 
-from ..estimation.result import Diagnosis
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.observation_mask import (
     GATE_RANGE,
@@ -25,6 +24,7 @@ from ..tracks.observation_mask import (
     split_tracks,
 )
 from ..tracks.track_segments import consecutive, is_usable
+from ..velocity_diagnosis.result import Diagnosis
 from .landmark_mask import exclude_landmarks
 from .significance import significant_bias, significant_misalignment, significant_offset, significant_scale
 

@@ -55,7 +55,7 @@ class JointFilter:
         self.row_variance = self.measurement.row_variance
         self.feature = problem.feature_row(o.landmark)
         """(n,) index into `problem.features` of each observation"""
-        self.measured = self.measurement.measured(o.pixel)
+        self.measured = self.measurement.rows_of(o.pixel)
         """(n, r) measured rows, px"""
         self.motion: MotionModel = motion_model(problem)
         if settings.gyro_bias is not None:

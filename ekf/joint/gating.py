@@ -12,7 +12,7 @@ from scipy.special import chdtri
 
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.data.observations import BoolArray, IntArray
-from fgbaseline.geometry import FloatArray, StereoMeasurement
+from fgbaseline.geometry import FloatArray, MeasurementModel
 
 from .settings import JointSettings
 
@@ -40,7 +40,7 @@ class GatedObservations:
         return np.argsort(np.where(self.accepted, self.weight != 1.0, 2), kind="stable")
 
 
-def gate_observations(nis: FloatArray, measurement: StereoMeasurement, settings: JointSettings) -> GatedObservations:
+def gate_observations(nis: FloatArray, measurement: MeasurementModel, settings: JointSettings) -> GatedObservations:
     """Gate observations by their `nis` (n,), each innovation whitened by its own covariance.
 
     Where more than `disagreeing_share` of a frame's observations are outliers, all are rejected: the few inliers agree

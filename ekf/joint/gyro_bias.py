@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
-from ..motion_model import POSE, BodyState, Prediction
+from ..motion_model import POSE, BodyState, PredictedState
 
 BIAS = 3
 
@@ -59,11 +59,11 @@ class BiasedVelocityMotion:
         self.start = BodyState(problem.initial_pose, np.zeros(BIAS))
         self.covariance = block_diag(problem.initial_covariance, prior.covariance())
 
-    def predict(self, k: int, body: BodyState) -> Prediction:
-        """Prediction of frame k + 1 from the state of frame k."""
+    def predict(self, k: int, body: BodyState) -> PredictedState:
+        """PredictedState of frame k + 1 from the state of frame k."""
         dt, twist = float(self.dt[k]), self.problem.increment[k].copy()
         twist[3:] -= dt * body.additive
         step = se3.exp_one(twist)
         F = se3.adjoint(se3.inverse(step))
         F, Q = self.prior.augment(twist, dt, F, self.problem.increment_covariance[k])
-        return Prediction(BodyState(body.pose @ step, body.additive), F, Q)
+        return PredictedState(BodyState(body.pose @ step, body.additive), F, Q)

@@ -13,9 +13,9 @@ import numpy as np
 
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import squared_norm
+from fgbaseline.geometry.measurement import mahalanobis_squared
 
-from ..motion_model import POSE, Prediction
+from ..motion_model import POSE, PredictedState
 from .gating import GatedObservations, chi2_quantile
 from .update import Innovation, NotPositiveDefiniteError
 
@@ -43,7 +43,7 @@ class ProcessNoise:
         self.n_rejected = 0
         """number of consecutive frames rejected as a whole"""
 
-    def propagate(self, prediction: Prediction) -> None:
+    def propagate(self, prediction: PredictedState) -> None:
         """Accumulate the noise of one interval: propagated by F, plus Q."""
         self._accumulated = prediction.covariance(self._accumulated)
 
@@ -91,6 +91,6 @@ def inflation_factor(residual: FloatArray, covariance: FloatArray, by_motion: Fl
     median = chi2_quantile(0.5, residual.shape[1])
     for doubling in range(MAX_DOUBLINGS):
         factor = 2.0**doubling
-        if np.median(squared_norm(residual, covariance + factor * by_motion)) <= median:
+        if np.median(mahalanobis_squared(residual, covariance + factor * by_motion)) <= median:
             return factor
     return None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
 
-from ..motion_model import POSE, BodyState, Prediction
+from ..motion_model import POSE, BodyState, PredictedState
 from .landmark_representation import WorldPoints, generators, motion_jacobian, world_points
 from .update import subtract_symmetric
 
@@ -107,7 +107,7 @@ class JointState:
         before[:] = now
         return change
 
-    def predict(self, prediction: Prediction) -> None:
+    def predict(self, prediction: PredictedState) -> None:
         """Predict the body (equation 9), with Sigma <- F Sigma F^T + W."""
         transition, P, body = prediction.transition, self.P, self.n_body
         moved = transition @ P[:body]

@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import squared_norm
+from fgbaseline.geometry.measurement import mahalanobis_squared
 
 from ..motion_model import POSE
 
@@ -136,7 +136,7 @@ class Innovation:
 
     def nis_per_observation(self, variance: FloatArray) -> FloatArray:
         """NIS (n,) of each observation alone: r^T (H P H^T + R)^-1 r, R = diag(variance), (n, r) or (r,), px^2."""
-        return squared_norm(self.residual, self.own_covariances(variance))
+        return mahalanobis_squared(self.residual, self.own_covariances(variance))
 
     def own_covariances(self, variance: FloatArray) -> FloatArray:
         """Covariances (n, r, r) of each innovation alone, px^2: H P H^T + R, R = diag(variance), (n, r) or (r,)."""
@@ -158,7 +158,7 @@ class Innovation:
         n, r = len(self), self.residual.shape[1]
         each = np.arange(n)
         lower = np.tril(inverse.reshape(n, r, n, r)[each, :, each, :])
-        return squared_norm(z, lower + np.swapaxes(np.tril(lower, -1), 1, 2))
+        return mahalanobis_squared(z, lower + np.swapaxes(np.tril(lower, -1), 1, 2))
 
     def factorize(self, variance: FloatArray) -> CholeskyFactor:
         """Factor of S for R = diag(variance), (n, r) or (r,), px^2. Raises NotPositiveDefiniteError."""

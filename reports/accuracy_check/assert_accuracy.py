@@ -19,12 +19,12 @@ from fgbaseline.compare import (
     summarized,
     time_coverage,
 )
-from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.compare.acceptance_limits import Bounds, Outcome
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
 from fgbaseline.data.formats import Order, read_trajectory_file
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..phrases.check import bound, number

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.compare.limits import Outcome, rounded
+from fgbaseline.compare.acceptance_limits import Outcome, rounded
 from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.geometry import InputError
 
 from ..phrases.check import violated_limits

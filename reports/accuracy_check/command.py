@@ -17,9 +17,9 @@ from xml.etree import ElementTree
 import click
 from rich.console import Console
 
-from fgbaseline.compare.limits import Outcome
+from fgbaseline.compare.acceptance_limits import Outcome
 from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.named_file import writing
+from fgbaseline.data.formats.file_errors import writing
 from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 

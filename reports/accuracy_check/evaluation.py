@@ -6,15 +6,15 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from fgbaseline.compare import MIN_STRETCHES, is_insufficient
-from fgbaseline.compare.limits import Bounds, Outcome, around, rounded
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.compare.acceptance_limits import Bounds, Outcome, around, rounded
+from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.data.toml_file import TomlFile
 
 from ..formatting import number
 from ..phrases.check import too_little_data, untrusted_reference
 from ..phrases.evidence import reference_sigma_sentence
 from ..results.check import NEW, Checked, Line, Shortage
-from ..results.documents import INFINITE
+from ..results.json_files import INFINITE
 from ..results.reader import (
     DIGITS,
     NO_SUCH_METRIC,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, model_validator
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
-from fgbaseline.compare.limits import Better, Bounds
+from fgbaseline.compare.acceptance_limits import Better, Bounds
 from fgbaseline.data.toml_file import TomlFile, read_toml
 
 from ..results.parts import Finite, Part

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.data.wording import plural
 
 from ..phrases.bench import sentences

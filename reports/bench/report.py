@@ -19,7 +19,7 @@ from ..html.rendering import render_page
 from ..phrases.bench import FIGURES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
-from ..results.documents import INFINITE, at
+from ..results.json_files import INFINITE, at
 from ..results.reader import RunFolder
 from ..tables.bench import main_table, ranking_tables, runs_table
 from ..tables.table import latex, markdown

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.geometry import InputError
 
 from .worker import Outcome

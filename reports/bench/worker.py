@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
+from fgbaseline.data.estimator_runner import describe, solve_all
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.solving import describe, solve_all
-from fgbaseline.diagnosis import Calibration, calibrated, hold_out, read_repairs
+from fgbaseline.diagnosis import AsRecordedSettings, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
 
@@ -106,7 +106,7 @@ def _problem(sequence: Sequence, job: Job) -> Problem:
         count = DEFAULT_FEATURES if job.features is None else features
         return documented(sequence, count, LandmarkMode(job.landmarks))
     if job.noise == "assumed":
-        return calibrated(sequence, features, settings=Calibration())
+        return calibrated(sequence, features, settings=AsRecordedSettings())
     repairs = None
     if isinstance(job.source, Recorded) and job.source.repairs is not None:
         repairs = read_repairs(job.source.repairs.path)

@@ -125,7 +125,7 @@ def compare(
     from fgbaseline.geometry import InputError
 
     from ..comparison import compare as compare_files
-    from ..results.documents import COMPARISON
+    from ..results.json_files import COMPARISON
 
     if out is not None:
         require_free(out, force=force, mark=COMPARISON)
@@ -186,7 +186,7 @@ def check(
     """
     from fgbaseline.data.toml_text import toml_values
 
-    from ..results.documents import document_in, read_document
+    from ..results.json_files import document_in, read_document
 
     values, summary = toml_values(limits), document_in(folder)
     document = read_document(summary)  # faults of both files are reported before their models are imported
@@ -216,7 +216,7 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     from fgbaseline.data.formats.atomic_folder import atomic_folder
     from fgbaseline.data.wording import plural
 
-    from ..results.documents import COMPARISON, document_in, read_document
+    from ..results.json_files import COMPARISON, document_in, read_document
 
     file = document_in(folder, "run or compare")
     read_document(file)  # a fault is reported before matplotlib is imported
@@ -300,6 +300,6 @@ def reproduce(
     Exits 0 when the reproduction is written, whatever the claims' results, and 2 on bad input.
     """
     from ..reproduction.command import reproduce as run_reproduction
-    from ..reproduction.study import SweepSettings
+    from ..reproduction.experiments import SweepSettings
 
     return run_reproduction(sequence, out, SweepSettings(sweep_features, sweep_noise), force=force)

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import InputError
 
-from ..keywords import for_python
+from ..python_arguments import for_python
 from .opening import as_path, with_open_file
 
 if TYPE_CHECKING:

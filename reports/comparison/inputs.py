@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, TypeAlias, cast, get_args
 
 import numpy as np
 
-from fgbaseline.compare.trajectory_comparison.bodies import (
+from fgbaseline.compare.trajectory_comparison.body_frames import (
     moved_body,
     with_body_recognized,
     with_length_unit_recognized,
     with_lever_arm,
 )
 from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
-from fgbaseline.compare.trajectory_comparison.entry import Entries, Entry
+from fgbaseline.compare.trajectory_comparison.inputs import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Trajectory
 from fgbaseline.data.formats import ParsedTrajectory, read_landmarks, read_times
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory
 from fgbaseline.data.formats.trajectory_reader import read_extrinsic
-from fgbaseline.data.formats.trajectory_text import OpenedTrajectory
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..run.defaults import names_in

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from fgbaseline.compare.trajectory_comparison.settings import Settings
-from fgbaseline.data.formats.named_file import FilePath, shown
-from fgbaseline.data.formats.trajectory_text import OpenedTrajectory, open_trajectory
+from fgbaseline.data.formats.file_errors import FilePath, shown
+from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory, open_trajectory
 from fgbaseline.geometry import InputError
 
 Input = TypeVar("Input")

@@ -9,10 +9,10 @@ from fgbaseline.compare import Criterion, Trust, Verdict
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence, Trajectory, read, read_problem
-from fgbaseline.data.formats.named_file import reading
+from fgbaseline.data.formats.file_errors import reading
 from fgbaseline.geometry import InputError
 
-from ..results.documents import SUMMARY
+from ..results.json_files import SUMMARY
 from ..results.reader import RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 

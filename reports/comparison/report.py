@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
 from fgbaseline.compare.trajectory_comparison.metrics import PairedEntries, compare_paired, pair_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.dataframes import as_cell_value
-from fgbaseline.data.formats.named_file import FilePath
+from fgbaseline.data.formats.file_errors import FilePath
 
-from ..keywords import for_python
 from ..notebook import NotebookResult, write_report
 from ..phrases import comparison as phrases
+from ..python_arguments import for_python
 from ..results.comparison_summary import results_by_name, summarize
-from ..results.documents import COMPARISON
+from ..results.json_files import COMPARISON
 from ..tables.comparison import comparison_table, main_columns, main_frame, metrics_columns
 from ..tables.csv_file import write_csv
 from ..tables.table import Table, latex, markdown

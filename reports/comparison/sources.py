@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.data import Estimate, Landmarks, Status, Trajectory, Truth
 from fgbaseline.data.formats import ParsedTrajectory, TrajectoryFormat
-from fgbaseline.data.formats.named_file import FilePath
-from fgbaseline.data.formats.trajectory_reader import parsed_file
-from fgbaseline.data.formats.trajectory_text import (
+from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.trajectory_opening import (
     OpenedTrajectory,
     TrajectoryArchive,
     TrajectoryText,
     TrajectoryTopic,
     open_trajectory,
 )
+from fgbaseline.data.formats.trajectory_reader import parsed_file
 from fgbaseline.geometry import InputError
 
 from .opening import split_name

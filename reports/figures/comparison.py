@@ -13,11 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import MatchedTrajectories
-from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
+from .axis_limits import common_window
 from .comparison_data import ComparisonData, of_comparison
 from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
 from .evidence import map_difference, three_sigma
@@ -29,7 +30,6 @@ from .paths import frame_top_view
 from .reprojection import distribution
 from .saving import EncodedFigure
 from .style import SCREEN, WHITE, Style, in_style, safe_text, stacked_panels
-from .view_limits import common_window
 
 if TYPE_CHECKING:
     import pandas as pd

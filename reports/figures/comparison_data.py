@@ -10,12 +10,12 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import Align
-from fgbaseline.compare.columns import Columns, of_frame
-from fgbaseline.data.formats.named_file import reading
+from fgbaseline.compare.column_tables import Columns, of_frame
+from fgbaseline.data.formats.file_errors import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..results.documents import COMPARISON
+from ..results.json_files import COMPARISON
 from ..results.reader import RunFolder
 from .palette import colors
 from .style import SCREEN, Line, Style, lines

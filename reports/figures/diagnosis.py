@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fgbaseline.data.axis_conventions import IDENTITY, twist_in_imu_axes
-from fgbaseline.data.motion import Shift, zero_order_hold
+from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.data.wording import per_cent, plural
 from fgbaseline.diagnosis import Diagnosis, TrackStatistics
 from fgbaseline.diagnosis.repairs.significance import significant_bias

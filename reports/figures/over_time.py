@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.column_tables import Columns
 from fgbaseline.geometry import FloatArray
 
+from .axis_limits import common_window, signed_range
 from .legend import title_and_legend
 from .palette import GREEN
 from .panels import (
@@ -27,7 +28,6 @@ from .panels import (
 )
 from .run_data import RunData
 from .style import SCREEN, Line, Style, safe_text, stacked_panels
-from .view_limits import common_window, signed_range
 
 if TYPE_CHECKING:
     import pandas as pd

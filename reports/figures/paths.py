@@ -11,11 +11,11 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
+from .axis_limits import Window, common_window, known, robust_window
 from .legend import note, swatch, title_and_legend
 from .palette import GRAY, LANDMARK, TRUTH
 from .run_data import RunData
 from .style import SCREEN, WHITE, Style, label, safe_text
-from .view_limits import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run

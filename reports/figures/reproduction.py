@@ -21,14 +21,14 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
+from .axis_limits import Window, common_window, known, robust_window
 from .drawing import DrawOne, drawn
 from .legend import note, swatch, title_and_legend
 from .paths import frame_top_view
 from .style import SCREEN, safe_text
-from .view_limits import Window, common_window, known, robust_window
 
 if TYPE_CHECKING:
-    from fgbaseline.reports.reproduction.study import Outcome, Study
+    from fgbaseline.reports.reproduction.experiments import Outcome, Study
 
 PATH, ENDS, ARROW, LANDMARK = "#d62728", "#1f4e9c", "#1f4e9c", "#2ca02c"
 DEAD_RECKONING, BROKEN = "#444444", "#b3261e"

@@ -161,10 +161,14 @@ def _classes(run: RunData) -> "dict[str, pd.DataFrame]":
 
 def _ninths(classes: "pd.DataFrame") -> FloatArray:
     """(3, 3) median error of each ninth of the image; NaN for one without an observation."""
-    from fgbaseline.compare.residuals.patterns import COLUMNS, REGION, ROWS
+    from fgbaseline.compare.residuals.residual_classes import REGION, REGION_COLUMNS, REGION_ROWS
 
     medians = classes.loc[classes["by"] == REGION].set_index("of")["median"]
-    return medians.reindex([f"{row} {column}" for row in ROWS for column in COLUMNS]).to_numpy(np.float64).reshape(3, 3)
+    return (
+        medians.reindex([f"{row} {column}" for row in REGION_ROWS for column in REGION_COLUMNS])
+        .to_numpy(np.float64)
+        .reshape(3, 3)
+    )
 
 
 def medians_by_class(

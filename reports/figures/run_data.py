@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fgbaseline import compare
-from fgbaseline.data.formats.named_file import reading
+from fgbaseline.data.formats.file_errors import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..results.documents import SUMMARY, document_in
+from ..results.json_files import SUMMARY, document_in
 from ..results.reader import RunFolder
 from .palette import colors
 from .style import SCREEN, Line, Style, lines

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from fgbaseline import compare
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
-from fgbaseline.compare.trajectory_comparison.entry import Entry
+from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.geometry import FloatArray
 
 from ..figures.comparison_data import ComparisonData

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from fgbaseline.compare.limits import Bounds, Outcome
+from fgbaseline.compare.acceptance_limits import Bounds, Outcome
 from fgbaseline.data.wording import plural
 
 from ..results.check import NEW, Checked, Line, Shortage

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.compare import RmseDifference, distance_traveled
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
-from fgbaseline.compare.trajectory_comparison.samples import coverage
+from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage
 
 from ..formatting import MINUS, counted, grouped, interval, listed, number, per_cent, resolution, resolved
 from .evidence import causal_estimate, threshold_sentences

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fgbaseline.compare.residuals.patterns import COLUMNS, ROWS
+from fgbaseline.compare.residuals.residual_classes import REGION_COLUMNS, REGION_ROWS
 from fgbaseline.data import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
@@ -36,6 +36,6 @@ def _sparse(pixel: FloatArray, size: tuple[float, float], image: str) -> str:
     ends = np.array(size)
     cell = np.clip((3.0 * pixel / ends).astype(np.int64), 0, 2)
     share = np.bincount(3 * cell[:, 1] + cell[:, 0], minlength=9) / len(pixel)
-    places = [f"{ROWS[k // 3]} {COLUMNS[k % 3]}" for k in np.flatnonzero(share < SPARSE / 9.0)]
+    places = [f"{REGION_ROWS[k // 3]} {REGION_COLUMNS[k % 3]}" for k in np.flatnonzero(share < SPARSE / 9.0)]
     few = f"below {per_cent(SPARSE)} of an even share"
     return f"Sparse cells of the 3 x 3 grid of the {image} ({few}): {listed(places) or 'none'}."

@@ -11,8 +11,8 @@ from fgbaseline.data import Status
 from fgbaseline.data.wording import plural
 
 from ..formatting import meters, per_cent, pixels
+from .experiments import Outcome, Staged, Study, path_length
 from .recordings import PAPER_RECORDINGS, PaperRecording
-from .study import Outcome, Staged, Study, path_length
 
 MIN_CAUSE_FACTOR = 1.5
 """a cause is named where its repair changes the value at least by this factor"""

@@ -20,9 +20,9 @@ from ..figures.reproduction import draw
 from ..progress import reporter
 from ..tables.table import print_table
 from .claims import Claim, claims_of, missing_claims
+from .experiments import Study, SweepSettings, stages_of, study_recording
 from .page import claims_table, render
 from .recordings import read_subjects
-from .study import Study, SweepSettings, stages_of, study_recording
 
 MARK = "claims.json"
 """the file that marks a reproduction's folder"""

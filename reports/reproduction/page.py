@@ -13,7 +13,7 @@ from ..html.rendering import render_page
 from ..results.metric import INERTIAL_TERMS, TERMS
 from ..tables.table import Column, Row, Table, numbers, words
 from .claims import Claim, Verdict
-from .study import Outcome, Study
+from .experiments import Outcome, Study
 
 BADGES: Mapping[str, str] = {
     Verdict.HOLDS: "trusted",

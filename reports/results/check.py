@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fgbaseline.compare.limits import Bounds, Outcome, rounded
+from fgbaseline.compare.acceptance_limits import Bounds, Outcome, rounded
 
 from .reader import DIGITS, Measured
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import SegmentErrors, distance_traveled
-from fgbaseline.compare.columns import Columns
+from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.block_bootstrap import Bounded, ErrorStatistics
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
-from fgbaseline.compare.trajectory_comparison.samples import coverage, samples
+from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage, samples
 
-from .documents import INFINITE, finite, nulls
+from .json_files import INFINITE, finite, nulls
 
 if TYPE_CHECKING:
     import pandas as pd

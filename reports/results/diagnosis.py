@@ -67,8 +67,8 @@ def found_by(diagnosis: Diagnosis) -> Found:
         measured="velocities",
         document=to_json(diagnosis, tracks, findings),
         findings=findings,
-        undecided=diagnosis.cannot_tell,
-        not_identifiable=() if diagnosis.cannot_tell else tuple(not_identifiable(diagnosis)),
+        undecided=diagnosis.failure_reason,
+        not_identifiable=() if diagnosis.failure_reason else tuple(not_identifiable(diagnosis)),
         sentences=() if diagnosis.fit is None else (_noise(diagnosis),),
         diagnosis=diagnosis,
         tracks=tracks,
@@ -85,8 +85,8 @@ def found_of_inertial(sequence: Sequence) -> Found:
         measured="inertial samples",
         document=inertial_to_json(diagnosis, findings),
         findings=findings,
-        undecided=diagnosis.cannot_tell,
-        not_identifiable=NOT_BY_ONE_CAMERA if read.monocular and not diagnosis.cannot_tell else (),
+        undecided=diagnosis.failure_reason,
+        not_identifiable=NOT_BY_ONE_CAMERA if read.monocular and not diagnosis.failure_reason else (),
         sentences=(*sequence.remarks, *inertial_sentences(diagnosis)),
     )
 

@@ -14,7 +14,6 @@ from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.sample_sizes import samples
 
-from .documents import INFINITE, nulls
 from .evidence import (
     CovarianceCount,
     HeldOutError,
@@ -29,6 +28,7 @@ from .evidence import (
     summarize_evidence,
 )
 from .inertial import QuantityDivergence, QuantityError, StateNees, inertial_notes, summarize_inertial
+from .json_files import INFINITE, nulls
 from .metric import TERMS, Metric
 from .metrics import MEASURED, NOT_MEASURED, measured
 from .parts import Divergence, Number, Part, PoseSigma, Reprojection, Spread

@@ -9,7 +9,7 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Alignment
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.geometry.strapdown import BLOCKS
 
 from . import metric as group

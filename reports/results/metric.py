@@ -6,10 +6,10 @@ from enum import Flag, auto
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 
 from ..formatting import RESOLUTION, interval, number, resolved
-from .documents import at
+from .json_files import at
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fgbaseline.compare import time_coverage
-from fgbaseline.compare.limits import Better
-from fgbaseline.compare.trajectory_comparison.resolution import truth_resolution
+from fgbaseline.compare.acceptance_limits import Better
+from fgbaseline.compare.trajectory_comparison.decimal_resolution import truth_resolution
 
 from ..formatting import RESOLUTION
 from . import metric as group

@@ -12,9 +12,9 @@ from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray
 
-from .documents import finite
 from .estimator import EstimatorSummary, InertialEstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
+from .json_files import finite
 from .parts import Document, Number, Part, PoseSigma
 from .provenance import machine, versions
 

@@ -18,15 +18,16 @@ from fgbaseline.data import (
     estimator_names,
     find_estimator,
 )
-from fgbaseline.data.formats.named_file import FilePath
-from fgbaseline.data.solving import no_progress
+from fgbaseline.data.estimator_runner import no_progress
+from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
 from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
-from ..keywords import for_python
+from ..python_arguments import for_python
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
+from .estimation import read_added, solve
 from .problem import (
     RunSettings,
     build_problem,
@@ -37,7 +38,6 @@ from .problem import (
     with_defaults,
 )
 from .report import RunReport
-from .solution import read_added, solve
 
 AS_GIVEN = ("preset", "features", "truth_frame", "truth_up", "as_recorded", "held_out", "seed", "cameras")
 OF_ADDED = ("add_body", "add_time_unit", "add_offset")

@@ -12,7 +12,7 @@ from fgbaseline.data.tracking import Pictures
 from fgbaseline.data.wording import plural
 
 from ..open_page import announce, print_sentences
-from ..results.documents import SUMMARY
+from ..results.json_files import SUMMARY
 from .problem import (
     TRACKS,
     RunSettings,
@@ -46,7 +46,7 @@ def run(
         require_rerun(rerun_file)
 
     if settings.add or settings.add_body or settings.add_time_unit or settings.add_offset:
-        from .solution import read_added
+        from .estimation import read_added
 
         added = read_added(settings)
     else:
@@ -71,8 +71,8 @@ def run(
         from ..phrases.run import verdict
         from ..tables.run import terminal_table
         from ..tables.table import print_table
+        from .estimation import solve
         from .folder import write_run
-        from .solution import solve
 
         import_estimators(settings.estimators)
         (problem,) = built()

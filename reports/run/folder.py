@@ -18,7 +18,7 @@ from fgbaseline.data.tracking import Pictures
 from .. import figures
 from ..formatting import counted
 from ..html.run_page import render
-from ..results.documents import SUMMARY
+from ..results.json_files import SUMMARY
 from ..results.reader import TRUTH
 from ..results.run import Summary, summarize
 from ..tables.csv_file import write_csv

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from fgbaseline.data.formats.atomic_write import require_new
-from fgbaseline.data.formats.named_file import shown
+from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.data.toml_file import read_toml
 from fgbaseline.data.tracking import (
     ImageOptions,

@@ -27,7 +27,15 @@ from fgbaseline.data.finding import OF_THE_FILE
 from fgbaseline.data.formats import BodyFrame, ParsedTrajectory
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.tracking import Cameras, ImageOptions, Pictures, has_images
-from fgbaseline.diagnosis import Calibration, calibrated, hold_out, known_units, read_repairs, unit_findings, unusable
+from fgbaseline.diagnosis import (
+    AsRecordedSettings,
+    calibrated,
+    hold_out,
+    known_units,
+    read_repairs,
+    unit_findings,
+    unusable,
+)
 from fgbaseline.diagnosis.conventions.units import evidence
 from fgbaseline.geometry import InputError
 
@@ -299,7 +307,7 @@ def build_problem(sequence: Sequence, settings: RunSettings, processes: int = 1)
         if settings.features is None:
             features = DEFAULT_FEATURES
         return documented(sequence, features, settings.landmarks)
-    assumed = Calibration() if settings.as_recorded else None
+    assumed = AsRecordedSettings() if settings.as_recorded else None
     return calibrated(sequence, features, settings=assumed, repairs=repairs, processes=processes)
 
 

@@ -10,10 +10,10 @@ import pandas as pd
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data.dataframes import as_cell_value
 
-from ..keywords import for_python
 from ..notebook import NotebookResult, write_report
 from ..phrases.run import verdict
-from ..results.documents import SUMMARY
+from ..python_arguments import for_python
+from ..results.json_files import SUMMARY
 from ..results.run import Summary, summarize
 from ..tables.run import main_frame, main_table, metrics_table
 from ..tables.table import Table

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 
 from ..formatting import counted, interval, number
 from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records

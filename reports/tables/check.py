@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from fgbaseline.compare.limits import Outcome
+from fgbaseline.compare.acceptance_limits import Outcome
 
 from ..phrases.check import bound, change, number
 from ..results.check import Checked, Line

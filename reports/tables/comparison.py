@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..formatting import resolution, resolved

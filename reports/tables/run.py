@@ -11,7 +11,7 @@ import pandas as pd
 from fgbaseline.compare.estimate_comparison import Run, same_frames
 
 from ..formatting import DASH, INFINITY, RESOLUTION, counted, listed, number
-from ..results.documents import INFINITE, at, leaves
+from ..results.json_files import INFINITE, at, leaves
 from ..results.metric import ATE, DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
 from ..results.metrics import ate_resolution, shown_in
 from ..results.reader import DIVERGENCES

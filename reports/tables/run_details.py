@@ -14,7 +14,7 @@ from fgbaseline.data import Estimate, Event
 from fgbaseline.data.finding import Finding
 
 from ..formatting import NO_BREAK, RESOLUTION, counted, grouped, number, per_cent, quantity, resolved
-from ..results.documents import at
+from ..results.json_files import at
 from .table import Cell, Column, Row, Table, numbers, words
 
 PIXEL_ROWS = ("uL", "vL", "uR", "vR")

@@ -7,7 +7,7 @@ from itertools import groupby
 from math import isfinite, nan
 from typing import Literal, NamedTuple, Self
 
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 
 from ..formatting import DASH, interval, md, tex
 from ..results.metric import Metric, Value

@@ -10,8 +10,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
-from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.problem import Problem
+from fgbaseline.data.velocity_increments import dead_reckoned_path
 
 from ..graph.cheirality import CHEIRALITY_VIOLATION, cheirality_violations
 from ..graph.frame_states import FrameStates

@@ -25,7 +25,7 @@ def full_graph(problem: Problem, states: FrameStates | None = None) -> gtsam.Non
     for k in range(problem.n_frames - 1):
         graph.add(factors.motion(k, states))
     o = problem.observations()
-    measured = problem.measurement.measured(o.pixel).tolist()
+    measured = problem.measurement.rows_of(o.pixel).tolist()
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured, strict=True):
         graph.add(factors.observation(k, landmark_key(j), rows))
     if problem.landmark_prior is not None:

@@ -44,7 +44,7 @@ class _KnownLandmarks:
 
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
         self._points, self._model = np.ascontiguousarray(points.T), problem.measurement
-        self._measured = problem.measurement.measured(pixel).T
+        self._measured = problem.measurement.rows_of(pixel).T
         cam_T_imu = se3.inverse(problem.sequence.imu_T_cam)
         self._rotation, self._translation = cam_T_imu[:3, :3], cam_T_imu[:3, 3:]
         self._by_turn = self._rotation @ hat3(np.eye(3))  # [k] (3, 3): derivative by w of a point e_k in the IMU frame

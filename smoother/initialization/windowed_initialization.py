@@ -52,7 +52,7 @@ def optimize_window(
         graph.add(factors.motion(k, states))
     for k in range(first, last + 1):
         states.insert(values, k)
-    measured = factors.problem.measurement.measured(o.pixel).tolist()
+    measured = factors.problem.measurement.rows_of(o.pixel).tolist()
     for k, j, rows in zip(o.frame.tolist(), o.landmark.tolist(), measured, strict=True):
         graph.add(factors.observation(k, landmark_key(j), rows))
     for j, position in zip(landmarks.index.tolist(), landmarks.position, strict=True):

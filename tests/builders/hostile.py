@@ -12,9 +12,9 @@ import numpy as np
 from fgbaseline import data, diagnosis
 from fgbaseline.compare.estimate_comparison import Result, Run, compare_all
 from fgbaseline.data import Observations, Sequence, Truth
+from fgbaseline.data.estimator_runner import solve_all
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
-from fgbaseline.data.solving import solve_all
 from fgbaseline.geometry import FloatArray, se3
 
 from .synthetic import Scene, drive, with_pixels

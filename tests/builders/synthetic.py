@@ -7,11 +7,11 @@ import numpy as np
 
 from fgbaseline import diagnosis
 from fgbaseline.data import Estimate, Excluded, HuberKernel, Observations, Problem, Sequence, Truth
-from fgbaseline.data.motion import Shift, dead_reckoned_path, increments
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
+from fgbaseline.data.velocity_increments import Shift, dead_reckoned_path, increments
 from fgbaseline.ekf.pose_update import PoseInnovation, pose_innovation
-from fgbaseline.geometry import FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, MeasurementModel, se3
 
 DT = 0.1
 
@@ -89,7 +89,7 @@ def first_innovation(sequence: Sequence, world_T_imu: FloatArray) -> PoseInnovat
     assert sequence.truth is not None
     assert sequence.truth.landmarks is not None
     points, pixel = sequence.truth.landmarks, sequence.observations.pixel[: sequence.n_landmarks]
-    model = StereoMeasurement(sequence.camera, 0.25)
+    model = MeasurementModel(sequence.camera, 0.25)
     return pose_innovation(model, se3.inverse(sequence.imu_T_cam), world_T_imu, points, pixel)
 
 
@@ -115,7 +115,7 @@ def matched(sequence: Sequence) -> Problem:
     """The calibrated preset with the noise that `drive` simulates: 0.5 px, 0.1 m/s, 0.01 rad/s, held over the interval
     after the sample."""
     noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.1, angular_velocity=0.01)
-    return diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings(noise=noise, shift=Shift.AFTER))
 
 
 def position_errors(estimate: Estimate, sequence: Sequence) -> FloatArray:

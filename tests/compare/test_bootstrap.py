@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from fgbaseline import compare
 from fgbaseline.compare.statistics.block_bootstrap import autocovariance, block_length
-from fgbaseline.compare.statistics.block_draws import (
+from fgbaseline.compare.statistics.bootstrap_resampling import (
     BlockDraws,
     draw_blocks,
     percentile_interval,

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from fgbaseline import compare, data
 from fgbaseline.compare.landmarks.map_difference import MIN_WITH_SIGMAS
-from fgbaseline.compare.residuals.patterns import _p95
+from fgbaseline.compare.residuals.residual_classes import _p95
 from fgbaseline.compare.residuals.whitening import whitened_rows
 from fgbaseline.data import Estimate, LandmarkPrior, Landmarks, Problem, Sequence
 from fgbaseline.data.triangulate_landmarks import landmarks_along

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline.compare.trajectory_comparison.resolution import decimal_step, position_resolution
+from fgbaseline.compare.trajectory_comparison.decimal_resolution import decimal_step, position_resolution
 
 
 @given(seed=st.integers(0, 1000), decimals=st.integers(3, 9), other=st.integers(3, 9))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.trajectory.path import along_track_frame, distance_traveled
+from fgbaseline.compare.trajectory.path_length import along_track_frame, distance_traveled
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3
 

@@ -13,8 +13,8 @@ from fgbaseline.compare.reference_trust import TrustLimits, _above, _below, expe
 from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
 from fgbaseline.data import Estimate, Event, Problem, Status
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.triangulate_landmarks import landmarks_along
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.geometry import disparity
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
@@ -35,7 +35,9 @@ def reference() -> Estimate:
 def assumed_noise(pixel: float = 0.5, linear: float = 0.1, angular: float = 0.01) -> Problem:
     """The same drive with another noise model, without a mask that would hide its consequences."""
     noise = diagnosis.NoiseSettings(pixel=pixel, linear_velocity=linear, angular_velocity=angular)
-    problem = diagnosis.calibrated(clean().sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
+    problem = diagnosis.calibrated(
+        clean().sequence, settings=diagnosis.AsRecordedSettings(noise=noise, shift=Shift.AFTER)
+    )
     return replace(problem, kernel=None)
 
 
@@ -54,7 +56,7 @@ def test_the_pixel_scale_is_that_of_the_noise_within_a_tenth(
 ) -> None:
     sequence = drive(seconds=6.0, features_per_frame=features_per_frame)
     noise = diagnosis.NoiseSettings(pixel=0.5 / scale, linear_velocity=0.1, angular_velocity=0.01)
-    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings(noise=noise, shift=Shift.AFTER))
     problem = replace(problem, kernel=kernel, excluded=np.zeros_like(problem.excluded))
     assert problem.mask.all()
     estimate = smoother.isam2(problem)
@@ -150,7 +152,7 @@ def test_expected_are_the_observations_of_the_chosen_features_but_for_excluded_f
     np.testing.assert_array_equal(expected_observations(problem), problem.mask | (d > 1.0) | (d <= 0.0))
     pixel = problem.sequence.observations.pixel.copy()
     pixel[::7, 3] += 10.0  # not on one row: excluded
-    few = diagnosis.calibrated(with_pixels(problem.sequence, pixel), 10, settings=diagnosis.Calibration())
+    few = diagnosis.calibrated(with_pixels(problem.sequence, pixel), 10, settings=diagnosis.AsRecordedSettings())
     chosen = np.isin(few.sequence.observations.landmark, few.features)
     assert (~chosen & (few.excluded != data.Excluded.FEATURE_NOT_CHOSEN)).any()  # excluded ones of other tracks
     np.testing.assert_array_equal(expected_observations(few), few.mask | (((d > 1.0) | (d <= 0.0)) & chosen))

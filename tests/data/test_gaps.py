@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fgbaseline import data, diagnosis
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.problem.velocity_gaps import gaps, inflate_gap_covariance, random_walk_density
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.geometry import se3
 
 from ..builders.hostile import gap
@@ -57,8 +57,8 @@ def test_only_the_gap_is_made_uncertain_and_a_longer_one_more_so() -> None:
     assert len(before.increment) == len(short.increment)
 
 
-@pytest.mark.parametrize("settings", [None, diagnosis.Calibration(shift=Shift.AFTER)])
-def test_the_calibrated_problem_allows_for_gaps_diagnosed_or_not(settings: diagnosis.Calibration | None) -> None:
+@pytest.mark.parametrize("settings", [None, diagnosis.AsRecordedSettings(shift=Shift.AFTER)])
+def test_the_calibrated_problem_allows_for_gaps_diagnosed_or_not(settings: diagnosis.AsRecordedSettings | None) -> None:
     sequence = gap()
     problem = diagnosis.calibrated(sequence, settings=settings)
     sigma = np.sqrt(problem.increment_covariance[29, 0, 0])

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from fgbaseline.data import read
 from fgbaseline.data.tracking import ImageOptions, MonocularTracker, Pictures, TrackerSettings, Tracks, track
-from fgbaseline.data.tracking.rig import CameraModel, Distortion, rectify
+from fgbaseline.data.tracking.rectification import CameraModel, Distortion, rectify
 from fgbaseline.data.tracking.sources import open_recording
 from fgbaseline.geometry import FloatArray, InputError, MonocularCamera, se3
 from fgbaseline.geometry.monocular import left_of

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data import Excluded, Observations, Sequence
-from fgbaseline.data.motion import Shift, back_project, dead_reckoned_path, increments
 from fgbaseline.data.problem.documented import most_observed
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.velocity_increments import Shift, back_project, dead_reckoned_path, increments
 from fgbaseline.geometry import InputError, se3
 
 from ..builders.synthetic import Scene, drive, with_pixels
@@ -96,8 +96,8 @@ def test_a_reduced_calibrated_problem_keeps_what_is_seen_most_after_masking() ->
     pixel[4 * np.arange(5, 10), :] += 40.0
     s = with_pixels(s, pixel)
     everything, three = (
-        diagnosis.calibrated(s, settings=diagnosis.Calibration()),
-        diagnosis.calibrated(s, 3, settings=diagnosis.Calibration()),
+        diagnosis.calibrated(s, settings=diagnosis.AsRecordedSettings()),
+        diagnosis.calibrated(s, 3, settings=diagnosis.AsRecordedSettings()),
     )
     assert counted(everything, s) == [5, 10, 10, 10]
     assert three.features.tolist() == [1, 2, 3]
@@ -110,7 +110,7 @@ def test_a_reduced_calibrated_problem_keeps_what_is_seen_most_after_masking() ->
 def test_the_calibrated_noise_is_a_velocity_noise_times_the_interval(shift: Shift) -> None:
     s = drive()
     noise = diagnosis.NoiseSettings(pixel=2.0, linear_velocity=0.4, angular_velocity=0.05)
-    problem = diagnosis.calibrated(s, settings=diagnosis.Calibration(noise=noise, shift=shift))
+    problem = diagnosis.calibrated(s, settings=diagnosis.AsRecordedSettings(noise=noise, shift=shift))
     for dt, covariance in zip(s.dt, problem.increment_covariance, strict=True):
         np.testing.assert_allclose(covariance, np.diag(np.repeat([0.4 * dt, 0.05 * dt], 3) ** 2), rtol=1e-12)
     assert problem.pixel_variance == 4.0
@@ -123,7 +123,10 @@ def test_as_recorded_means_that_each_velocity_holds_over_the_interval_after_its_
     s = drive()
     u = np.concatenate([s.linear_velocity, s.angular_velocity], axis=1)
     blind = replace(s, observations=data.Observations.none())
-    as_recorded, not_diagnosed = diagnosis.calibrated(s, settings=diagnosis.Calibration()), diagnosis.calibrated(blind)
+    as_recorded, not_diagnosed = (
+        diagnosis.calibrated(s, settings=diagnosis.AsRecordedSettings()),
+        diagnosis.calibrated(blind),
+    )
     assert not not_diagnosed.diagnosed
     for problem in (as_recorded, not_diagnosed, data.documented(s)):
         np.testing.assert_array_equal(problem.increment, u[:-1] * s.dt[:, None])

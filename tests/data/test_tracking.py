@@ -16,11 +16,11 @@ from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.formats.npz_writer import write_tracks
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
-from fgbaseline.data.tracking.rig import CameraModel, Distortion, rectify
+from fgbaseline.data.tracking.rectification import CameraModel, Distortion, rectify
 from fgbaseline.data.tracking.sources.image_files import EightBits
 from fgbaseline.data.tracking.track_file import TrackFile
 from fgbaseline.diagnosis import diagnose, track_statistics
-from fgbaseline.geometry import FloatArray, InputError, StereoCamera, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, InputError, MeasurementModel, StereoCamera, se3
 from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
@@ -320,7 +320,7 @@ def test_kitti_odometry_06(recordings: Callable[[str], Path]) -> None:
     assert np.mean(error[~np.isin(frame, (0, 1, 2, 8))] > 5.0) < 0.005
     fitted = poses.copy()
     for _ in range(3):
-        measurement = StereoMeasurement(found.camera, 1.0, None)
+        measurement = MeasurementModel(found.camera, 1.0, None)
         points = triangulate_tracks(measurement, fitted[frame], landmark, pixel, n).position
         for k in (0, 1, 2, 8):
             seen = frame == k
@@ -333,7 +333,7 @@ def residual_norms(
     camera: StereoCamera, poses: FloatArray, frame: IntArray, landmark: IntArray, pixel: FloatArray
 ) -> FloatArray:
     """Norms (n,) of the residuals in uL, uR and v, px, with landmarks fitted to the poses; inf behind the camera."""
-    measurement, n = StereoMeasurement(camera, 1.0, None), int(landmark.max()) + 1
+    measurement, n = MeasurementModel(camera, 1.0, None), int(landmark.max()) + 1
     points = triangulate_tracks(measurement, poses[frame], landmark, pixel, n).position
     seen = se3.transform(se3.inverse(poses[frame]), points[landmark])
     error = np.linalg.norm(three_rows(pixel).T - camera.rows(seen.T).pixel, axis=0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.solving import solve_all
+from fgbaseline.data.estimator_runner import solve_all
 from fgbaseline.data.user_estimator import load_all, parse
 from fgbaseline.geometry import InputError
 

@@ -8,8 +8,8 @@ import pytest
 from fgbaseline.data import Observations, Sequence
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import calibrated, diagnose, findings_of
-from fgbaseline.diagnosis.conventions.integer_delay import integer_delay
-from fgbaseline.diagnosis.repairs.dropout import averaged_over_dropouts, dropout_intervals
+from fgbaseline.diagnosis.conventions.integer_time_offset import integer_time_offset
+from fgbaseline.diagnosis.repairs.visual_dropouts import averaged_over_dropouts, dropout_intervals
 from fgbaseline.geometry import FloatArray
 
 RATE = 10.0
@@ -115,11 +115,11 @@ def test_blind_intervals_have_too_few_landmarks_in_common() -> None:
     assert dropout_intervals(observations, 5).tolist() == [False, False, True, True]
 
 
-def test_an_integer_delay_is_the_minimum_of_the_fit_or_undetermined() -> None:
+def test_an_integer_time_offset_is_the_minimum_of_the_fit_or_undetermined() -> None:
     dt = 0.1
 
     def parabola(depth: float, at: float) -> float | None:
-        found = integer_delay(lambda shift: depth * (shift - at) ** 2, dt)
+        found = integer_time_offset(lambda shift: depth * (shift - at) ** 2, dt)
         return None if found is None else found.shift
 
     assert parabola(100.0, -0.9) == pytest.approx(-0.09)
@@ -136,7 +136,7 @@ def test_a_cost_that_is_no_parabola_determines_whole_intervals_alone() -> None:
         def cost(shift: float, floor: float = floor, before: float = before, after: float = after) -> float:
             return floor if shift == 0.0 else before if shift < 0.0 else after
 
-        found = integer_delay(cost, dt)
+        found = integer_time_offset(cost, dt)
         assert found is not None
         assert found.shift == 0.0
         assert found.deviation > 0.2 * dt

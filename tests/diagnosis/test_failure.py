@@ -12,7 +12,7 @@ from fgbaseline.diagnosis import calibrated, diagnose
 def test_a_failed_diagnosis_is_reported_and_the_recording_is_used_as_recorded(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    module = importlib.import_module("fgbaseline.diagnosis.estimation.pipeline")
+    module = importlib.import_module("fgbaseline.diagnosis.velocity_diagnosis.pipeline")
 
     def breaks(_: data.Sequence) -> None:
         raise error
@@ -20,8 +20,8 @@ def test_a_failed_diagnosis_is_reported_and_the_recording_is_used_as_recorded(
     monkeypatch.setattr(module, "odometry", breaks)
     sequence = simulate(Simulation(duration=5.0))
     diagnosis = diagnose(sequence)
-    assert str(error) in diagnosis.cannot_tell
+    assert str(error) in diagnosis.failure_reason
     problem = calibrated(sequence)
     assert not problem.diagnosed
-    assert problem.remarks[0] == f"not diagnosed: {diagnosis.cannot_tell}"
+    assert problem.remarks[0] == f"not diagnosed: {diagnosis.failure_reason}"
     assert len(problem.observations()) > 0

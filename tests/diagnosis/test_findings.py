@@ -9,11 +9,11 @@ import pytest
 
 from fgbaseline.data import Excluded, Observations, Sequence, Truth
 from fgbaseline.data.finding import UNITS
-from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import AXIS_CONVENTIONS, Simulation, simulate
+from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of, not_identifiable, repair, to_json
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
-from fgbaseline.diagnosis.windows.selection import spread_spans
+from fgbaseline.diagnosis.window_adjustment.selection import spread_spans
 from fgbaseline.geometry import FloatArray
 
 

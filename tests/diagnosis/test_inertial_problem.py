@@ -15,8 +15,8 @@ from fgbaseline.data.imu import ASSUMED_NOISE, ImuSamples
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis.conventions.rate_units import DEGREE
+from fgbaseline.diagnosis.inertial.imu_spikes import without_spikes
 from fgbaseline.diagnosis.inertial.sensor_findings import sensor_findings
-from fgbaseline.diagnosis.inertial.spikes import without_spikes
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, InputError, se3, so3, strapdown
 
@@ -153,7 +153,7 @@ def test_other_units_are_found_and_repaired_or_refused(code: str, recording: dat
     assert problem.start is not None
     np.testing.assert_allclose(found.start.velocity, problem.start.velocity, atol=1e-6)
     with pytest.raises(InputError, match=name):
-        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+        diagnosis.calibrated(wrong, settings=diagnosis.AsRecordedSettings())
 
 
 @pytest.mark.parametrize(("unit", "name"), [(1e-3, "in mm"), (1e3, "in km")])
@@ -171,7 +171,7 @@ def test_a_baseline_in_another_unit_is_found_by_the_accelerometer(unit: float, n
     assert found.sequence.camera.baseline == pytest.approx(recording.camera.baseline, rel=1e-12)
     np.testing.assert_allclose(found.start.velocity, expected.start.velocity, atol=1e-6)
     with pytest.raises(InputError, match=name):
-        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+        diagnosis.calibrated(wrong, settings=diagnosis.AsRecordedSettings())
 
 
 def test_an_unusual_baseline_that_the_accelerometer_confirms_stays() -> None:
@@ -192,7 +192,7 @@ def test_a_baseline_that_neither_unit_explains_is_refused(recording: data.Sequen
     with pytest.raises(InputError, match=r"the stereo baseline, 30 m, is in doubt.*0\.03 m; write b in m"):
         diagnosis.calibrated(wrong)
     with pytest.raises(InputError, match=r"the stereo baseline, 30 m, is in doubt.*0\.03 m; write b in m"):
-        diagnosis.calibrated(wrong, settings=diagnosis.Calibration())
+        diagnosis.calibrated(wrong, settings=diagnosis.AsRecordedSettings())
 
 
 def test_rates_in_thousandths_of_degrees_are_found(recording: data.Sequence) -> None:
@@ -206,7 +206,7 @@ def test_raw_counts_of_a_gyroscope_are_refused_by_their_factor(counts: float, re
     """16.4 per °/s are 940 per rad/s, and no mrad/s."""
     assert recording.imu is not None
     wrong = replace(recording, imu=in_units(recording.imu, DEGREE / counts, 1.0))
-    for settings in (None, diagnosis.Calibration()):
+    for settings in (None, diagnosis.AsRecordedSettings()):
         with pytest.raises(InputError, match=rf"raw counts of a gyroscope, .*{counts:.3g} per °/s; write rad/s$") as e:
             diagnosis.calibrated(wrong, settings=settings)
         measured = re.search(r"are ([\d.e+]+) times those that the cameras see", str(e.value))
@@ -254,7 +254,7 @@ def test_other_axes_are_found_and_repaired(code: str) -> None:
 
 
 def test_as_recorded_repairs_nothing(recording: data.Sequence) -> None:
-    found = diagnosis.calibrated(recording, settings=diagnosis.Calibration())
+    found = diagnosis.calibrated(recording, settings=diagnosis.AsRecordedSettings())
     assert np.sqrt(found.pixel_variance) == 1.5
     assert not found.diagnosed
     assert found.repairs == ()
@@ -273,7 +273,7 @@ def test_a_diagnosis_that_is_given_is_the_one_that_is_used(recording: data.Seque
 def test_no_argument_is_ignored(recording: data.Sequence) -> None:
     velocities = simulate(Simulation(duration=3.0))
     of_velocities, of_samples = diagnosis.diagnose(velocities), diagnosis.diagnose_inertial(recording)
-    as_recorded = diagnosis.Calibration()
+    as_recorded = diagnosis.AsRecordedSettings()
     late, masked = replace(as_recorded, shift=-0.5), replace(as_recorded, mask=MaskSettings(min_track=5))
     one_camera = simulated_problem("drone", 1, seconds=3.0, cameras="left").sequence
     for sequence, found, settings, sentence in (

@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from fgbaseline.data import Sequence
 from fgbaseline.data.problem.inertial import imu_intervals
-from fgbaseline.diagnosis.inertial_initialization.start import Start, inertial_start
+from fgbaseline.diagnosis.inertial_initialization.initial_state import Start, inertial_start
 from fgbaseline.diagnosis.odometry.stereo_odometry import odometry
 from fgbaseline.geometry import FloatArray, so3, strapdown
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data import Excluded, Observations, Sequence
-from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate_with_labels
+from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, exclusions
 from fgbaseline.geometry import FloatArray
 
@@ -168,7 +168,7 @@ def test_nothing_to_mask() -> None:
 
 def test_on_a_drive_with_wrong_matches_the_mask_leaves_few_of_them_and_most_of_the_right_ones() -> None:
     sequence, labels = simulate_with_labels(Simulation(duration=20.0, wrong_share=0.05, seed=3))
-    left = diagnosis.calibrated(sequence, settings=diagnosis.Calibration()).excluded == Excluded.NO
+    left = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings()).excluded == Excluded.NO
     determined = sequence.observations.pixel[:, 0] - sequence.observations.pixel[:, 2] > 3.0
     assert labels.wrong.mean() > 0.04
     assert labels.wrong[left].mean() < 0.025
@@ -180,7 +180,7 @@ def test_the_mask_is_that_of_the_recording_whatever_is_estimated_from_it() -> No
     one, other = (
         diagnosis.calibrated(
             sequence,
-            settings=diagnosis.Calibration(
+            settings=diagnosis.AsRecordedSettings(
                 noise=diagnosis.NoiseSettings(pixel, 10.0 * pixel, pixel), kernel=data.HuberKernel(pixel)
             ),
         )

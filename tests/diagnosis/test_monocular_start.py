@@ -11,10 +11,10 @@ from fgbaseline.data import Problem, Sequence
 from fgbaseline.data.imu import ImuSamples
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
-from fgbaseline.diagnosis import Calibration
+from fgbaseline.diagnosis import AsRecordedSettings
 from fgbaseline.diagnosis.inertial_initialization.states import motions_between
 from fgbaseline.diagnosis.monocular.gyroscope_bias import epipolar_bias
-from fgbaseline.diagnosis.monocular.start import LOOSENED, MonocularStart, monocular_start
+from fgbaseline.diagnosis.monocular.initial_state import LOOSENED, MonocularStart, monocular_start
 from fgbaseline.diagnosis.monocular.window_tracks import keyframe_tracks, rays_of
 from fgbaseline.geometry import InputError
 
@@ -115,7 +115,7 @@ def test_the_calibrated_problem_has_start_noise_depths_and_remarks(recordings: l
     assert problem.diagnosed
     assert problem.pixel_variance**0.5 == pytest.approx(0.5, rel=0.15)
     assert any("determines the scale to" in remark for remark in problem.remarks)
-    given = diagnosis.calibrated(recordings[0], settings=Calibration())
+    given = diagnosis.calibrated(recordings[0], settings=AsRecordedSettings())
     assert not given.diagnosed
     assert given.pixel_variance == 1.5**2
 

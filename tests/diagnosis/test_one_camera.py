@@ -10,7 +10,7 @@ from fgbaseline.data import Sequence
 from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.problem import Excluded, Problem
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
-from fgbaseline.diagnosis import Calibration, InertialDiagnosis, calibrated, diagnose_inertial, inertial_findings
+from fgbaseline.diagnosis import AsRecordedSettings, InertialDiagnosis, calibrated, diagnose_inertial, inertial_findings
 from fgbaseline.diagnosis.odometry import epipolar_motion
 from fgbaseline.diagnosis.odometry.epipolar_motion import Links, Motion, epipolar_motions
 from fgbaseline.diagnosis.odometry.monocular_odometry import monocular_odometry, rays, track_links
@@ -84,7 +84,7 @@ def test_rotations_and_directions_are_those_of_the_truth() -> None:
 
 def test_a_clean_recording_has_no_finding() -> None:
     found = diagnose_inertial(clean())
-    assert not found.cannot_tell
+    assert not found.failure_reason
     assert codes(found) == set()
     assert found.pixel == pytest.approx(0.5, rel=0.15)
 
@@ -123,7 +123,7 @@ def test_other_units_are_converted_or_refused_as_recorded(name: str, factor: flo
     assert found.sequence.imu is not None
     assert np.allclose(getattr(found.sequence.imu, name), values[name])
     with pytest.raises(InputError, match="run without --as-recorded, which repairs them"):
-        calibrated(wrong, settings=Calibration())
+        calibrated(wrong, settings=AsRecordedSettings())
 
 
 @pytest.mark.parametrize("late", [0.095, -0.095])
@@ -165,7 +165,7 @@ def test_intrinsics_of_other_images_are_refused() -> None:
     camera = clean().camera
     other = replace(camera, fu=3.0 * camera.fu, fv=3.0 * camera.fv, cu=3.0 * camera.cu, cv=3.0 * camera.cv)
     wrong = replace(clean(), camera=other)
-    assert "scale K or features" in diagnose_inertial(wrong).cannot_tell
-    for settings in (None, Calibration()):
+    assert "scale K or features" in diagnose_inertial(wrong).failure_reason
+    for settings in (None, AsRecordedSettings()):
         with pytest.raises(InputError, match="scale K or features"):
             calibrated(wrong, settings=settings)

@@ -11,23 +11,23 @@ from scipy.optimize import least_squares
 
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.axis_conventions import axes_matrix
-from fgbaseline.data.motion import Shift, zero_order_hold
 from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.diagnosis.conventions.axes import linear_axes
 from fgbaseline.diagnosis.conventions.robust_regression import regress
 from fgbaseline.diagnosis.conventions.spline import spline_through
-from fgbaseline.diagnosis.conventions.time_delay import timing
+from fgbaseline.diagnosis.conventions.velocity_time_offset import timing
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, TrackConsistency, exclusions, split_tracks
-from fgbaseline.diagnosis.windows import bundle_adjustment as adjustment
-from fgbaseline.diagnosis.windows.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
-from fgbaseline.diagnosis.windows.residuals import (
+from fgbaseline.diagnosis.window_adjustment import bundle_adjustment as adjustment
+from fgbaseline.diagnosis.window_adjustment.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
+from fgbaseline.diagnosis.window_adjustment.residuals import (
     N_CALIBRATION,
     WindowData,
     concatenate_windows,
     motion_terms,
     pixel_terms,
 )
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.measurement import three_rows
 
 from ..builders.synthetic import Scene
@@ -88,7 +88,7 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
     calibration = np.array([0.01, -0.02, 0.005, 0.03, 0.02, -0.01, 0.015, 0.3])
     one = concatenate_windows([(data, poses, points)])
     _, before, after, J_calibration = motion_terms(one, poses, SIGMAS, calibration[None])
-    model = StereoMeasurement(sequence.camera, 0.5**2, KERNEL)
+    model = MeasurementModel(sequence.camera, 0.5**2, KERNEL)
     terms = pixel_terms(model, sequence.imu_T_cam, one, poses, points, calibration[None])
     by_point = np.moveaxis(terms.J_point, 2, 0)
 
@@ -122,7 +122,7 @@ def test_the_derivatives_of_motion_and_pixels_equal_their_finite_differences() -
 def test_a_window_ends_where_scipy_ends() -> None:
     fit, data = fitted()
     sequence = window()[0].sequence()
-    model = StereoMeasurement(sequence.camera, SIGMAS.pixel**2, KERNEL)
+    model = MeasurementModel(sequence.camera, SIGMAS.pixel**2, KERNEL)
     W, m = len(fit.poses), len(fit.points)
     root, one = np.sqrt(np.diag(CALIBRATION_PRIOR)), concatenate_windows([(data, fit.poses, fit.points)])
 

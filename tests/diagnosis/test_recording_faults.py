@@ -26,7 +26,7 @@ from fgbaseline.geometry import InputError, se3, so3
 from fgbaseline.reports.run.problem import RunSettings, build_problem
 
 from ..builders.commands import fgbaseline
-from ..diagnosis.test_real_recordings import UTIAS
+from .test_real_recordings import UTIAS
 
 Recordings = Callable[[str], Path]
 EPOCH = 1.4e9
@@ -282,7 +282,7 @@ def test_where_units_are_in_doubt_nothing_is_changed_and_an_option_settles_it() 
     s = drive()
     blind = replace(s, t=s.t * 1e3, observations=data.Observations.none())
     found = diagnose(blind)
-    assert "--time-unit" in found.cannot_tell
+    assert "--time-unit" in found.failure_reason
     with pytest.raises(InputError, match="in doubt"):
         calibrated(blind)
     settled = calibrated(blind, repairs=Repairs(units=UnitOverrides(time="ms")))
@@ -335,7 +335,7 @@ def test_swapped_cameras_and_landmarks_seen_once_are_refused_by_their_cause(pres
         (swapped, "left and right camera are swapped"),
         (replace(s, observations=single, n_landmarks=len(o), truth=None), "seen in one frame only"),
     ):
-        assert cause in diagnose(broken).cannot_tell
+        assert cause in diagnose(broken).failure_reason
         with pytest.raises(InputError, match=cause):
             build_problem(broken, settings)
 

@@ -11,10 +11,18 @@ import pytest
 from fgbaseline import data
 from fgbaseline.data import Excluded
 from fgbaseline.data.axis_conventions import axes_matrix
-from fgbaseline.data.motion import increments
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.diagnosis import Calibration, Diagnosis, Repairs, calibrated, diagnose, read_repairs, repairs_text
-from fgbaseline.diagnosis.repair_overrides.application import with_overrides
+from fgbaseline.data.velocity_increments import increments
+from fgbaseline.diagnosis import (
+    AsRecordedSettings,
+    Diagnosis,
+    Repairs,
+    calibrated,
+    diagnose,
+    read_repairs,
+    repairs_text,
+)
+from fgbaseline.diagnosis.repair_overrides.applied_overrides import with_overrides
 from fgbaseline.diagnosis.repair_overrides.settings import MaskOverrides, SigmaOverrides
 from fgbaseline.geometry import InputError, so3
 
@@ -163,7 +171,7 @@ def test_a_user_specified_mask_is_the_mask() -> None:
 def test_a_recording_that_determines_nothing_takes_the_given_values() -> None:
     blind = simulate(Simulation(duration=5.0, blackouts=((0.3, 4.9),)))
     found = diagnose(blind)
-    assert found.cannot_tell
+    assert found.failure_reason
     problem = calibrated(blind, diagnosis=found, repairs=Repairs(angular_axes="x,-y,-z", gyro_bias=(0.01, 0.0, 0.0)))
     np.testing.assert_allclose(
         problem.sequence.angular_velocity, (blind.angular_velocity - [0.01, 0.0, 0.0]) * [1.0, -1.0, -1.0], atol=1e-12
@@ -175,7 +183,7 @@ def test_a_recording_that_determines_nothing_takes_the_given_values() -> None:
 
 def test_repairs_beside_what_takes_the_recording_as_it_is_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not both"):
-        calibrated(faulty().sequence, settings=Calibration(), repairs=Repairs())
+        calibrated(faulty().sequence, settings=AsRecordedSettings(), repairs=Repairs())
     data.write_npz(simulate(Simulation(duration=3.0)), tmp_path / "drive.npz")
     file_with(tmp_path, "velocity_scale = 1.1")
     for refused in ("--as-recorded", "--preset=documented"):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Sequence
-from fgbaseline.data.motion import held_samples
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.velocity_increments import held_samples
 from fgbaseline.diagnosis import Repairs, calibrated, diagnose, findings_of, repairs_text
 from fgbaseline.geometry import FloatArray, se3
 

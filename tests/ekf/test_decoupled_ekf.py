@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Estimate, LandmarkMode, Problem, Status
-from fgbaseline.data.motion import back_project, dead_reckoned_path
 from fgbaseline.data.simulate import KITTI
+from fgbaseline.data.velocity_increments import back_project, dead_reckoned_path
 from fgbaseline.ekf.decoupled_ekf import _standard_form_failure
 from fgbaseline.ekf.landmark_mapping import map_landmarks
 from fgbaseline.ekf.landmark_update import IndependentLandmarks
@@ -99,7 +99,7 @@ def test_a_landmark_in_the_camera_plane_fails_with_its_frame_and_earlier_poses_a
 
 def test_without_observations_there_is_no_filter_but_dead_reckoning_remains() -> None:
     sequence = replace(drive(), observations=data.Observations.none())
-    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings())
     estimate = ekf.ekf(problem)
     assert estimate.status is Status.FAILED
     assert estimate.reason == "no observations"
@@ -125,7 +125,7 @@ def test_on_clean_data_the_filter_is_nearer_to_the_truth_than_dead_reckoning() -
     for path in ("town", "loop", "handheld"):
         for seed in (1, 2, 3):
             sequence = drive(path, seconds=20.0, features_per_frame=70.0, seed=seed)
-            problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
+            problem = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings())
             filtered, reckoned = ekf.ekf(problem), ekf.dead_reckoning(problem)
             assert filtered.status is Status.OK
             assert_covariances(filtered)

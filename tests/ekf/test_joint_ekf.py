@@ -24,7 +24,7 @@ from fgbaseline.ekf.joint.landmark_representation import (
 )
 from fgbaseline.ekf.joint.process_noise import MAX_REJECTED, inflation_factor
 from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
-from fgbaseline.geometry import FgbaselineError, FloatArray, StereoMeasurement, se3
+from fgbaseline.geometry import FgbaselineError, FloatArray, MeasurementModel, se3
 from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, predict, three_rows
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
@@ -500,8 +500,8 @@ def test_on_clean_drives_it_is_nearer_to_the_truth_than_the_filter_with_separate
 WILD, TAME = 1e6, 1.0
 
 
-def measured(kernel: HuberKernel | None) -> StereoMeasurement:
-    return StereoMeasurement(SCENE.camera, 1.0, kernel)
+def measured(kernel: HuberKernel | None) -> MeasurementModel:
+    return MeasurementModel(SCENE.camera, 1.0, kernel)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from scipy.stats import chi2
 
 from fgbaseline import compare, data, diagnosis, ekf
 from fgbaseline.data import Estimate, Sequence
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.simulate.settings import PathName
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.ekf import GyroBiasPrior, JointSettings, Linearization
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3
 
@@ -98,7 +98,7 @@ def test_a_gyroscope_bias_bends_the_path_unless_it_is_estimated() -> None:
                 duration=20.0, features_per_frame=6.0, seed=seed, wrong_share=0.0, gyro_bias=BIAS, sigma_angular=0.005
             )
         )
-        problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration(noise=noise, shift=Shift.AFTER))
+        problem = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings(noise=noise, shift=Shift.AFTER))
         plain, asked = ekf.joint_ekf(problem), ekf.joint_ekf_bias(problem)
         assert plain.gyro_bias is None
         squares.append([np.mean(position_errors(e, sequence) ** 2) for e in (plain, asked)])

@@ -78,7 +78,7 @@ def test_on_noisy_velocities_it_halves_the_error_of_dead_reckoning(recordings: R
 
 @pytest.mark.slow
 def test_with_noise_added_to_the_velocities_it_beats_dead_reckoning_and_the_textbook(recordings: Recordings) -> None:
-    calibration = diagnosis.Calibration(noise=diagnosis.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
+    calibration = diagnosis.AsRecordedSettings(noise=diagnosis.NoiseSettings(1.5, LINEAR_NOISE, ANGULAR_NOISE))
     squares = []
     for name in UTIAS:
         sequence = noisy(data.read(recordings(f"utias/{name}.mat")))

@@ -1,4 +1,4 @@
-"""Prediction and pose update of the filter: their Jacobians, and what the covariance does."""
+"""PredictedState and pose update of the filter: their Jacobians, and what the covariance does."""
 
 from dataclasses import replace
 
@@ -9,21 +9,21 @@ from hypothesis import strategies as st
 
 from fgbaseline import data, ekf
 from fgbaseline.data.simulate import KITTI
-from fgbaseline.ekf.motion_model import BodyState, Prediction, VelocityMotion
+from fgbaseline.ekf.motion_model import BodyState, PredictedState, VelocityMotion
 from fgbaseline.ekf.pose_update import (
     PoseInnovation,
     pose_innovation,
     pose_posterior,
     standard_form_covariance,
 )
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoMeasurement, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 
 from ..builders.dense_filter import DenseFilter
 from ..builders.synthetic import Scene, drive, plain_problem
 
 CAM_T_IMU = se3.inverse(KITTI.imu_T_cam)
 V = 15.0
-PRINTED = StereoMeasurement(KITTI.camera, V)
+PRINTED = MeasurementModel(KITTI.camera, V)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -87,7 +87,7 @@ def test_a_posterior_covariance_is_positive_and_below_the_prior_for_any_jacobian
     assert np.linalg.eigvalsh(S * scale)[0] > -1e-14
     assert np.linalg.eigvalsh((sigma - S) * scale)[0] > -1e-9
     # The noise of the next step makes it positive definite beyond doubt: the filter can go on.
-    still = Prediction(BodyState(np.eye(4), np.empty(0)), np.eye(6), 1e-6 * sigma)
+    still = PredictedState(BodyState(np.eye(4), np.empty(0)), np.eye(6), 1e-6 * sigma)
     np.linalg.cholesky(still.covariance(S))
 
 
@@ -189,7 +189,7 @@ def test_the_kernel_lowers_the_weight_beyond_its_threshold_only(seed: int, thres
     world_T_imu, points, pixel = sight(random)
     pixel[::2] += 100.0 * random.normal(size=pixel[::2].shape)
     kernel, sigma = HuberKernel(threshold), covariance_of(random, 1e-4)
-    innovation = pose_innovation(StereoMeasurement(KITTI.camera, 2.25, kernel), CAM_T_IMU, world_T_imu, points, pixel)
+    innovation = pose_innovation(MeasurementModel(KITTI.camera, 2.25, kernel), CAM_T_IMU, world_T_imu, points, pixel)
     weight = kernel.weight(innovation.nis_per_observation(sigma))
     R = np.diag([2.25, 2.25, 1.125])
     for r, H, w in zip(innovation.residual, innovation.jacobian, weight, strict=True):

@@ -153,7 +153,7 @@ def test_nor_on_real_recordings(recordings: Callable[[str], Path], recording: st
 
 @cache
 def recorded(path: Path, frames: int) -> Problem:
-    return truncated(diagnosis.calibrated(data.read(path), settings=diagnosis.Calibration()), frames)
+    return truncated(diagnosis.calibrated(data.read(path), settings=diagnosis.AsRecordedSettings()), frames)
 
 
 def truncated(problem: Problem, frames: int) -> Problem:

@@ -55,7 +55,7 @@ def test_a_hostile_recording_is_diagnosed_without_an_exception_text(name: str) -
     tracks = track_statistics(diagnosis)
     findings = findings_of(diagnosis, tracks)
     assert [f["code"] for f in to_json(diagnosis, tracks, findings)["findings"]] == [f.code for f in findings]
-    assert "Error" not in diagnosis.cannot_tell
+    assert "Error" not in diagnosis.failure_reason
     assert repairs_text(diagnosis)
 
 

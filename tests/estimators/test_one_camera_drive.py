@@ -10,7 +10,7 @@ import pytest
 from fgbaseline import data, diagnosis, ekf, smoother
 from fgbaseline.data import Observations, Problem, Sequence, Status
 from fgbaseline.data.problem.inertial import imu_intervals
-from fgbaseline.diagnosis.monocular import window
+from fgbaseline.diagnosis.monocular import initialization_window
 from fgbaseline.geometry.monocular import left_of
 
 from .test_one_camera_real import errors
@@ -37,8 +37,8 @@ def test_gravity_points_down_however_little_the_body_turns(sequence: Sequence) -
     """Where the body turns about the vertical only, a bias of 2 g and gravity upside down fit the samples as well."""
     assert sequence.imu is not None
     imu = imu_intervals(sequence.imu, sequence.t)
-    for frames in window._windows(sequence, 0):
-        states = window._solved(sequence, imu, frames, None).solution.states
+    for frames in initialization_window._windows(sequence, 0):
+        states = initialization_window._solved(sequence, imu, frames, None).solution.states
         assert np.abs(states.accelerometer_bias).max() < 1.0
 
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from fgbaseline.compare.residuals.cost import cost, pixel_squares
 from fgbaseline.data import Estimate, HuberKernel, Landmarks, Problem
-from fgbaseline.diagnosis.windows.residuals import WindowData, concatenate_windows, pixel_terms
+from fgbaseline.diagnosis.window_adjustment.residuals import WindowData, concatenate_windows, pixel_terms
 from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
-from fgbaseline.geometry.measurement import predict, squared_norm, three_rows
+from fgbaseline.geometry.measurement import mahalanobis_squared, predict, three_rows
 from fgbaseline.geometry.stereo import PIXEL_ROWS
 from fgbaseline.geometry.triangulation import triangulate_tracks
 from fgbaseline.smoother.batch.full_graph import full_graph
@@ -143,7 +143,7 @@ def test_three_rows_and_the_printed_four_weigh_a_residual_alike_but_for_what_no_
     whole = np.einsum("ni,ni->n", residual, np.linalg.solve(S, residual[:, :, None])[:, :, 0])
     three = H @ sigma @ np.swapaxes(H, 1, 2) + np.diag(V * np.array([1.0, 1.0, 0.5]))
     apart = (residual[:, 1] - residual[:, 3]) ** 2 / (2.0 * V)
-    np.testing.assert_allclose(squared_norm(three_rows(residual), three) + apart, whole, rtol=1e-9)
+    np.testing.assert_allclose(mahalanobis_squared(three_rows(residual), three) + apart, whole, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kernel", [None, HuberKernel(1.0), HuberKernel()])

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, StereoCamera, StereoMeasurement, se3
-from fgbaseline.geometry.measurement import predict, squared_norm
+from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, MeasurementModel, StereoCamera, se3
+from fgbaseline.geometry.measurement import mahalanobis_squared, predict
 from fgbaseline.geometry.monocular import left_of, require_stereo
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
@@ -43,7 +43,7 @@ def test_squared_norms_of_two_rows(seed: int) -> None:
     half, residual = random.normal(size=(7, 2, 2)), random.normal(size=(7, 2))
     covariance = half @ np.swapaxes(half, 1, 2) + 0.1 * np.eye(2)
     expected = np.einsum("ni,ni->n", residual, np.linalg.solve(covariance, residual[:, :, None])[:, :, 0])
-    np.testing.assert_allclose(squared_norm(residual, covariance), expected, rtol=1e-9)
+    np.testing.assert_allclose(mahalanobis_squared(residual, covariance), expected, rtol=1e-9)
 
 
 def views(seed: int, n: int = 6) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -58,7 +58,7 @@ def views(seed: int, n: int = 6) -> tuple[FloatArray, FloatArray, FloatArray]:
 @pytest.mark.parametrize("seed", range(5))
 def test_exact_rays_give_the_point(seed: int) -> None:
     world_T_cam, point, pixel = views(seed)
-    model = StereoMeasurement(CAMERA, 1.0, HuberKernel())
+    model = MeasurementModel(CAMERA, 1.0, HuberKernel())
     found = triangulate_tracks(model, world_T_cam, np.zeros(len(pixel), np.int64), pixel, 1)
     np.testing.assert_allclose(found.position[0], point, atol=1e-7)
 
@@ -67,7 +67,7 @@ def test_exact_rays_give_the_point(seed: int) -> None:
 def test_noisy_rays_give_the_minimum_of_the_whitened_residuals(seed: int) -> None:
     world_T_cam, point, pixel = views(seed)
     pixel = pixel + np.random.default_rng(seed).normal(size=pixel.shape)
-    model = StereoMeasurement(CAMERA, 1.0)
+    model = MeasurementModel(CAMERA, 1.0)
     found = triangulate_tracks(model, world_T_cam, np.zeros(len(pixel), np.int64), pixel, 1)
 
     def cost(at: FloatArray) -> float:
@@ -84,7 +84,7 @@ def test_noisy_rays_give_the_minimum_of_the_whitened_residuals(seed: int) -> Non
 def test_parallel_rays_have_no_point() -> None:
     world_T_cam = np.tile(np.eye(4), (4, 1, 1))
     pixel = CAMERA.project(np.array([[0.5, 0.2, 4.0]] * 4))  # a camera that does not move
-    found = triangulate_tracks(StereoMeasurement(CAMERA, 1.0), world_T_cam, np.zeros(4, np.int64), pixel, 1)
+    found = triangulate_tracks(MeasurementModel(CAMERA, 1.0), world_T_cam, np.zeros(4, np.int64), pixel, 1)
     assert np.isnan(found.position).all()
     assert not found.information.any()
 

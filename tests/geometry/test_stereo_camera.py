@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, StereoMeasurement, disparity, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, StereoCamera, disparity, se3
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..builders.dense_filter import K_s, homogeneous, pi
@@ -95,7 +95,7 @@ def several(tracks: list[Track], huber: float | None) -> tuple[FloatArray, Float
     row = np.repeat(np.arange(len(tracks)), 6)
     poses, pixel = np.concatenate([t.world_T_cam for t in tracks]), np.concatenate([t.pixel for t in tracks])
     mixed = np.random.default_rng(0).permutation(len(row))
-    model = StereoMeasurement(CAMERA, Track.variance, None if huber is None else HuberKernel(huber))
+    model = MeasurementModel(CAMERA, Track.variance, None if huber is None else HuberKernel(huber))
     found = triangulate_tracks(model, poses[mixed], row[mixed], pixel[mixed], len(tracks))
     return found.position, found.information
 
@@ -145,7 +145,7 @@ def test_a_point_without_a_positive_disparity_is_not_determined() -> None:
     flipped = track.pixel[:, [2, 1, 0, 3]]
     row = np.repeat([0, 1], 6)
     poses = np.concatenate([track.world_T_cam] * 2)
-    model = StereoMeasurement(CAMERA, Track.variance)
+    model = MeasurementModel(CAMERA, Track.variance)
     found = triangulate_tracks(model, poses, row, np.concatenate([flipped, track.pixel]), 3)
     assert np.isnan(found.position[[0, 2]]).all()
     np.testing.assert_allclose(found.position[1], several([track], None)[0][0], rtol=1e-9)

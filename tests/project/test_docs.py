@@ -94,7 +94,7 @@ HOURS = {
     "make mutants",
     "make bench",
     "make bench BENCH_FLAGS=--quick",
-    "python -m benchmarks.waiting",
+    "python -m benchmarks.latency",
     "python benchmarks/accuracy.py --estimators joint-ekf-ungated,joint-ekf",
     "python -m benchmarks.isam2_variants 2011_09_26_drive_0036_sync_KLT.mat",
 }

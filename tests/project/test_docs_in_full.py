@@ -22,7 +22,7 @@ import pytest
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.formats import attach_truth
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.tracking.rig import CameraModel
+from fgbaseline.data.tracking.rectification import CameraModel
 from fgbaseline.data.tracking.sources import open_recording
 from fgbaseline.geometry import FloatArray, se3
 

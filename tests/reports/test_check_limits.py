@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fgbaseline.compare.limits import Better, Bounds, Outcome, around, rounded
+from fgbaseline.compare.acceptance_limits import Better, Bounds, Outcome, around, rounded
 from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError

@@ -11,13 +11,13 @@ import pytest
 
 from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Problem
+from fgbaseline.data.estimator_runner import solve_all
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.solving import solve_all
 from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.measurement import Prediction
-from fgbaseline.reports.results.documents import SUMMARY
+from fgbaseline.reports.results.json_files import SUMMARY
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.problem import RunSettings, build_problem
 

@@ -13,7 +13,7 @@ from evo.core.trajectory import PoseTrajectory3D
 
 from fgbaseline.compare import time_coverage
 from fgbaseline.data import Estimate, Status, Trajectory, Truth, write_tum
-from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.velocity_increments import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 from fgbaseline.reports.accuracy_check import assert_accuracy
 from fgbaseline.reports.comparison import compare

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fgbaseline.compare.limits import Better
+from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results import metrics
 from fgbaseline.reports.results.comparison import Summary as Comparison

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import Observations, Sequence, Status, write_npz
-from fgbaseline.data.motion import dead_reckoned_path, increments
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.reproduction.experiments import FilterSettings, run_filter
 from fgbaseline.reports.reproduction.recordings import TRACKS_PER_FRAME, paper_recording, read_subjects, stand_in
-from fgbaseline.reports.reproduction.repair_stages import diagnosed_stages, simulated_stages
-from fgbaseline.reports.reproduction.study import FilterSettings, run_filter
+from fgbaseline.reports.reproduction.repair_ablation import diagnosed_stages, simulated_stages
 
 from ..builders.commands import everything_in, fgbaseline
 

@@ -13,9 +13,9 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import compare
+from fgbaseline.reports.run.estimation import read_added, solve
 from fgbaseline.reports.run.folder import write_run
 from fgbaseline.reports.run.problem import RunSettings, build_problem
-from fgbaseline.reports.run.solution import read_added, solve
 
 from ..builders.browser import Opened
 

@@ -10,11 +10,11 @@ import pytest
 
 from fgbaseline import ekf
 from fgbaseline.compare.estimate_comparison import compare_all
-from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status, solving
-from fgbaseline.data.solving import solve_all
+from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status, estimator_runner
+from fgbaseline.data.estimator_runner import solve_all
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.run.estimation import batch_is_added, solve
 from fgbaseline.reports.run.problem import RunSettings, check_estimators, read_sequence
-from fgbaseline.reports.run.solution import batch_is_added, solve
 
 from ..builders.runs import as_dict
 from ..builders.synthetic import Scene, plain_problem
@@ -26,7 +26,7 @@ PROBLEM = plain_problem(Scene().sequence())
 def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """What `find_estimator` finds, beside dead reckoning."""
     estimators: dict[str, Any] = {"dead-reckoning": ekf.dead_reckoning}
-    monkeypatch.setattr(solving, "find_estimator", estimators.__getitem__)
+    monkeypatch.setattr(estimator_runner, "find_estimator", estimators.__getitem__)
     return estimators
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from fgbaseline import compare, data, smoother
 from fgbaseline.data import Estimate, Observations, Problem, Status
-from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.velocity_increments import dead_reckoned_path
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent, values_from_state
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key

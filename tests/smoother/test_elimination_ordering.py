@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fgbaseline import diagnosis, smoother
 from fgbaseline.data import Problem
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.diagnosis import NoiseSettings
 from fgbaseline.smoother.graph.keys import AUXILIARY_POSE, distance_key, landmark_of, pose_key, state_keys
 from fgbaseline.smoother.isam2 import estimator
@@ -87,7 +87,7 @@ def test_the_auxiliary_pose_is_no_landmark() -> None:
 def short_drive() -> Problem:
     simulation = Simulation(duration=4.0, features_per_frame=15.0, seed=4, wrong_share=0.0)
     noise = NoiseSettings(simulation.sigma_pixel, simulation.sigma_linear, simulation.sigma_angular)
-    return diagnosis.calibrated(simulate(simulation), settings=diagnosis.Calibration(noise, shift=Shift.AFTER))
+    return diagnosis.calibrated(simulate(simulation), settings=diagnosis.AsRecordedSettings(noise, shift=Shift.AFTER))
 
 
 def test_the_order_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:

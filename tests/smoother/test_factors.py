@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fgbaseline import data
 from fgbaseline.data import HuberKernel, Problem
-from fgbaseline.data.motion import dead_reckoned_path
+from fgbaseline.data.velocity_increments import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.geometry.measurement import three_rows
 from fgbaseline.smoother.graph.factors import FactorBuilder

@@ -11,8 +11,8 @@ import pytest
 from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.data import HuberKernel
-from fgbaseline.data.motion import dead_reckoned_path
 from fgbaseline.data.simulate.settings import PathName
+from fgbaseline.data.velocity_increments import dead_reckoned_path
 from fgbaseline.smoother import ISAM2Settings
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gauss_newton import compact_graph, gauss_newton
@@ -111,7 +111,7 @@ def test_a_landmark_that_no_camera_sees_leaves_the_others_at_their_minimum() -> 
 @pytest.mark.slow
 def test_a_recording_in_wrong_axes_ends_at_the_minimum_too(recordings: Callable[[str], Path]) -> None:
     sequence = data.read(recordings("utias/2011_09_26_drive_0009_sync_KLT.mat"))
-    problem = diagnosis.calibrated(sequence, settings=diagnosis.Calibration())
+    problem = diagnosis.calibrated(sequence, settings=diagnosis.AsRecordedSettings())
     answer = smoother.isam2(problem)
     batch = smoother.batch(problem, given={"isam2": answer})
     assert cost(problem, answer, batch.used) < (1.0 + 1e-5) * cost(problem, batch, batch.used)

@@ -9,8 +9,8 @@ import pytest
 
 from fgbaseline import data, diagnosis, ekf, smoother
 from fgbaseline.data import Estimate, HuberKernel, Observations, Problem, Sequence, Status
-from fgbaseline.data.motion import Shift
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.smoother.graph.factors import FactorBuilder
@@ -280,7 +280,7 @@ def test_simultaneous_first_landmarks_do_not_disturb_the_path(seed: int) -> None
         )
     )
     noise = diagnosis.NoiseSettings(pixel=0.5, linear_velocity=0.5, angular_velocity=0.05)
-    settings = diagnosis.Calibration(
+    settings = diagnosis.AsRecordedSettings(
         noise=noise, shift=Shift.AFTER, mask=MaskSettings(prediction_gate=np.inf), kernel=None
     )
     estimate = smoother.isam2(diagnosis.calibrated(sequence, settings=settings))

@@ -7,9 +7,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ...formats.named_file import FilePath, reading
+from ...formats.file_errors import FilePath, reading
 from ...formats.yaml_file import pose, read_yaml
-from ..rig import CameraModel, Distortion
+from ..rectification import CameraModel, Distortion
 
 MODELS = {"radtan": Distortion.RADTAN, "radial-tangential": Distortion.RADTAN, "equidistant": Distortion.EQUIDISTANT}
 LONGEST_BASELINE = 5.0

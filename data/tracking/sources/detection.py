@@ -8,17 +8,17 @@ from typing import Literal
 from fgbaseline.geometry import InputError, se3
 
 from ...formats.bag_file import METADATA, STORAGE, is_bag
+from ...formats.file_errors import reading, shown
 from ...formats.imu_attachment import read_imu
 from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
-from ...formats.named_file import reading, shown
 from ...formats.trajectory_reader import read_extrinsic
 from ...formats.velocity_csv import read_velocity_csv
 from .bags import open_bag
 from .euroc import open_euroc
+from .image_folders import open_two_folders
 from .image_recording import ImageRecording
 from .kitti_odometry import open_kitti_odometry
 from .kitti_raw import open_kitti_raw
-from .two_folders import open_two_folders
 
 Cameras = Literal["stereo", "left"]
 ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ", b"Rar!")

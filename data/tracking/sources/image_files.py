@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import InputError
 
-from ...formats.named_file import reading, shown
+from ...formats.file_errors import reading, shown
 from ..opencv import opencv
-from ..rig import Image
+from ..rectification import Image
 from .image_recording import ImagePair
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".bmp")

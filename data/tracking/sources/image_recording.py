@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray
 from ...formats.ground_truth import BodyFrame
 from ...formats.imu_samples import RawSamples
 from ...sequence import Truth
-from ..rig import CameraModel, Image
+from ..rectification import CameraModel, Image
 
 ONE_CAMERA = "One camera: its tracks have no right pixels, and raw inertial samples determine their scale."
 

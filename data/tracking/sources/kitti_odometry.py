@@ -15,10 +15,10 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
+from ...formats.file_errors import reading, regular_file, shown
 from ...formats.kitti import read_times
-from ...formats.named_file import reading, regular_file, shown
 from ...wording import plural
-from ..rig import CameraModel, Distortion
+from ..rectification import CameraModel, Distortion
 from .image_files import file_pairs, image_files, size_of
 from .image_recording import ONE_CAMERA, ImageRecording, TruthFile
 
