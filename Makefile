@@ -59,6 +59,9 @@ docs: install
 # The pictures that are in docs/images, by the commands that stand beside them. Five minutes, and a Chromium.
 figures: run
 	$(BIN)/python benchmarks/report_image.py $(OUT) docs/images/report.png
+	$(BIN)/python -m benchmarks.rendered_room out/room
+	$(BIN)/fgbaseline run out/room --out out/room_run --force
+	$(BIN)/python benchmarks/report_image.py out/room_run docs/images/one-frame.png --section one-frame
 	$(BIN)/python benchmarks/consistency.py --seeds 50 --figure docs/images/consistency.png
 
 # Mutated files for every reader, guided by coverage; FUZZ_SECONDS for each of them.

@@ -1,4 +1,4 @@
-"""The picture of a report that README and docs show; docs/index.md has the command.
+"""The pictures of reports that README and docs show; docs/index.md has the command of the first, Makefile those of all.
 
 Needs Chromium; FGBASELINE_CHROMIUM names one that is not found by its usual names.
 """
@@ -12,13 +12,16 @@ from playwright.sync_api import sync_playwright
 
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
 SIZE = {"width": 1400, "height": 1250}
+FRAME = 40
+"""frame of the recording that a section shows: late enough for tracks to have tails"""
 
 
 @click.command()
 @click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("image", type=click.Path(dir_okay=False, path_type=Path))
-def main(run: Path, image: Path) -> None:
-    """The top of RUN/report.html as IMAGE, with landmarks and ellipses switched on."""
+@click.option("--section", help="Identifier of the section of the page to draw in place of its top.")
+def main(run: Path, image: Path, section: str | None) -> None:
+    """The top of RUN/report.html as IMAGE, with landmarks and ellipses switched on; or one section of the page."""
     chromium = next((found for name in NAMES if name and (found := shutil.which(name))), None)
     if chromium is None:
         raise click.ClickException("there is no Chromium; FGBASELINE_CHROMIUM names one")
@@ -32,7 +35,11 @@ def main(run: Path, image: Path) -> None:
                 button.click()
         page.mouse.move(0, 0)
         image.parent.mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=image)
+        if section is None:
+            page.screenshot(path=image)
+        else:
+            page.locator("#frame").fill(str(FRAME))
+            page.locator(f"#{section}").screenshot(path=image)
         browser.close()
 
 
