@@ -54,7 +54,7 @@ class Alignment(Displayed):
     of: int = 0
     """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """directions that the positions leave undetermined; the orientations determine them"""
+    """what the positions leave undetermined: rotations are then taken from the orientations, and the scale is 1"""
 
     @property
     def matrix(self) -> FloatArray:
@@ -105,13 +105,13 @@ def align(
     `first` pairs or all. Where the positions leave directions open (a straight line, standing still, a mirror image),
     the equally good transformation that brings the orientations nearest to the reference's is taken, which is
     independent of the frame. `up` (3,) is up in the reference's world, for yaw. Raises InputError for a kind that does
-    not exist, no pairs, or a `first` that is not between 1 and n.
+    not exist or a `first` that is not between 1 and n, and FgbaselineError where there are no pairs.
     """
     try:
         kind = Align(kind)
     except ValueError as error:
         known = ", ".join(Align)
-        raise InputError(f"alignment: {str(kind)!r} is none; choose one of {known}") from error
+        raise InputError(f"alignment: {str(kind)!r} is not a kind of alignment; choose one of {known}") from error
     if len(estimate) == 0 or estimate.shape != reference.shape:
         raise FgbaselineError(f"alignment needs paired poses, got {estimate.shape} and {reference.shape}")
     n = len(estimate)

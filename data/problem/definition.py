@@ -99,17 +99,17 @@ class Problem(Displayed):
     that of `initial_covariance`, and z of the world points up.
 
     Minimize the sum of squared whitened residuals of the increments (right perturbation [v, w], covariance
-    `increment_covariance`), of the stereo observations (each of the four rows with variance `pixel_variance`,
-    under `kernel`) and of `landmark_prior`, with the first pose at `initial_pose` with `initial_covariance`
-    (zero: held).
+    `increment_covariance`; with raw inertial data of the preintegrated samples), of the observations (the rows of
+    `measurement`, three of a stereo pair and two of one camera, with `kernel` on their norm) and of `landmark_prior`,
+    with the first pose at `initial_pose` with `initial_covariance` (zero: fixed).
     """
 
     preset: str
     sequence: Sequence
     """the recording as the estimators see it: repaired, where the preset repairs"""
     increment: FloatArray
-    """(T-1, 6) twist [v, w] times dt (m, rad): frame k to frame k+1 is exp(hat(increment[k])); (0, 6) with raw inertial
-    data"""
+    """(T-1, 6) twist [v, w] of the body times dt (m, rad): world_T_imu[k+1] = world_T_imu[k] exp(hat(increment[k]));
+    (0, 6) with raw inertial data"""
     increment_covariance: FloatArray
     """(T-1, 6, 6); (0, 6, 6) with raw inertial data"""
     pixel_variance: float

@@ -95,8 +95,8 @@ class CholeskyFactor(NamedTuple):
     def reweighted(self, residual: FloatArray, added: FloatArray) -> "CholeskyFactor":
         """Factor of the first m observations, of nu (m, r), with more noise in the last k of these: R + diag(added).
 
-        `added` is (k, r), px^2. The other columns of L are those of the factor without it, which is overwritten. Raises
-        NotPositiveDefiniteError.
+        `added` is (k, r), px^2. Only the trailing block of these k is factorized again; where m = n, `self.L` is
+        reused and overwritten. Raises NotPositiveDefiniteError.
         """
         last = residual.size
         first = last - added.size
@@ -118,13 +118,13 @@ class CholeskyFactor(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """Innovation of n observations with the covariance of its prediction."""
+    """Innovation of n observations, with H and H P."""
 
     H: StackedJacobian
     residual: FloatArray
     """(n, r) measured minus predicted, px"""
     HP: FloatArray
-    """(rn, size)"""
+    """(rn, size) cross-covariance of the predicted rows and the error of the state"""
 
     @staticmethod
     def of(H: StackedJacobian, residual: FloatArray, P: FloatArray) -> "Innovation":
@@ -147,8 +147,8 @@ class Innovation:
         """NIS (n,) of each observation under its prediction from the state and all other observations.
 
         With z = S^-1 nu and B_i the i-th block (r, r) on the diagonal of S^-1 it is z_i^T B_i^-1 z_i, because B_i^-1 is
-        the covariance of the i-th innovation given the others and B_i^-1 z_i its mean. R = diag(variance), (n, r) or
-        (r,). Raises NotPositiveDefiniteError.
+        the covariance of the i-th innovation given the others, and B_i^-1 z_i its deviation from its mean.
+        R = diag(variance), (n, r) or (r,). Raises NotPositiveDefiniteError.
         """
         factor = self.factorize(variance)
         inverse, failed = dpotri(factor.L, lower=1)
@@ -180,7 +180,8 @@ class Innovation:
 def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:
     """Kalman update: returns the correction delta (size,) of the error state; P (size, size) is updated in place.
 
-    `factor` is that of S with the weighted R. The arrays of `innovation` are overwritten.
+    `factor` is that of S with the weighted R. `innovation.HP` is overwritten, also as a view of that of
+    another innovation.
     """
     W_transposed = dtrsm(1.0, factor.L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
     delta: FloatArray = W_transposed @ factor.whitened

@@ -175,7 +175,7 @@ def _consistency(run: Run) -> list[str]:
         f"{number(np.sqrt(value / DEGREES_OF_FREEDOM))} for {name} (NEES {number(value)})"
         for name, value in sorted(mean.items(), key=lambda item: abs(np.log(max(item[1], 1e-300) / DEGREES_OF_FREEDOM)))
     )
-    return [f"Normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1): {listed(each)}."]
+    return [f"Normalized error RMS (square root of mean NEES / {DEGREES_OF_FREEDOM}, expected 1): {listed(each)}."]
 
 
 def _invalid_covariances(run: Run) -> list[str]:

@@ -200,7 +200,9 @@ def test_the_first_n_pairs_alone_decide(seed: int, n: int) -> None:
 
 def test_a_degenerate_alignment_is_refused_with_its_reason() -> None:
     pair = matched(path("winding", 0), path("winding", 1))
-    with pytest.raises(InputError, match=r"'se4' is none; choose one of none, first-pose, yaw, se3, sim3"):
+    with pytest.raises(
+        InputError, match=r"'se4' is not a kind of alignment; choose one of none, first-pose, yaw, se3, sim3"
+    ):
         pair.aligned("se4")
     with pytest.raises(InputError, match="there are 15 pairs of poses, the first 16 cannot be taken"):
         pair.aligned("se3", first=16)
