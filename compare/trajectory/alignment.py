@@ -54,7 +54,7 @@ class Alignment(Displayed):
     of: int = 0
     """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """directions that the positions leave undetermined: the orientations then determine rotations, and the scale is 1"""
+    """directions that the positions leave undetermined: orientations then determine rotations, and the scale is 1"""
 
     @property
     def matrix(self) -> FloatArray:
