@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
@@ -133,6 +132,8 @@ def map_difference(data: RunData | ComparisonData, style: Style = SCREEN) -> Fig
     In meters and sigmas, on paper only in the camera frame. Another solver of the reference's graph has no distance in
     sigmas: P - P_ref is zero up to rounding.
     """
+    from fgbaseline.compare.estimate_comparison import SAME_GRAPH
+
     tables = {
         name: table.assign(sigmas=np.nan) if {name, data.reference} <= set(SAME_GRAPH) else table
         for name, table in data.by_depth.items()

@@ -55,7 +55,7 @@ def test_impossible_velocities_are_found_and_change_no_estimate(path: str, seed:
             assert finding.code == f"{name}_outliers"
             assert finding.before == len(frames)
             assert found.shift == before.shift
-            assert (np.abs(found.fit.shared - before.fit.shared) < 2.0 * before.fit.deviation).all()
+            assert (np.abs(found.fit.calibration - before.fit.calibration) < 2.0 * before.fit.deviation).all()
             for sigma in ("pixel", "linear_velocity", "angular_velocity"):
                 assert getattr(found.fit.sigmas, sigma) == pytest.approx(getattr(before.fit.sigmas, sigma), rel=0.25)
 

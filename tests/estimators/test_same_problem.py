@@ -77,7 +77,7 @@ def test_one_state_and_one_observation_have_one_residual_and_one_jacobian_everyw
     window = pixel_terms(model, s.imu_T_cam, one, np.stack([pose, pose]), points, np.zeros((1, 8)))
     np.testing.assert_allclose(window.residual.T, white, rtol=1e-7, atol=1e-9)
     in_white = by_point / np.sqrt(model.row_variance)[:, None]
-    np.testing.assert_allclose(np.moveaxis(window.by_point, 2, 0), in_white, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(np.moveaxis(window.J_point, 2, 0), in_white, rtol=1e-7, atol=1e-9)
     # The graph.
     values, factors = (
         values_from_state(estimate.world_T_imu, estimate.landmarks),
