@@ -59,13 +59,14 @@ def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Es
 
 def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None) -> Estimate:
     """Joint filter with first-estimate Jacobians in place of the invariant correction."""
-    settings = JointSettings(linearization=Linearization.FIRST_ESTIMATE)
+    settings = replace(JointSettings.of(problem), linearization=Linearization.FIRST_ESTIMATE)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-first-estimate")
 
 
 def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
     """Joint filter without a gate: outliers are only down-weighted by the kernel."""
-    return replace(joint_ekf(problem, progress, JointSettings(gate=None)), name="joint-ekf-ungated")
+    settings = replace(JointSettings.of(problem), gate=None)
+    return replace(joint_ekf(problem, progress, settings), name="joint-ekf-ungated")
 
 
 def _require_inverse_depth(problem: Problem, settings: JointSettings) -> None:

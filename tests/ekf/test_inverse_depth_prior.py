@@ -1,8 +1,13 @@
 """Landmarks that one camera sees for the first time begin in the scale that the state has, and say nothing of it."""
 
-import numpy as np
+from typing import Literal
 
+import numpy as np
+import pytest
+
+from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.problem import InverseDepthPrior
+from fgbaseline.ekf.joint import estimators
 from fgbaseline.ekf.joint.filter import JointFilter
 from fgbaseline.ekf.joint.inverse_depth_prior import inverse_depths, scene_depth
 from fgbaseline.ekf.joint.landmark_representation import LandmarkRepresentation, chart
@@ -58,3 +63,21 @@ def test_more_landmarks_do_not_narrow_the_scale() -> None:
 def scene_spread(prior: InverseDepthPrior | None) -> float:
     assert prior is not None
     return prior.sigma / prior.mean
+
+
+@pytest.mark.parametrize("cameras", ["left", "stereo"])
+def test_variants_reject_whole_frames_only_where_the_filter_does(
+    cameras: Literal["left", "stereo"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = simulated_problem("drone", 3, seconds=3.0, cameras=cameras)
+    used: list[JointSettings] = []
+
+    def run(problem: Problem, progress: object, settings: JointSettings) -> Estimate:
+        used.append(settings)
+        return Estimate.failed("joint-ekf", "not run", problem.n_frames, len(problem.excluded))
+
+    monkeypatch.setattr(estimators, "_run", run)
+    for solve in (estimators.joint_ekf, estimators.joint_ekf_first_estimate, estimators.joint_ekf_ungated):
+        solve(problem)
+    assert {each.disagreeing_share for each in used} == {JointSettings.of(problem).disagreeing_share}
+    assert len(used) == 3
