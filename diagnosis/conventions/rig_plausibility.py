@@ -62,6 +62,11 @@ def doubt_of_position(sequence: Sequence) -> str:
     )
 
 
+def unconfirmed_position(sequence: Sequence) -> str:
+    """Doubt about the position of the camera, where no motion in meters confirms it; empty for a near camera."""
+    return doubt_of_position(sequence) if is_far(sequence) else ""
+
+
 def extrinsic_unit(sequence: Sequence, usual: Sequence, seen: Odometry | None, of_baseline: float) -> float | None:
     """Factor that converts the translation of imu_T_cam to m, None where it is not m and the motion does not show it.
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.rig_plausibility import doubt_of_position, is_far
+from ..conventions.rig_plausibility import unconfirmed_position
 from ..inertial.imu_spikes import without_spikes
 from ..inertial.result import InertialDiagnosis
 from ..inertial.sensor_axes import in_imu_axes
@@ -21,7 +21,7 @@ from .track_mask import monocular_tracks, used
 
 def diagnose_monocular(recorded: Sequence) -> InertialDiagnosis:
     """Estimates units, axes, mask, start, pixel noise and sensor errors of a recording with one camera."""
-    reason = unusable(recorded) or (doubt_of_position(recorded) if is_far(recorded) else "")
+    reason = unusable(recorded) or unconfirmed_position(recorded)
     if reason:
         return InertialDiagnosis(recorded, recorded, reason)
     seen = monocular_odometry(recorded)

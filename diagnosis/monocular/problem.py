@@ -10,7 +10,7 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
-from ..conventions.rig_plausibility import doubt_of_position, is_far
+from ..conventions.rig_plausibility import unconfirmed_position
 from ..inertial.findings import inertial_findings, inertial_repairs, scale_findings
 from ..inertial.problem import imu_remarks, problem_of
 from ..inertial.result import InertialDiagnosis
@@ -64,7 +64,7 @@ def as_recorded_monocular(
     """
     assert sequence.imu is not None
     source = sequence.source or sequence.name
-    reason = unusable(sequence) or (doubt_of_position(sequence) if is_far(sequence) else "")
+    reason = unusable(sequence) or unconfirmed_position(sequence)
     if reason:
         raise InputError(f"{source}: {reason}")
     try:
