@@ -1,12 +1,14 @@
 """Figures of a result: drawn and laid out at once, or drawn and encoded in the background by forks of this process."""
 
 import gc
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
 
 from fgbaseline.data.parallel import background_map
 
@@ -21,6 +23,12 @@ DrawOne = Callable[[], Figure | None]
 """draws a figure, within `in_style()` and without layout; None where there is nothing to show"""
 Captioned = Mapping[str, tuple[Callable[..., Figure | None], str]]
 """name -> figure from the data of a result and a style, which may be None, and its caption in a paper"""
+
+# An open font file has one position for all processes that inherit it: a fork that reads it moves it under its parent
+# ("invalid outline", or another glyph). In a fork Matplotlib drops the fonts of its own cache, but not those of parsed
+# mathematics (3.11).
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=MathTextParser._parse_cached.cache_clear)  # type: ignore[attr-defined]
 
 
 def drawn(figures: Mapping[str, DrawOne], style: Style = SCREEN) -> dict[str, Figure]:
