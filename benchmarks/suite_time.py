@@ -1,6 +1,6 @@
-"""Time of the tests that two revisions have in common: `python -m benchmarks.suite_time --select bootstrap`.
+"""CPU time of the tests that two revisions have in common: `python -m benchmarks.suite_time --select bootstrap`.
 
-Each revision runs its own tests (those marked `full` left out) in an environment of its own, on two workers. Tests are
+Each revision runs its own files (tests marked `full` left out) in an environment of its own, on two workers. Tests are
 the same where their names are, with the parameters: files moved. Names that occur twice, and tests that do not pass on
 both sides, are left out.
 """
@@ -24,33 +24,53 @@ WANTED = 0.6
 RECORDINGS = "FGBASELINE_RECORDINGS"
 
 
-def seconds(folder: Path, revision: str | None, select: str) -> dict[str, float]:
-    """Seconds of each test that passes, by its name; set-up and teardown are part of it."""
+def pytest(folder: Path, revision: str | None, *words: str | Path, **variables: str) -> str:
+    """What pytest prints for the tests of a revision, in its environment, with our plugin."""
     place = environment(folder, revision)
     source, python = place.parent / "source", place / "bin" / "python"
     group = f"{source / 'pyproject.toml'}:dev"
     uv = Path(sys.executable).with_name("uv")
     subprocess.run([uv, "pip", "install", "--quiet", "--python", python, "--group", group], check=True)
-    report = folder / f"{revision or 'today'}.xml"
-    words = [python, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-k", select, f"--junitxml={report}"]
+    everything = os.environ | ONE_THREAD | {"PYTHONPATH": str(Path(__file__).parent)} | variables
+    command = [python, "-m", "pytest", "-q", "-p", "cpu_time_plugin", *words]
     if '"full:' in (source / "pyproject.toml").read_text(encoding="utf-8"):  # an unknown marker is an error
-        words += ["-m", "not full"]
-    subprocess.run(words, cwd=source, env=os.environ | ONE_THREAD, stdout=subprocess.DEVNULL, check=False)
-    cases = [case for case in ElementTree.parse(report).iter("testcase") if len(case) == 0]
-    often = Counter(case.attrib["name"] for case in cases)
-    return {name: float(case.attrib["time"]) for case in cases if often[name := case.attrib["name"]] == 1}
+        command += ["-m", "not full"]
+    return subprocess.run(command, cwd=source, env=everything, stdout=subprocess.PIPE, text=True, check=False).stdout
 
 
-def rows(select: str) -> list[Row]:
+def names(folder: Path, revision: str | None, select: str) -> set[str]:
+    """Names of a revision's tests that occur once."""
+    collected = pytest(folder, revision, "--collect-only", "-k", select)
+    often = Counter(line.partition("::")[2].rpartition("::")[2] for line in collected.splitlines() if "::" in line)
+    return {name for name, times in often.items() if times == 1}
+
+
+def seconds(folder: Path, revision: str | None, tests: Path) -> dict[str, float]:
+    """CPU seconds of each of the named tests that passes."""
+    report = folder / f"{revision or 'today'}.xml"
+    pytest(folder, revision, "-n", "2", "--dist", "loadfile", f"--junitxml={report}", FGBASELINE_TESTS=str(tests))
+    passed = [
+        case for case in ElementTree.parse(report).iter("testcase") if {child.tag for child in case} == {"properties"}
+    ]
+    return {
+        case.attrib["name"]: float(case.find("properties/property[@name='cpu']").attrib["value"]) for case in passed
+    }
+
+
+def rows(select: str, folder: Path) -> list[Row]:
     """The ratio over all tests in common, and how many these are."""
-    with TemporaryDirectory(prefix="fgbaseline-") as folder:
-        ours, theirs = (seconds(Path(folder), revision, select) for revision in (None, BEFORE))
+    both = (None, BEFORE)
+    tests = folder / "tests.txt"
+    tests.write_text(
+        "\n".join(set.intersection(*(names(folder, revision, select) for revision in both))), encoding="utf-8"
+    )
+    ours, theirs = (seconds(folder, revision, tests) for revision in both)
     common = ours.keys() & theirs.keys()
     if not common:
         raise click.ClickException("no test passes on both sides")
     ratio = sum(ours[test] for test in common) / sum(theirs[test] for test in common)
     quartiles = np.quantile([ours[test] / max(theirs[test], 1e-3) for test in common], [0.25, 0.75])
-    claim = f"`make test`, {len(common):,} tests that {BEFORE} has too, to {BEFORE}"
+    claim = f"`make test`, {len(common):,} tests that {BEFORE} has too, to {BEFORE} (CPU time)"
     spread = f"{quartiles[0]:.2f} to {quartiles[1]:.2f} (half of the tests)"
     return [Row(claim, f"at most {WANTED:g} times", f"{ratio:.2f} times", spread, ratio <= WANTED)]
 
@@ -58,11 +78,15 @@ def rows(select: str) -> list[Row]:
 @click.command()
 @click.option("--select", default="", metavar="EXPRESSION", help="Tests that pytest selects by -k; by default all.")
 @click.option("--recordings", type=click.Path(path_type=Path, exists=True, file_okay=False), help="Real recordings.")
-def main(select: str, recordings: Path | None) -> None:
-    """Print the table; the whole takes as long as the tests of both revisions."""
+@click.option("--keep", type=click.Path(path_type=Path, file_okay=False), help="Folder for both JUnit reports.")
+def main(select: str, recordings: Path | None, keep: Path | None) -> None:
+    """Print the table; the whole takes twice as long as the tests in common."""
     if recordings is not None:
         os.environ[RECORDINGS] = str(recordings.resolve())
-    click.echo(table(rows(select)))
+    with TemporaryDirectory(prefix="fgbaseline-") as folder:
+        place = keep or Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        click.echo(table(rows(select, place)))
 
 
 if __name__ == "__main__":
