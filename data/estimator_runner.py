@@ -32,10 +32,12 @@ def solve_all(
 ) -> dict[str, Estimate]:
     """Estimate of each named estimator, in the order of the names; a failure gives a failed estimate.
 
+    Estimators get the problem without ground truth.
     `functions` are estimators that are not registered, by name. An estimate or by-product without `seconds_total` gets
     the time that the call took. A by-product (`isam2-online` of `isam2`) is not computed twice. An estimator with a
     parameter `given` (`batch` starts from the answer of `isam2`) receives the earlier estimates by name.
     """
+    problem = replace(problem, sequence=replace(problem.sequence, truth=None))
     answers: dict[str, Estimate] = {}
     given: dict[str, Estimate] = {}
     for name in names:

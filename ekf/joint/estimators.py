@@ -53,7 +53,7 @@ def joint_ekf_bias(problem: Problem, progress: Progress | None = None) -> Estima
 
 
 def joint_ekf_textbook(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate."""
+    """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate of single observations."""
     return replace(joint_ekf(problem, progress, JointSettings.textbook()), name="joint-ekf-textbook")
 
 
@@ -64,7 +64,10 @@ def joint_ekf_first_estimate(problem: Problem, progress: Progress | None = None)
 
 
 def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Estimate:
-    """Joint filter without a gate: outliers are only down-weighted by the kernel."""
+    """Joint filter without a gate of single observations.
+
+    The kernel down-weights outliers; a frame most of which disagrees is still rejected.
+    """
     settings = replace(JointSettings.of(problem), gate=None)
     return replace(joint_ekf(problem, progress, settings), name="joint-ekf-ungated")
 

@@ -70,5 +70,5 @@ class JointSettings:
 
     @staticmethod
     def textbook() -> "JointSettings":
-        """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate."""
+        """Textbook EKF-SLAM: points in the world, Jacobians at the latest estimate, no gate of single observations."""
         return JointSettings(LandmarkRepresentation.WORLD, Linearization.TEXTBOOK, gate=None)

@@ -146,6 +146,20 @@ def test_an_estimator_that_requests_them_receives_earlier_estimates(installed: d
     assert set(received[1]) == {"dead-reckoning", "asking", "other"}
 
 
+def test_no_estimator_gets_the_ground_truth(installed: dict[str, Any]) -> None:
+    received: list[Problem] = []
+
+    def looking(problem: Problem, progress: Progress | None) -> Estimate:
+        received.append(problem)
+        return ekf.dead_reckoning(problem)
+
+    installed["looking"] = looking
+    assert PROBLEM.sequence.truth is not None
+    solve_all(PROBLEM, ["looking", "mine"], functions={"mine": looking})
+    assert [problem.sequence.truth for problem in received] == [None, None]
+    assert PROBLEM.sequence.truth is not None
+
+
 def test_by_products_of_a_run_are_not_solved_again(installed: dict[str, Any]) -> None:
     def both(problem: Problem, progress: Progress | None) -> Estimate:
         answer = ekf.dead_reckoning(problem)
