@@ -124,16 +124,19 @@ class StereoCamera:
         return np.ascontiguousarray(np.moveaxis(J, (0, 1), (-2, -1)))
 
     def triangulate(self, pixels: ArrayLike) -> FloatArray:
-        """Triangulates pixels (..., 4) to points (..., 3) in the left camera frame, m.
+        """Triangulates pixels (..., 4) to points (..., 3) in the left camera frame, m; height comes from vL alone.
 
-        Depth comes from the disparity uL - uR, height from vL. A negative disparity gives a point behind the camera, a
-        disparity of zero one at infinity; the caller decides whether to use them.
+        A disparity below zero gives a point behind the camera, one of zero a point at infinity; the caller decides
+        whether to use them.
         """
-        z_pixels = np.asarray(pixels, dtype=np.float64)
-        uL, vL = z_pixels[..., 0], z_pixels[..., 1]
+        return self.triangulate_rows(np.asarray(pixels, dtype=np.float64)[..., [0, 2, 1]])
+
+    def triangulate_rows(self, rows: FloatArray) -> FloatArray:
+        """Triangulates rows uL, uR, v (..., 3), px, to points (..., 3) in the left camera frame, m."""
+        uL, uR, v = np.moveaxis(rows, -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            z = self.fu * self.baseline / (uL - z_pixels[..., 2])
-            return np.stack([(uL - self.cu) / self.fu * z, (vL - self.cv) / self.fv * z, z], axis=-1)
+            z = self.fu * self.baseline / (uL - uR)
+            return np.stack([(uL - self.cu) / self.fu * z, (v - self.cv) / self.fv * z, z], axis=-1)
 
 
 def disparity(pixels: ArrayLike) -> FloatArray:

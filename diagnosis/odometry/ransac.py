@@ -36,7 +36,7 @@ def best_hypotheses(
         best_cost[better] = costs[least, of_pair][better]
 
     point = np.ascontiguousarray(links.point.T)
-    after = np.ascontiguousarray(camera.triangulate(links.pixel[:, [0, 2, 1, 2]]).T)
+    after = np.ascontiguousarray(camera.triangulate_rows(links.pixel).T)
     rng = np.random.default_rng(SEED)
     start = (np.cumsum(count[pairs]) - count[pairs])[:, None]
     pick = np.concatenate([start + _three_of(rng, count[pairs]) for _ in range(HYPOTHESES)])

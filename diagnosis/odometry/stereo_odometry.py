@@ -110,7 +110,7 @@ class _Block(NamedTuple):
     by_column: FloatArray
     """(n,) m/px: how x moves with uL, the disparity kept"""
     by_row: FloatArray
-    """(n,) m: the deviation of y for 1 px of noise in both vL and vR"""
+    """(n,) m: the deviation of y, which comes from the mean row, for 1 px of noise in both vL and vR"""
 
 
 def _block(camera: StereoCamera, links: TrackSegments, chosen: slice) -> _Block:

@@ -148,7 +148,7 @@ class TrackConsistency:
         """
         o, camera = self.sequence.observations, self.sequence.stereo_camera
         motion = se3.inverse(self.world_T_cam[o.frame[after]]) @ self.world_T_cam[o.frame[before]]
-        predicted = se3.transform(motion, camera.triangulate(o.pixel[before]))
+        predicted = se3.transform(motion, camera.triangulate_rows(three_rows(o.pixel[before])))
         residual = camera.project(predicted) - o.pixel[after]
         error = np.linalg.norm(three_rows(residual), axis=1)
         return np.where(predicted[:, 2] > 0, error, np.inf)

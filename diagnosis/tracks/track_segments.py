@@ -31,7 +31,7 @@ class TrackSegments:
     frame: IntArray
     """(n,) k"""
     point: FloatArray
-    """(n, 3) m, the landmark in the left camera's frame at k, from its own disparity"""
+    """(n, 3) m, the landmark in the left camera's frame at k, from its disparity and mean row"""
     pixel: FloatArray
     """(n, 3) uL, uR and (vL + vR) / 2 at k + 1, px"""
 
@@ -97,7 +97,7 @@ def track_segments(sequence: Sequence) -> TrackSegments:
         before=before,
         after=after,
         frame=o.frame[before],
-        point=sequence.stereo_camera.triangulate(o.pixel[before]),
+        point=sequence.stereo_camera.triangulate_rows(three_rows(o.pixel[before])),
         pixel=three_rows(o.pixel[after]),
     )
 

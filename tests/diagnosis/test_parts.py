@@ -12,11 +12,13 @@ from scipy.optimize import least_squares
 from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.problem import NoiseSettings
+from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.diagnosis.conventions.axes import linear_axes
 from fgbaseline.diagnosis.conventions.robust_regression import regress
 from fgbaseline.diagnosis.conventions.spline import spline_through
 from fgbaseline.diagnosis.conventions.velocity_time_offset import timing
+from fgbaseline.diagnosis.odometry.stereo_odometry import odometry
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings, TrackConsistency, exclusions, split_tracks
 from fgbaseline.diagnosis.window_adjustment import bundle_adjustment as adjustment
 from fgbaseline.diagnosis.window_adjustment.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
@@ -72,6 +74,12 @@ def test_windows_are_fitted_alike_by_one_process_and_by_three(monkeypatch: pytes
     for fit, other in zip(one, three, strict=True):
         assert np.array_equal(fit.poses, other.poses)
         assert np.array_equal(fit.last_covariance, other.last_covariance)
+
+
+def test_odometry_measures_the_pixel_noise_of_a_simulation() -> None:
+    settings = Simulation(path="handheld", duration=10, features_per_frame=60, sigma_pixel=0.5)
+    measured = [odometry(simulate(replace(settings, seed=seed))).pixel_sigma for seed in range(3)]
+    assert np.mean(measured) == pytest.approx(0.5, rel=0.03)
 
 
 def moved(poses: FloatArray, k: int, axis: int, step: float) -> FloatArray:
