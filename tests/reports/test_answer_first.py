@@ -8,6 +8,7 @@ import pytest
 
 from fgbaseline import compare, data
 from fgbaseline.compare import Verdict
+from fgbaseline.geometry import se3
 from fgbaseline.reports import comparison
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits_file import read_limits
@@ -203,6 +204,18 @@ def test_a_claim_above_the_error_is_not_called_overconfident() -> None:
     loose = answer(problem, "dead-reckoning", (0.5, 0.0, 0.0), covariance=claiming(1.0, T))
     run = run_of(problem, loose, answer(problem, "isam2", covariance=claiming(0.1, T)))
     assert not [s for s in verdict(run) if s.startswith("Overconfident")]
+
+
+def test_a_reference_whose_nees_is_too_large_is_called_overconfident_though_its_sigma_exceeds_its_error() -> None:
+    problem = plain_problem(scene())
+    thin = claiming(1.0, problem.n_frames)
+    thin[:, 3:, 3:] *= 1e-6  # 1 mrad, against 10 mrad of error below
+    reference = answer(problem, "isam2", covariance=thin)
+    turned = reference.world_T_imu @ se3.exp(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.01]))
+    run = run_of(problem, replace(reference, world_T_imu=turned))
+    said = [s for s in verdict(run) if s.startswith("Overconfident: isam2 differs from ground truth by ")]
+    assert len(said) == 1
+    assert "less than its position sigma of 1.73 m (RMS), but its covariance is too small" in said[0]
 
 
 def test_an_inflation_of_a_few_percent_is_not_mentioned() -> None:
