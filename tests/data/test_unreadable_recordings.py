@@ -19,7 +19,7 @@ NO_RECORDINGS = {
     "empty zip": (b"PK\x05\x06" + bytes(18), "this archive is not a recording; .* found nothing"),
     "zip magic only": (b"PK\x03\x04", "zip directory: the file is damaged"),
     "matlab 7.3": (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + b"\x89HDF\r\n\x1a\n", "MATLAB 7.3"),
-    "matlab header only": (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", "not a UTIAS recording; .* found nothing"),
+    "matlab header only": (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", "not a UTIAS recording; .* nothing"),
 }
 
 
