@@ -140,4 +140,4 @@ def _require_path(answer: Estimate) -> None:
     wrong = np.flatnonzero(known & ~(defect <= ROTATION_TOLERANCE))
     if len(wrong):
         k = int(wrong[0])
-        raise FgbaselineError(f"its pose of frame {k} is no rigid motion (rotation off by {defect[k]:.3g})")
+        raise FgbaselineError(f"its pose of frame {k} is not a rigid motion (rotation off by {defect[k]:.3g})")

@@ -257,7 +257,7 @@ def check_sequence(s: Sequence) -> None:
     defect = float(so3.orthogonality_error(s.imu_T_cam[:3, :3]))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(
-            f"imu_T_cam: its upper left 3x3 is no rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
+            f"imu_T_cam: its upper left 3x3 is not a rotation (off by {defect:.3g}, allowed {ROTATION_TOLERANCE:g}); "
             "write the extrinsic as a rigid motion"
         )
     if not np.array_equal(s.imu_T_cam[3], [0.0, 0.0, 0.0, 1.0]):
@@ -288,7 +288,9 @@ def _check_truth(truth: Truth, T: int, n_landmarks: int) -> None:
     defect = so3.orthogonality_error(truth.world_T_imu[truth.known][:, :3, :3])
     if defect.size and defect.max() > ROTATION_TOLERANCE:
         k = int(np.flatnonzero(truth.known)[defect.argmax()])
-        raise InputError(f"ground_truth: the pose of frame {k} is no rigid motion (rotation off by {defect.max():.3g})")
+        raise InputError(
+            f"ground_truth: the pose of frame {k} is not a rigid motion (rotation off by {defect.max():.3g})"
+        )
     for name in ("velocity", "gyroscope_bias", "accelerometer_bias"):
         values = getattr(truth, name)
         if values is not None and values.shape != (T, 3):

@@ -21,7 +21,7 @@ def _parsed(text: bytes) -> dict[str, Any]:
         return tomllib.loads(text.decode())
     except UnicodeDecodeError as error:
         line = text.count(b"\n", 0, error.start) + 1
-        raise InputError(f"line {line}: this is no UTF-8 text; write the file as TOML") from None
+        raise InputError(f"line {line}: this is not UTF-8 text; write the file as TOML") from None
     except tomllib.TOMLDecodeError as error:
         why, _, where = str(error).rpartition(" (at ")
         found = re.search(r"line (\d+)", where)

@@ -150,7 +150,7 @@ def check_trajectory(path: Trajectory) -> FloatArray:
         defect <= ROTATION_TOLERANCE,
         path,
         lambda i: (
-            f"its upper left 3x3 is no rotation, or its last row not 0 0 0 1 (off by {defect[i]:.3g}, allowed "
+            f"its upper left 3x3 is not a rotation, or its last row not 0 0 0 1 (off by {defect[i]:.3g}, allowed "
             f"{ROTATION_TOLERANCE:g}); write rigid motions"
         ),
     )

@@ -50,7 +50,7 @@ def load(wanted: UserEstimator) -> Estimator:
     name = f"fgbaseline_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise InputError(f"estimator: {path} is no Python file; its name must end in .py")
+        raise InputError(f"estimator: {path} is not a Python file; its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     with _importable(path.resolve().parent):
         sys.modules[name] = module

@@ -56,7 +56,7 @@ def require_free(place: Path, *, force: bool, mark: str) -> None:
         if not place.exists() and not place.is_symlink():
             _require_room(place)
         elif not place.is_dir() or place.is_symlink():
-            raise InputError(f"{place}: it exists and is no folder; choose another --out")
+            raise InputError(f"{place}: it exists and is not a folder; choose another --out")
         elif any(place.iterdir()):
             if not force:
                 raise _exists(place)
@@ -91,7 +91,7 @@ def atomic_folder(place: Path, *, force: bool, mark: str) -> Iterator[Path]:
 def _require_room(place: Path) -> None:
     parent = next(parent for parent in place.absolute().parents if parent.exists())
     if not parent.is_dir():
-        raise InputError(f"{place}: {parent} is no folder; choose another --out")
+        raise InputError(f"{place}: {parent} is not a folder; choose another --out")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{place}: {parent} may not be written to; choose another --out, or change its permissions")
 

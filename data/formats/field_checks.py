@@ -55,7 +55,7 @@ def extrinsic(key: str, imu_R_cam: FloatArray, position: FloatArray) -> FloatArr
     defect = float(so3.orthogonality_error(imu_R_cam))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(
-            f"{key}: its 3x3 block {imu_R_cam.tolist()} is no rotation (off by {defect:.3g}, allowed "
+            f"{key}: its 3x3 block {imu_R_cam.tolist()} is not a rotation (off by {defect:.3g}, allowed "
             f"{ROTATION_TOLERANCE:g}); write the extrinsic as a rigid motion"
         )
     imu_T_cam = np.eye(4)

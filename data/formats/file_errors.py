@@ -54,5 +54,5 @@ def regular_file(path: FilePath) -> Path:
     if file.is_dir():
         raise InputError("this is a folder; give a file")
     if not file.is_file():
-        raise InputError("this is no ordinary file; give a file")
+        raise InputError("this is not an ordinary file; give a file")
     return file

@@ -31,7 +31,7 @@ def kitti_poses(values: FloatArray, line: IntArray) -> FloatArray:
     if len(wrong):
         i = wrong[0]
         raise InputError(
-            f"line {line[i]}: the first three columns are no rotation (off by {defect[i]:.3g}, allowed "
+            f"line {line[i]}: the first three columns are not a rotation (off by {defect[i]:.3g}, allowed "
             f"{ROTATION_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
         )
     rough = defect > EXACT

@@ -34,7 +34,9 @@ def read_landmarks(path: FilePath) -> Landmarks:
         number, position = table.values[:, columns[0]], table.values[:, columns[1:]]
         wrong = np.flatnonzero((number < 0) | (number != np.floor(number)) | (number >= 2**53))
         if len(wrong):
-            raise InputError(f"line {table.line[wrong[0]]}: the id {number[wrong[0]]:g} is no whole number from 0 on")
+            raise InputError(
+                f"line {table.line[wrong[0]]}: the id {number[wrong[0]]:g} is not a whole number from 0 on"
+            )
         order = np.argsort(number, kind="stable")
         index = number[order].astype(np.int64)
         again = np.flatnonzero(np.diff(index) == 0)

@@ -112,7 +112,7 @@ class MatFile:
         """
         shape, variable = self.shape(key), self._variables[key]
         if variable.flags & 0xFF not in DENSE_CLASSES or variable.flags & COMPLEX:
-            raise InputError(f"{key}: it is no dense array of real numbers; save it as double")
+            raise InputError(f"{key}: it is not a dense array of real numbers; save it as double")
         with damage_as_input_error(key):
             source = self._open(variable)
             self._head(source)

@@ -240,7 +240,7 @@ def _unpacked(file: Path) -> bytes:
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"it is packed by gzip and damaged ({error}); pack it again") from error
     if len(content) > MOST_BYTES:
-        raise InputError(f"it unpacks to more than {MOST_BYTES >> 20} MiB, which is no trajectory; check the file")
+        raise InputError(f"it unpacks to more than {MOST_BYTES >> 20} MiB, which is not a trajectory; check the file")
     return content
 
 
@@ -294,7 +294,7 @@ def _require_numbers(lines: Lines, columns: Sequence[int], *, nan: bool) -> None
                 continue
             if DATE.fullmatch(word):
                 raise InputError(f"line {number}: {_short(word)} is a date; write time stamps in seconds since 1970")
-            raise InputError(f"line {number}: {_short(word)} is no finite number; remove the line or mend it")
+            raise InputError(f"line {number}: {_short(word)} is not a finite number; remove the line or mend it")
 
 
 def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
@@ -303,7 +303,7 @@ def _culprit(lines: Lines, columns: Sequence[int], *, nan: bool) -> InputError:
         _require_numbers(lines, columns, nan=nan)
     except InputError as error:
         return error
-    return InputError(f"the file is no table of {lines.width} numbers a line; check that it is the right one")
+    return InputError(f"the file is not a table of {lines.width} numbers a line; check that it is the right one")
 
 
 def _short(text: str) -> str:

@@ -96,4 +96,4 @@ def _what(head: bytes) -> str:
         return "this is a single array (.npy)"
     if head.isascii() and b"\0" not in head:
         return "this is a text file and no recording"
-    return f"this is no recording (it begins with the bytes {head[:8].hex(' ')})"
+    return f"this is not a recording (it begins with the bytes {head[:8].hex(' ')})"

@@ -80,7 +80,7 @@ def stamps_of(words: Sequence[str], value: FloatArray, unit: str | None, rest: S
             whole = tuple(int(a) * 10**9 + int(b) for a, b in zip(words, rest, strict=True))
             value = np.array([float(stamp) for stamp in whole])
         except (ValueError, OverflowError) as error:
-            raise InputError("the seconds and nanoseconds of its stamps are no whole numbers; write those") from error
+            raise InputError("the seconds and nanoseconds of its stamps are not whole numbers; write those") from error
     elif (value == np.floor(value)).all():
         whole = tuple(_exactly(word, number) for word, number in zip(words, value.tolist(), strict=True))
     known = next((u for u in TimeUnit if u == unit), None)
@@ -104,7 +104,7 @@ def likely_seconds(stamps: Stamps) -> FloatArray:
 def no_unit(stamps: Stamps) -> str:
     """Why none of the units fits, in words."""
     return (
-        f"its time stamps are {stamps.interval:.3g} apart, which is no interval of a recorder in seconds, "
+        f"its time stamps are {stamps.interval:.3g} apart, which is not an interval of a recorder in seconds, "
         "milliseconds, microseconds or nanoseconds"
     )
 

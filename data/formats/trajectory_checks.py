@@ -62,5 +62,7 @@ def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, Float
     defect[finite] = so3.orthogonality_error(poses[finite, :3, :3])
     if len(stamps) and defect.max() > ROTATION_TOLERANCE:
         i = int(defect.argmax())
-        raise InputError(f"pose {i} (at {float(stamps[i])!r} s) is no rigid motion (rotation off by {defect[i]:.3g})")
+        raise InputError(
+            f"pose {i} (at {float(stamps[i])!r} s) is not a rigid motion (rotation off by {defect[i]:.3g})"
+        )
     return stamps, poses

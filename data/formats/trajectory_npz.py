@@ -83,7 +83,7 @@ def _rigid(key: str, poses: FloatArray, known: BoolArray) -> FloatArray:
     if len(wrong):
         k = int(np.flatnonzero(known)[wrong[0]])
         raise InputError(
-            f"{key}: the pose {k} is no rigid motion: {poses[k].tolist()}; write a pose, or NaN in all of its entries"
+            f"{key}: the pose {k} is not a rigid motion: {poses[k].tolist()}; write a pose, or NaN in all its entries"
         )
     rough = defect > EXACT
     chosen[rough, :3, :3] = nearest_rotations(chosen[rough, :3, :3])

@@ -161,7 +161,7 @@ def _with_stamps(
     if stamps.unit == "ns" and stamps.whole is None:
         i = int(np.flatnonzero(stamps.value != np.floor(stamps.value))[0])
         raise InputError(
-            f"line {line[i]}: the time stamp {stamps.words[i]} is no whole number of nanoseconds; write those"
+            f"line {line[i]}: the time stamp {stamps.words[i]} is not a whole number of nanoseconds; write those"
         )
     units, is_known = possible_units(stamps)
     return replace(file, stamps=stamps, units=units, unit_known=is_known, remarks=remarks), left

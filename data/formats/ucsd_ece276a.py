@@ -127,7 +127,7 @@ def course_form(keys: frozenset[str]) -> str:
         return "fgbaseline" if keys & OWN_KEYS else "course"
     found = ", ".join(repr(k) for k in sorted(keys)[:12]) or "nothing"
     raise InputError(
-        f"this archive is no recording; expected time_stamps, linear_velocity, angular_velocity, K, b and imu_T_cam, "
+        "this archive is not a recording; expected time_stamps, linear_velocity, angular_velocity, K, b and imu_T_cam, "
         f"but found {found}"
     )
 
@@ -190,7 +190,7 @@ def _truth(archive: NpzArchive, T: int, n_landmarks: int, *, inertial: bool) -> 
     if broken.any():
         k = int(np.argmax(broken))
         raise InputError(
-            f"ground_truth: the pose of frame {k} is no rigid motion: {poses[k].tolist()}; "
+            f"ground_truth: the pose of frame {k} is not a rigid motion: {poses[k].tolist()}; "
             "write a pose, or NaN in all of its entries where it is not known"
         )
     landmarks = None

@@ -36,7 +36,7 @@ def read_utias(mat: MatFile, name: str, source: str) -> Sequence:
     if not mat.keys & {"y_k_j", *VELOCITIES}:
         found = ", ".join(repr(k) for k in sorted(mat.keys)[:16]) or "nothing"
         raise InputError(
-            f"this MATLAB file is no UTIAS recording; expected v_vk_vk_i, w_vk_vk_i and y_k_j, found {found}"
+            f"this MATLAB file is not a UTIAS recording; expected v_vk_vk_i, w_vk_vk_i and y_k_j, found {found}"
         )
     stamps = read_stamps("t", mat.array("t"))
     T = len(stamps.kept)

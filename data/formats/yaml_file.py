@@ -35,7 +35,7 @@ def read_yaml(path: FilePath) -> dict[str, Any]:
         # OpenCV writes %YAML:1.0, which is no directive of YAML
         tree = yaml.load("\n".join(line for line in text.splitlines() if not line.startswith("%")), Loader)
     except (yaml.YAMLError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise InputError(f"it is no YAML ({' '.join(str(error).split())[:120]})") from error
+        raise InputError(f"it is not YAML ({' '.join(str(error).split())[:120]})") from error
     if not isinstance(tree, dict):
         raise InputError("it has no keys; give the calibration of cameras or IMU, in the form of EuRoC or Kalibr")
     return tree

@@ -39,7 +39,7 @@ def _words(path: Path) -> dict[str, Any]:
     try:
         words = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"it is no JSON ({error}); export the problem again") from error
+        raise InputError(f"it is not JSON ({error}); export the problem again") from error
     found = words.get("schema") if isinstance(words, dict) else None
     if found != layout.SCHEMA:
         raise InputError(f"schema: expected {layout.SCHEMA!r}, got {found!r}; export the problem again")

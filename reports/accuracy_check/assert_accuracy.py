@@ -175,7 +175,7 @@ def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float
 
 def _checked(metric: str, value: float, limit: float) -> CheckedMetric:
     bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
-    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "deg"}.get(metric, "m"), value, bounds)
+    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "°"}.get(metric, "m"), value, bounds)
 
 
 def _drawn(

@@ -192,7 +192,7 @@ def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> li
         place = ("sequence", index, "files", number)
         paths = [path for path in _matching(folder, pattern) if path.is_file() and path not in excluded]
         if not paths:
-            what = "matches no file" if has_magic(pattern) else "is no file"
+            what = "matches no file" if has_magic(pattern) else "is not a file"
             raise suite.wrong(
                 place, f"files: '{pattern}' {what} in {folder}; correct it, or give the folder with --data"
             )

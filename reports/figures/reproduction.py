@@ -174,7 +174,7 @@ def sweep_figure(studies: Several["Study"]) -> Figure:
             _map(axes, study, outcomes)
             axes.set_title(f"{safe_text(study.subject.label)}: {name}")
         _bars(figure.add_subplot(grid[2 * i + 1, :]), study)
-    broken = "the printed equations break: frames at which (I - KH)Σ is no covariance"
+    broken = "the printed equations break: frames at which (I - KH)Σ is not a covariance"
     frame = Rectangle((0, 0), 1, 1, fill=False, edgecolor=BROKEN, linewidth=2.0, label=broken)
     title_and_legend(figure, "Where the documented filter breaks: distance from dead reckoning (RMS)", [frame])
     return figure

@@ -83,7 +83,7 @@ WORDS: Mapping[str, str] = {
     "thereby more accurate than its position sigma.",
     "mask": "The observations that no estimator gets, decided before any of them runs; What was left out has the "
     "reasons.",
-    "calibrated": "Preset of a recording that is diagnosed, repaired and masked; it is no camera calibration.",
+    "calibrated": "Preset of a recording that is diagnosed, repaired and masked; cameras are not calibrated.",
     "P, P_ref": "6 x 6 covariance of a pose, by an estimator and by the reference.",
 }
 """word of a run's page that is no metric -> definition"""

@@ -46,7 +46,7 @@ def tracked(
 def write_tracks(source: Path, out: Path, options: ImageOptions, settings: Path | None, *, force: bool) -> int:
     """Tracks the images in `source` and writes `out`; prints what was found. Raises InputError."""
     if not has_images(source):
-        raise InputError(f"{shown(source)}: this is no folder of images and no bag; check the path")
+        raise InputError(f"{shown(source)}: this is neither a folder of images nor a bag; check the path")
     if out.suffix != ".npz":
         raise InputError(f"{shown(out)}: tracks are written as .npz; give a name that ends with it")
     require_new(out, force=force)

@@ -189,7 +189,9 @@ def read_sequence(settings: RunSettings, pictures: Pictures | None = None) -> Se
     length = float(np.linalg.norm(settings.truth_up))
     if sequence.truth is None or not (np.isfinite(length) and length > 0.0):
         given = ",".join(f"{x:g}" for x in settings.truth_up)
-        why = "is no direction" if sequence.truth is not None else "is given without a ground truth; add --truth FILE"
+        why = (
+            "is not a direction" if sequence.truth is not None else "is given without a ground truth; add --truth FILE"
+        )
         raise InputError(f"truth-up: {given} {why}")
     return replace(sequence, truth=replace(sequence.truth, up=np.array(settings.truth_up) / length))
 

@@ -10,7 +10,7 @@ from ..results.metrics import METRICS
 from .table import Row, Table, numbers, words
 
 NUMBERS = ("value", "bound", "margin", "baseline", "change")
-UNITS = {metric.key: metric.unit for metric in METRICS if metric.scale == 1.0 and "°" not in metric.unit}
+UNITS = {metric.key: metric.unit for metric in METRICS if metric.scale == 1.0}
 _METERS = ("ate", "ate_unaligned", "divergence")
 _PIXELS = ("reprojection", "reprojection_used", "reprojection_common", "components", "held_out")
 _NO_UNIT = ("behind_camera", "n", "under_3px", "rank", "block", "sse")
@@ -49,7 +49,7 @@ def unit_of(metric: str) -> str:
     if parts[-1] in _NO_UNIT:
         return ""
     if any(part.endswith("_deg") for part in parts):
-        return "deg"
+        return "°"
     if parts[0] in _PIXELS:
         return "px"
     if parts[0] in _METERS or "translation" in parts or metric == "final_m":

@@ -189,7 +189,7 @@ def test_topics_are_given_where_types_leave_them_open(room: Room, tmp_path: Path
     recording = open_recording(bag.path, ImageOptions(calibration=calibration(tmp_path), topics=("/a", "/c")))
     assert "Topics: /a, /c." in recording.remarks
     for topics, sentence in (
-        (("/a", "/d"), "/d is no topic of images"),
+        (("/a", "/d"), "/d is not a topic of images"),
         (("/a", "/c", "/b"), "expected LEFT,RIGHT or LEFT, and IMU after them if any, got /a,/c,/b"),
         (("/a", "/a"), "left and right are both /a"),
     ):

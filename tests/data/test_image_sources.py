@@ -217,7 +217,7 @@ def test_two_folders(euroc: Path, room: Room, tmp_path: Path, form: str) -> None
     assert len(list(recording.pairs())) == N
     for file in (*left.iterdir(), *right.iterdir()):
         file.rename(file.with_name(f"frame_{int(file.stem) - START_NS}.png"))
-    with pytest.raises(InputError, match="no stamps; add --times"):
+    with pytest.raises(InputError, match="not stamps; add --times"):
         open_recording(left, ImageOptions(right=right, calibration=tmp_path / "calibration.yaml"))
 
 

@@ -128,7 +128,7 @@ BAD_YAML = {
     "no number": (YAML.replace("1e-5", "small"), "gyroscope_random_walk: expected a number"),
     "a key missing": (YAML.replace("gyroscope_random_walk: 1e-5\n", ""), "gyroscope_random_walk is missing"),
     "a camera's file": ("sensor_type: camera\nrate_hz: 20\n", "not that of a camera"),
-    "no yaml": ("a: [1, 2\nb: }", "it is no YAML"),
+    "no yaml": ("a: [1, 2\nb: }", "it is not YAML"),
     "a list": ("- 1\n- 2\n", "it has no keys"),
 }
 
@@ -162,7 +162,7 @@ def short(lines: list[list[str]]) -> list[list[str]]:
 
 BAD_CSV = {
     backward: "stamps must rise",
-    with_nan: "line 9: 'nan' is no finite number",
+    with_nan: "line 9: 'nan' is not a finite number",
     without_gravity: "gravity was taken off",
     short: "5 numbers",
 }

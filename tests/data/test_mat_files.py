@@ -117,7 +117,7 @@ def changed(array, index, value):
 
 BAD = {
     "velocity missing": (lambda v: v.pop("w_vk_vk_i"), "w_vk_vk_i is missing; the file has 'C_c_v'"),
-    "no recording": (lambda v: (v.clear(), v.update(x=1.0)), "this MATLAB file is no UTIAS recording; .* found 'x'"),
+    "no recording": (lambda v: (v.clear(), v.update(x=1.0)), "this MATLAB file is not a UTIAS recording; .* found 'x'"),
     "velocity too short": (
         lambda v: v.update(v_vk_vk_i=v["v_vk_vk_i"][:, :5]),
         r"v_vk_vk_i: expected 3 rows of at least 6 columns for the 6 time stamps, got \(3, 5\)",
@@ -141,13 +141,13 @@ BAD = {
         lambda v: v.update(y_k_j=changed(v["y_k_j"], (1, 5, 2), -1.0)),
         "y_k_j: landmark 2 in frame 5 is .* -1 in some rows only",
     ),
-    "no rotation": (lambda v: v.update(C_c_v=np.ones((3, 3))), "C_c_v .* no rotation"),
+    "no rotation": (lambda v: v.update(C_c_v=np.ones((3, 3))), "C_c_v .* not a rotation"),
     "position of other shape": (lambda v: v.update(rho_v_c_v=np.ones((1, 3))), r"rho_v_c_v: expected shape \(3, 1\)"),
     "no baseline": (lambda v: v.update(b=0.0), "b: expected a positive number, the baseline in meters, got 0.0"),
     "NaN center": (lambda v: v.update(cu=np.nan), "cu: expected one finite number"),
-    "text": (lambda v: v.update(fu="700"), "fu: it is no dense array of real numbers"),
-    "complex": (lambda v: v.update(fv=1j), "fv: it is no dense array of real numbers"),
-    "cells": (lambda v: v.update(t=np.array([1, "a"], dtype=object)), "t: it is no dense array of real numbers"),
+    "text": (lambda v: v.update(fu="700"), "fu: it is not a dense array of real numbers"),
+    "complex": (lambda v: v.update(fv=1j), "fv: it is not a dense array of real numbers"),
+    "cells": (lambda v: v.update(t=np.array([1, "a"], dtype=object)), "t: it is not a dense array of real numbers"),
     "landmarks of other count": (
         lambda v: v.update(rho_i_pj_i=np.ones((3, 4))),
         r"rho_i_pj_i: expected shape \(3, 3\)",

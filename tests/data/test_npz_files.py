@@ -252,11 +252,11 @@ BAD = {
     ),
     "extrinsic no rotation": (
         lambda a: a.update(imu_T_cam=changed(a["imu_T_cam"], (0, 2), 1.00001)),
-        r"imu_T_cam: its 3x3 block .* is no rotation \(off by 2e-05, allowed 1e-06\)",
+        r"imu_T_cam: its 3x3 block .* is not a rotation \(off by 2e-05, allowed 1e-06\)",
     ),
     "extrinsic mirrored": (
         lambda a: a.update(imu_T_cam=changed(a["imu_T_cam"], (0, 2), -1.0)),
-        "imu_T_cam: .* is no rotation",
+        "imu_T_cam: .* is not a rotation",
     ),
     "extrinsic last row": (lambda a: a.update(imu_T_cam=np.ones((4, 4))), "imu_T_cam: its last row"),
     "extrinsic NaN": (
@@ -293,18 +293,18 @@ BAD = {
     "pickled": (lambda a: a.update(b=np.array([{}], dtype=object)), "b: it is a pickled array, which is never opened"),
     "text": (lambda a: a.update(K=np.array("K")), "K: it holds <U1 where real numbers are expected"),
     "complex": (lambda a: a.update(K=np.ones((3, 3), complex)), "K: it holds complex128"),
-    "no recording": (lambda a: (a.clear(), a.update(x=np.ones(3))), "this archive is no recording; .* found 'x'"),
+    "no recording": (lambda a: (a.clear(), a.update(x=np.ones(3))), "this archive is not a recording; .* found 'x'"),
     "truth of other length": (
         lambda a: a.update(ground_truth=np.tile(np.eye(4), (5, 1, 1))),
         r"ground_truth: expected shape \(6, 4, 4\)",
     ),
     "truth no rotation": (
         lambda a: a.update(ground_truth=changed(np.tile(np.eye(4), (6, 1, 1)), (3, 0, 1), 0.1)),
-        "ground_truth: the pose of frame 3 is no rigid motion",
+        "ground_truth: the pose of frame 3 is not a rigid motion",
     ),
     "truth half NaN": (
         lambda a: a.update(ground_truth=changed(np.tile(np.eye(4), (6, 1, 1)), (2, 0, 3), np.nan)),
-        "ground_truth: the pose of frame 2 is no rigid motion",
+        "ground_truth: the pose of frame 2 is not a rigid motion",
     ),
     "landmarks without poses": (lambda a: a.update(landmarks=np.ones((3, 5))), "landmarks: they need ground_truth"),
     "landmarks of other count": (

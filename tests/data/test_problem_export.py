@@ -123,7 +123,7 @@ def put(index: Any, value: float) -> Any:
         ({"frame": put(0, 5)}, "frame: observations must be sorted"),
         ({"landmark": lambda a: a + 0.5}, "landmark: expected whole numbers"),
         ({"t": put(1, 0.0)}, "t: stamps must rise"),
-        ({"imu_T_cam": put((0, 0), 3.0)}, "imu_T_cam: its 3x3 block .* is no rotation"),
+        ({"imu_T_cam": put((0, 0), 3.0)}, "imu_T_cam: its 3x3 block .* is not a rotation"),
         ({"pixel_variance": np.array(-1.0)}, "pixel_variance: expected a positive number"),
         ({"pixel_variance": np.ones(2)}, "pixel_variance: expected shape"),
         ({"pixel_inflation": np.array(0.0)}, "pixel_inflation: expected a positive number"),
@@ -148,7 +148,7 @@ def test_an_unknown_schema_or_value_of_an_exported_problem_is_refused(
     path = tmp_path / layout.SCALARS
     words = json.loads(path.read_text())
     for text, sentence in (
-        ("{", "it is no JSON"),
+        ("{", "it is not JSON"),
         ("[]", "schema: expected 'fgbaseline/problem/1', got None"),
         (json.dumps({**words, "schema": "fgbaseline/problem/9"}), "got 'fgbaseline/problem/9'"),
         (json.dumps({**words, "reading": "aloud"}), "'aloud' is not a valid LandmarkMode"),

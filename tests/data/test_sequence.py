@@ -38,7 +38,7 @@ WRONG: dict[str, Callable[[], Sequence]] = {
     ),
     "time_stamps: row 5 is not finite": lambda: replace(GOOD, t=skewed(GOOD.t, (5,), np.inf)),
     "time_stamps: stamps must rise, but frame 4": lambda: replace(GOOD, t=GOOD.t[[0, 1, 2, 3, 3, 5]]),
-    "imu_T_cam: its upper left 3x3 is no rotation": lambda: replace(
+    "imu_T_cam: its upper left 3x3 is not a rotation": lambda: replace(
         GOOD, imu_T_cam=skewed(GOOD.imu_T_cam, (0, 0), 0.01)
     ),
     r"imu_T_cam: expected finite numbers of shape \(4, 4\), got": lambda: replace(GOOD, imu_T_cam=GOOD.imu_T_cam[:3]),
@@ -54,7 +54,7 @@ WRONG: dict[str, Callable[[], Sequence]] = {
     "an observation names a frame or landmark": lambda: replace(GOOD, observations=one_off(landmark=12)),
     "features: an observation names a frame": lambda: replace(GOOD, observations=one_off(frame=-1)),
     "ground_truth: expected shape .6, 4, 4., got .5, 4, 4.": lambda: GOOD.with_truth(Truth(POSES[:5], POINTS)),
-    "ground_truth: the pose of frame 3 is no rigid motion": lambda: GOOD.with_truth(
+    "ground_truth: the pose of frame 3 is not a rigid motion": lambda: GOOD.with_truth(
         Truth(skewed(POSES, (3, 1, 1), 0.1), POINTS)
     ),
     "landmarks: expected shape .12, 3., got .11, 3.": lambda: GOOD.with_truth(Truth(POSES, POINTS[:11])),

@@ -142,12 +142,15 @@ GOOD = "1000000000,0,0,0,1,0,0,0"
 BAD_TEXT = {
     "seven fields": ("1 2 3 4 5 6 7\n", "line 1: it has 7 fields"),
     "three between commas": ("1,2,3\n", "line 1: it has 3 fields"),
-    "word": (f"#h\n{GOOD}\n2000000000,0,0,x,1,0,0,0\n", "line 3: 'x' is no finite number"),
+    "word": (f"#h\n{GOOD}\n2000000000,0,0,x,1,0,0,0\n", "line 3: 'x' is not a finite number"),
     "NaN stamp": (f"#h\n{GOOD}\nnan,0,0,1,1,0,0,0\n", "line 3: the time stamp is NaN"),
-    "infinite": (f"#h\n{GOOD}\n2000000000,0,0,inf,1,0,0,0\n", "line 3: 'inf' is no finite number"),
+    "infinite": (f"#h\n{GOOD}\n2000000000,0,0,inf,1,0,0,0\n", "line 3: 'inf' is not a finite number"),
     "missing": (f"{GOOD}\n2000000000,0,0,1,0,0,0\n", "line 2: expected 8 numbers, got 7"),
     "empty stamp": (f"{GOOD}\n,0,0,0,1,0,0,0\n", "line 2: the time stamp is NaN"),
-    "half a nanosecond": ("#t [ns],x,y,z,qw,qx,qy,qz\n1.5,0,0,0,1,0,0,0\n", "line 2: the time stamp 1.5 is no whole n"),
+    "half a nanosecond": (
+        "#t [ns],x,y,z,qw,qx,qy,qz\n1.5,0,0,0,1,0,0,0\n",
+        "line 2: the time stamp 1.5 is not a whole n",
+    ),
     "long quaternion": (f"{GOOD}\n2000000000,0,0,0,1,0.1,0,0\n", r"line 2: the quaternion \[0.1, 0.0, 0.0, 1.0\] has"),
     "unsorted": (
         f"{GOOD}\n500000000,0,0,0,1,0,0,0\n",
@@ -217,9 +220,9 @@ def misshape(arrays):
 @pytest.mark.parametrize(
     ("spoil", "sentence"),
     [
-        (reflect, "world_T_body: the pose 2 is no rigid motion"),
-        (half_nan, "world_T_body: the pose 1 is no rigid motion"),
-        (projective, "world_T_body: the pose 1 is no rigid motion"),
+        (reflect, "world_T_body: the pose 2 is not a rigid motion"),
+        (half_nan, "world_T_body: the pose 1 is not a rigid motion"),
+        (projective, "world_T_body: the pose 1 is not a rigid motion"),
         (fall, "t: stamps must rise, but frame 2"),
         (shorten, r"world_T_body: expected shape \(4, 4, 4\)"),
         (lose_all, "world_T_body: every pose is NaN"),

@@ -296,7 +296,7 @@ DAMAGED = {
     ),
     "decimal commas": (lambda p: tum(p).replace(".", ","), "line 1: .* is written with a decimal comma"),
     "decimal commas between semicolons": (lambda p: tum(p, separator=";").replace(".", ","), "with a decimal comma"),
-    "a word": (lambda p: tum(p).replace(p.numbers()[7][0], "1.2x4"), "line 8: '1.2x4' is no finite number"),
+    "a word": (lambda p: tum(p).replace(p.numbers()[7][0], "1.2x4"), "line 8: '1.2x4' is not a finite number"),
     "a line cut short": (lambda p: tum(p)[: tum(p).rindex(" ")], "line 60: expected 8 numbers, got 7"),
     "time that runs backward": (
         lambda p: "\n".join(reversed(tum(p).splitlines())), r"line 2: the time stamp .* is not after .* \(line 1\)"

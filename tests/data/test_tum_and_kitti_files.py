@@ -49,8 +49,8 @@ def test_unknown_poses_are_left_out(tmp_path):
     [
         ([0.0, 0.0], (0, 3, 1.0), "must be finite and rise"),
         ([0.0, np.nan], (0, 3, 1.0), "must be finite and rise"),
-        ([0.0, 1.0], (0, 0, 2.0), r"pose 1 \(at 1.0 s\) is no rigid motion"),
-        ([0.0, 1.0], (0, 3, np.nan), r"pose 1 \(at 1.0 s\) is no rigid motion"),
+        ([0.0, 1.0], (0, 0, 2.0), r"pose 1 \(at 1.0 s\) is not a rigid motion"),
+        ([0.0, 1.0], (0, 3, np.nan), r"pose 1 \(at 1.0 s\) is not a rigid motion"),
         ([0.0, 1.0, 2.0], (0, 3, 1.0), r"stamps \(n,\) and poses \(n, 4, 4\)"),
     ],
 )
@@ -73,12 +73,12 @@ def test_comments_blank_lines_and_foreign_line_ends(tmp_path):
 
 GOOD = "1 0 0 0 0 0 0 1"
 BAD_TUM = {
-    "word": ([GOOD, "2 0 x 0 0 0 0 1"], "line 2: 'x' is no finite number"),
-    "underscore": ([GOOD, "2 0 1_0 0 0 0 0 1"], "line 2: '1_0' is no finite number"),
-    "other digits": ([GOOD, "2 0 ١ 0 0 0 0 1"], "line 2: '١' is no finite number"),
+    "word": ([GOOD, "2 0 x 0 0 0 0 1"], "line 2: 'x' is not a finite number"),
+    "underscore": ([GOOD, "2 0 1_0 0 0 0 0 1"], "line 2: '1_0' is not a finite number"),
+    "other digits": ([GOOD, "2 0 ١ 0 0 0 0 1"], "line 2: '١' is not a finite number"),
     "NaN stamp": ([GOOD, "# between", "nan 0 0 0 0 0 0 1"], "line 3: the time stamp is NaN"),
-    "infinite": ([GOOD, "inf 0 0 0 0 0 0 1"], "line 2: 'inf' is no finite number"),
-    "overflow": ([GOOD, "2 1e999 0 0 0 0 0 1"], "line 2: '1e999' is no finite number"),
+    "infinite": ([GOOD, "inf 0 0 0 0 0 0 1"], "line 2: 'inf' is not a finite number"),
+    "overflow": ([GOOD, "2 1e999 0 0 0 0 0 1"], "line 2: '1e999' is not a finite number"),
     "short": ([GOOD, "", "2 0 0 0 0 0 1"], "line 3: expected 8 numbers, got 7: '2 0 0 0 0 0 1'"),
     "short from the start": (["1 2 3"], "line 1: it has 3 fields"),
     "long quaternion": ([GOOD, "2 0 0 0 0 0 0 1.002"], r"line 2: the quaternion .* has length 1.002"),
@@ -130,10 +130,10 @@ def test_kitti_rotations_are_made_exact(tmp_path):
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ("1 0 0 5 0 1 0 5 0 0 -1 5", "line 2: the first three columns are no rotation"),
+        ("1 0 0 5 0 1 0 5 0 0 -1 5", "line 2: the first three columns are not a rotation"),
         ("1.01 0 0 5 0 1 0 5 0 0 1 5", r"line 2: .* \(off by 0.0201, allowed 0.001\)"),
-        ("1e200 0 0 5 0 1 0 5 0 0 1 5", "line 2: the first three columns are no rotation"),
-        ("1 0 0 5 0 1 0 5 0 0 1 inf", "line 2: 'inf' is no finite number"),
+        ("1e200 0 0 5 0 1 0 5 0 0 1 5", "line 2: the first three columns are not a rotation"),
+        ("1 0 0 5 0 1 0 5 0 0 1 inf", "line 2: 'inf' is not a finite number"),
         ("1 0 0 5 0 1 0 5 0 0 1", "line 2: expected 12 numbers, got 11"),
     ],
 )

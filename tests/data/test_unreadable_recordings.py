@@ -13,13 +13,13 @@ from fgbaseline.geometry import InputError
 NO_RECORDINGS = {
     "empty": (b"", "the file is empty"),
     "text": (b"1 2 3\n", "this is a text file and no recording"),
-    "random": (b"\xfe\xff\x00\x01", "this is no recording .*fe ff 00 01"),
+    "random": (b"\xfe\xff\x00\x01", "this is not a recording .*fe ff 00 01"),
     "hdf5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "this is an HDF5 file"),
     "single array": (b"\x93NUMPY\x01\x00" + bytes(70), "this is a single array"),
-    "empty zip": (b"PK\x05\x06" + bytes(18), "this archive is no recording; .* found nothing"),
+    "empty zip": (b"PK\x05\x06" + bytes(18), "this archive is not a recording; .* found nothing"),
     "zip magic only": (b"PK\x03\x04", "zip directory: the file is damaged"),
     "matlab 7.3": (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + b"\x89HDF\r\n\x1a\n", "MATLAB 7.3"),
-    "matlab header only": (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", "no UTIAS recording; .* found nothing"),
+    "matlab header only": (b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", "not a UTIAS recording; .* nothing"),
 }
 
 
@@ -48,7 +48,7 @@ def test_places_that_are_no_file(tmp_path):
         read(str(tmp_path) + "/\udcff.npz")
     str(raised.value).encode("utf-8")
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(InputError, match="no ordinary file"):
+    with pytest.raises(InputError, match="not an ordinary file"):
         read(tmp_path / "pipe")
 
 

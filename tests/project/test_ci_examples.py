@@ -102,3 +102,21 @@ def test_the_commands_run_in_their_order_and_separate_good_from_bad(repository: 
     assert bash(OURS[-1], repository).returncode == 1
     assert JUnitXml.fromfile(str(repository / "out" / "check.xml")).failures == 2
     assert "violated" in (repository / "out" / "check.md").read_text()
+
+
+@pytest.mark.slow
+def test_the_failed_test_of_the_page_prints_what_the_page_shows(repository: Path) -> None:
+    page = (ROOT / "docs" / "ci.md").read_text()
+    for command in OURS[:2]:  # simulate, run
+        assert bash(command, repository).returncode == 0
+    (test,) = re.findall(r"```python\n(def test_filter.*?)```", page, re.DOTALL)
+    (repository / "test_filter.py").write_text(test)
+    pytest_command = f"{sys.executable} -m pytest -p no:cacheprovider --accuracy-figures accuracy test_filter.py"
+    printed = [line for line in bash(pytest_command, repository).stdout.splitlines() if line.startswith("E   ")]
+    (shown,) = re.findall(r"```text\n(E   .*?)```", page, re.DOTALL)
+    number = re.compile(r"\d+\.\d{3,}")  # equal up to the rounding of other processors
+    assert [number.sub("#", " ".join(line.split())) for line in printed] == [
+        number.sub("#", " ".join(line.split())) for line in shown.splitlines()
+    ]
+    found, expected = ([float(n) for n in number.findall(text)] for text in ("\n".join(printed), shown))
+    assert found == pytest.approx(expected, rel=0.01)

@@ -99,13 +99,10 @@ HOURS = {
     "python -m benchmarks.isam2_variants 2011_09_26_drive_0036_sync_KLT.mat",
 }
 """commands of which there is no cheap form"""
-NEVER_RUN = {
-    **dict.fromkeys(
-        ("pip install 'fgbaseline[images]'", "pip install 'fgbaseline[images,ros]'"),
-        "it would fetch from a registry, under a name that is not registered yet",
-    ),
-    "pip install 'fgbaseline[rerun]'": "it would fetch from a registry, under a name that is not registered yet",
-}
+NEVER_RUN = dict.fromkeys(
+    (f"pip install '.[{extras}]'" for extras in ("images", "images,ros", "rerun")),
+    "it would install the checkout and fetch the extras from a registry",
+)
 """command -> why no test can run it"""
 SHORTER = {
     "--duration 10 ": "--duration 3 ",
@@ -229,6 +226,22 @@ SHOWING = [d for d in DOCUMENTS if any(commands(b) or b.language == "python" for
 @pytest.mark.parametrize("document", SHOWING, ids=_ids(SHOWING))
 def test_every_command_and_snippet_runs(document: Path, place: Place) -> None:
     place.follow(document)
+
+
+def test_comments_after_a_print_are_what_it_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "getting-started.md").read_text()
+    printing = [block for block in blocks(text) if block.language == "python" and "print(" in block.text]
+    group.main(
+        shlex.split(next(c for b in blocks(text) for c in commands(b) if " simulate " in c))[1:], standalone_mode=False
+    )
+    for block in printing:
+        capsys.readouterr()
+        exec(compile(block.text, "getting-started", "exec"), {})
+        assert capsys.readouterr().out.splitlines() == re.findall(r"^print\(.*\)  # (.+)$", block.text, re.MULTILINE)
+    assert printing
 
 
 @pytest.mark.slow

@@ -58,3 +58,22 @@ def test_docstrings_start_with_their_subject_and_name_no_persons() -> None:
         if begin.match(text) or PERSONS.search(text)
     ]
     assert not found
+
+
+def test_messages_and_docs_negate_the_verb() -> None:
+    """A person reads "is not a rotation"; "is no rotation" is read twice. "There is no ..." stays."""
+    negated = re.compile(r"(?<!here )\b(is|are) no (?!longer|more than)[a-zA-Z]+")
+    texts = [
+        (path, node.lineno, node.value)
+        for path in sources()
+        if "tests" not in path.parts and "benchmarks" not in path.parts
+        for tree in [ast.parse(path.read_text(encoding="utf-8"))]
+        for documenting in [{id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documenting
+    ]
+    texts += [(path, i, line) for path in docs() for i, line in enumerate(path.read_text().splitlines(), 1)]
+    found = [
+        f"{path.relative_to(ROOT)}:{i}: {word.group()}" for path, i, text in texts for word in negated.finditer(text)
+    ]
+    assert not found

@@ -103,14 +103,14 @@ def a_dangling_link(place: Path) -> None:
 def test_a_file_or_link_is_never_replaced_by_a_folder(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / "out")
     before = everything_in(tmp_path)
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         written(tmp_path / "out", "new", force=True)
     assert everything_in(tmp_path) == before
 
 
 def test_a_place_below_a_file_or_with_an_impossible_name_is_refused_at_once(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file is no folder"):
+    with pytest.raises(InputError, match="file is not a folder"):
         require_free(tmp_path / "file" / "a" / "out", force=False, mark=MARK)
     with pytest.raises(InputError, match="cannot be written"):
         require_free(tmp_path / ("x" * 300), force=False, mark=MARK)

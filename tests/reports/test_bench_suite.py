@@ -43,7 +43,7 @@ def drive(tmp_path: Path) -> Path:
         ('name = "x"\nestimators = ["ekf", "ekf"]\n' + DRIVE, "estimators", "'ekf' is named twice"),
         (SEQUENCE, "sequence[0]", "give files or simulate"),
         ('name = "x"\n' + DRIVE + 'files = "drive.npz"\n', "sequence[0]", "give files or simulate"),
-        (SEQUENCE + 'files = ["drive.npz", "drive_2.npz"]\n', "sequence[0].files[1]", "'drive_2.npz' is no file in"),
+        (SEQUENCE + 'files = ["drive.npz", "drive_2.npz"]\n', "sequence[0].files[1]", "'drive_2.npz' is not a file in"),
         (SEQUENCE + 'files = "kitti/*.mat"\n', "sequence[0].files", "'kitti/*.mat' matches no file in"),
         (SEQUENCE + 'files = "suite.toml"\n', "sequence[0].files", "a text file and no recording"),
         ('name = "x"\n' + FILE + 'truth = "poses.txt"\n', "sequence[0]", "truth and truth_frame"),

@@ -302,7 +302,7 @@ def test_bad_input_is_one_sentence(
     ("metric", "unit"),
     [
         ("ate.rmse", "m"),
-        ("divergence.rotation_rmse_deg", "deg"),
+        ("divergence.rotation_rmse_deg", "°"),
         ("ate_unaligned.final", "m"),
         ("reprojection_common.median", "px"),
         ("reprojection.under_3px", ""),
@@ -313,7 +313,7 @@ def test_bad_input_is_one_sentence(
         ("nees.mean", ""),
         ("seconds", "s"),
         ("translation.rmse.value", "m"),
-        ("relative.0.5 s.rotation_deg.median.value", "deg"),
+        ("relative.0.5 s.rotation_deg.median.value", "°"),
     ],
 )
 def test_units_are_those_of_the_schema(metric: str, unit: str) -> None:

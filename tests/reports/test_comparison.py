@@ -382,8 +382,8 @@ BAD_LANDMARKS = {
     "id;x;y;z\n1;2;3;4": "line 1: expected a header with id,x,y,z, but id, x, y, z is missing",
     "id,x,y\n1,2,3": "line 1: expected a header with id,x,y,z, but z is missing",
     "id,x,y,z\n1,2,3": "line 2: expected 4",
-    "id,x,y,z\n1,2,3,4\n2,x,3,4": "line 3: 'x' is no finite number",
-    "id,x,y,z\n1.5,2,3,4": r"line 2: the id 1\.5 is no whole number",
+    "id,x,y,z\n1,2,3,4\n2,x,3,4": "line 3: 'x' is not a finite number",
+    "id,x,y,z\n1.5,2,3,4": r"line 2: the id 1\.5 is not a whole number",
     "id,x,y,z\n7,2,3,4\n1,2,3,4\n7,0,0,0": "line 4: the landmark 7 stands on line 2 too",
 }
 

@@ -41,7 +41,7 @@ class Finished:
     @property
     def summary(self) -> Any:
         def refuse(constant: str) -> None:
-            raise AssertionError(f"{constant} is no JSON")
+            raise AssertionError(f"{constant} is not JSON")
 
         return json.loads((self.out / "summary.json").read_text(encoding="utf-8"), parse_constant=refuse)
 
@@ -227,7 +227,7 @@ def test_the_stated_up_of_the_truth_is_kept_and_no_direction_is_refused(recordin
     truth = read_sequence(RunSettings(sequence=recording, truth_up=(0.0, 0.0, 2.0))).truth
     assert truth is not None
     np.testing.assert_allclose(truth.up, [0.0, 0.0, 1.0])
-    with pytest.raises(InputError, match="truth-up: 0,0,0 is no direction"):
+    with pytest.raises(InputError, match="truth-up: 0,0,0 is not a direction"):
         read_sequence(RunSettings(sequence=recording, truth_up=(0.0, 0.0, 0.0)))
     without = data.read(recording).with_truth(None)
     with pytest.raises(InputError, match="truth-up: 0,0,1 is given without a ground truth; add --truth FILE"):

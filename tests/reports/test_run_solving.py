@@ -86,8 +86,8 @@ ANSWERS = {
     "innovations.nis is (3,)": with_changes(innovations=Innovations.none(3)),
     "landmarks.index must rise": with_changes(landmarks=Landmarks(np.array([1, 0]), np.zeros((2, 3)))),
     "0 to 11": with_changes(landmarks=Landmarks(np.array([M]), np.zeros((1, 3)))),
-    "frame 4 is no rigid motion": with_changes(world_T_imu=BENT),
-    "frame 6 is no rigid motion": with_changes(world_T_imu=INFINITE),
+    "frame 4 is not a rigid motion": with_changes(world_T_imu=BENT),
+    "frame 6 is not a rigid motion": with_changes(world_T_imu=INFINITE),
     "no pose at all": with_changes(world_T_imu=np.full((T, 4, 4), np.nan)),
 }
 

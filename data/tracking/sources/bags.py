@@ -108,7 +108,7 @@ def _chosen(bag: Bag, given: tuple[str, ...], *, left_alone: bool) -> Topics:
     if given:
         wrong = next((name for name in given if name not in (*images, *imus)), None)
         if wrong is not None:
-            raise InputError(f"{bag.source}: {wrong} is no topic of images or inertial samples; it has {listed}")
+            raise InputError(f"{bag.source}: {wrong} is not a topic of images or inertial samples; it has {listed}")
         n = sum(name in images for name in given)
         if n not in (1, 2) or len(given) - n > 1 or given[:n] != tuple(name for name in given if name in images):
             raise InputError(f"topics: expected LEFT,RIGHT or LEFT, and IMU after them if any, got {','.join(given)}")

@@ -69,7 +69,7 @@ def _open(path: Path, options: ImageOptions) -> ImageRecording:
     if is_bag(path):
         return open_bag(path, options.calibration, options.topics, left_alone=left_alone)
     if options.topics:
-        raise InputError(f"topics: {shown(path)} is no ROS bag")
+        raise InputError(f"topics: {shown(path)} is not a ROS bag")
     if path.is_file():
         with reading(path), path.open("rb") as file:
             packed = file.read(8).startswith(ARCHIVES)

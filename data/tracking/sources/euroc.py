@@ -105,7 +105,7 @@ def _images(folder: Path) -> _Images:
         files = image_files(folder / "data")
         stamps = stamps_of_names(files)
         if stamps is None:
-            raise InputError(f"{shown(table)}: the file is missing, and the images' names are no stamps in ns")
+            raise InputError(f"{shown(table)}: the file is missing, and the images' names are not stamps in ns")
         return _rising(stamps, files, folder)
     with reading(table):
         rows = [line.split(",") for line in table.read_text("utf-8-sig").splitlines() if line.strip()]

@@ -73,7 +73,7 @@ def size_of(file: Path) -> tuple[int, int]:
             with Pillow.open(file) as image:
                 return image.size
         except UnidentifiedImageError:
-            raise InputError("it is no image; check the file") from None
+            raise InputError("it is not an image; check the file") from None
 
 
 def file_pairs(files: Sequence[tuple[Path, ...]]) -> Callable[[], Iterator[ImagePair]]:

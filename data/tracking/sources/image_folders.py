@@ -54,7 +54,9 @@ def open_two_folders(left: Path, right: Path | None, calibration: Path | None, t
         t = paired.t
         files = [(both[0][a], both[1][b]) for a, b in zip(paired.left.tolist(), paired.right.tolist(), strict=True)]
     else:
-        raise InputError(f"{shown(left)}: the images' names are no stamps; add --times FILE with a line for each image")
+        raise InputError(
+            f"{shown(left)}: the images' names are not stamps; add --times FILE with a line for each image"
+        )
     return ImageRecording(
         name=left.resolve().parent.name,
         form="two-folders",
