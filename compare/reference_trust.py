@@ -15,7 +15,7 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.wording import distance, per_cent, plural
 from fgbaseline.geometry import disparity
-from fgbaseline.geometry.monocular import UNIT_LENGTH
+from fgbaseline.geometry.monocular_camera import UNIT_LENGTH
 
 from .residuals.cost import cost
 from .residuals.noise_scale import motion_scale, pixel_scale

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera, se3, so3
-from fgbaseline.geometry.monocular import require_stereo
+from fgbaseline.geometry.monocular_camera import require_stereo
 
 from .dataframes import axis_columns, path_length, plot_over_time, pose_columns, table
 from .display import Displayed

@@ -12,8 +12,9 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, MeasurementModel, se3
-from fgbaseline.geometry.measurement import mahalanobis_squared, predict
-from fgbaseline.geometry.monocular import require_stereo
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import mahalanobis_squared
+from fgbaseline.geometry.monocular_camera import require_stereo
 
 
 class IndependentLandmarks:

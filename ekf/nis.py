@@ -8,7 +8,7 @@ It is computed before kernel and gate: rejected innovations are evidence as well
 import numpy as np
 
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import STEREO_ROWS
+from fgbaseline.geometry.measurement_model import STEREO_ROWS
 
 from .pose_update import PoseInnovation, PosePosterior, pose_posterior
 

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
 from fgbaseline.geometry import FloatArray, MeasurementModel
-from fgbaseline.geometry.measurement import mahalanobis_squared, predict
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import mahalanobis_squared
 
 from .motion_model import POSE
 

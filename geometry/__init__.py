@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import se3, so3, strapdown
     from .errors import FgbaselineError, InputError
-    from .measurement import HuberKernel, MeasurementModel
-    from .monocular import Camera, MonocularCamera
+    from .measurement_model import HuberKernel, MeasurementModel
+    from .monocular_camera import Camera, MonocularCamera
     from .so3 import FloatArray
-    from .stereo import StereoCamera, disparity
+    from .stereo_camera import StereoCamera, disparity
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
@@ -19,9 +19,9 @@ else:
             "so3": "so3 FloatArray",
             "strapdown": "strapdown",
             "errors": "FgbaselineError InputError",
-            "measurement": "HuberKernel MeasurementModel",
-            "monocular": "Camera MonocularCamera",
-            "stereo": "StereoCamera disparity",
+            "measurement_model": "HuberKernel MeasurementModel",
+            "monocular_camera": "Camera MonocularCamera",
+            "stereo_camera": "StereoCamera disparity",
         },
     )
 

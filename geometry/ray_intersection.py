@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .monocular import MonocularCamera
+from .monocular_camera import MonocularCamera
 from .so3 import FloatArray
 
 PARALLEL = 1e-9

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .measurement import MeasurementModel
-from .monocular import Camera, MonocularCamera
+from .measurement_model import MeasurementModel
+from .monocular_camera import Camera, MonocularCamera
 from .ray_intersection import PointStart, ray_intersections
 from .so3 import FloatArray
-from .stereo import disparity
+from .stereo_camera import disparity
 
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-8

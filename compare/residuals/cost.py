@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3, strapdown
-from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
+from fgbaseline.geometry.stereo_camera import PIXEL_COMPONENTS
 
 from .inertial_cost import inertial_squares, start_square
 from .reprojection import reprojection

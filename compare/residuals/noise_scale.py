@@ -6,7 +6,7 @@ from scipy.special import gammainc, gammaincc
 
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
+from fgbaseline.geometry.stereo_camera import PIXEL_COMPONENTS
 
 from .cost import motion_degrees, motion_squares, pixel_squares, prior_squares
 from .reprojection import reprojection

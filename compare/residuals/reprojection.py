@@ -8,7 +8,7 @@ import pandas as pd
 from fgbaseline.data import Estimate, Sequence, Status
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
+from fgbaseline.geometry.stereo_camera import PIXEL_COMPONENTS
 
 from ..statistics.descriptive import quantile, summarized, without_nan
 

@@ -5,7 +5,7 @@ import pandas as pd
 
 from fgbaseline.data import Problem
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import MONOCULAR_ROWS, STEREO_ROWS
+from fgbaseline.geometry.measurement_model import MONOCULAR_ROWS, STEREO_ROWS
 
 from ..statistics.chi_square import p_value
 

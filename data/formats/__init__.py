@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .euroc import read_euroc, write_euroc
     from .ground_truth import BodyFrame, attach_truth
-    from .kitti import read_times, write_kitti
+    from .kitti import read_kitti, read_times, write_kitti
     from .landmark_file import read_landmarks
     from .npz_writer import write_npz
     from .parsed_trajectory import ParsedTrajectory
@@ -12,15 +13,8 @@ if TYPE_CHECKING:
     from .trajectory_columns import Order
     from .trajectory_npz import write_trajectory_npz
     from .trajectory_opening import TrajectoryFormat
-    from .trajectory_reader import (
-        read_euroc,
-        read_kitti,
-        read_pose_covariances,
-        read_trajectory,
-        read_trajectory_file,
-        read_tum,
-    )
-    from .trajectory_writers import write_euroc, write_tum
+    from .trajectory_reader import read_pose_covariances, read_trajectory, read_trajectory_file
+    from .tum import read_tum, write_tum
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
@@ -28,17 +22,17 @@ else:
         __name__,
         {
             "trajectory_columns": "Order",
-            "trajectory_writers": "write_euroc write_tum",
+            "euroc": "read_euroc write_euroc",
+            "tum": "read_tum write_tum",
             "ground_truth": "BodyFrame attach_truth",
-            "kitti": "read_times write_kitti",
+            "kitti": "read_kitti read_times write_kitti",
             "landmark_file": "read_landmarks",
             "npz_writer": "write_npz",
             "parsed_trajectory": "ParsedTrajectory",
             "recording": "read",
             "trajectory_npz": "write_trajectory_npz",
             "trajectory_opening": "TrajectoryFormat",
-            "trajectory_reader": "read_euroc read_kitti read_pose_covariances read_trajectory "
-            "read_trajectory_file read_tum",
+            "trajectory_reader": "read_pose_covariances read_trajectory read_trajectory_file",
         },
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError
-from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
+from fgbaseline.geometry.stereo_camera import PIXEL_COMPONENTS
 
 from ..finding import Finding
 from ..observations import IntArray, Observations

@@ -1,42 +1,37 @@
-"""KITTI trajectories: the upper three rows of a pose in 12 numbers a line; line k is frame k."""
+"""KITTI files are read and written: poses, 12 numbers a line, where line k is frame k; and the stamps of frames."""
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError, so3
+from fgbaseline.geometry import FloatArray, InputError
 
-from ..observations import IntArray
 from ..time_unit import TimeUnit
+from ..wording import plural
 from .atomic_write import atomic_write
 from .file_errors import FilePath, reading, regular_file
 from .number_table import numbers_of, read_lines, require_width
 from .stamps import no_unit, possible_units, stamps_of
 from .trajectory_checks import require_rising, writable
+from .trajectory_reader import read_trajectory
 
 NUMBERS = 12
-ROTATION_TOLERANCE = 1e-3
-"""largest error of orthogonality of the nine numbers: files with four digits are within it"""
-EXACT = 1e-14
-"""error of orthogonality up to which rotations are left unchanged"""
 
 
-def kitti_poses(values: FloatArray, line: IntArray) -> FloatArray:
-    """Poses (n, 4, 4) of the 12 numbers (n, 12) on the lines (n,), their rotations made exact (the nearest one).
+def read_kitti(path: FilePath) -> FloatArray:
+    """Poses (n, 4, 4) `world_T_body` of a KITTI file; see `read_trajectory`."""
+    return read_trajectory(path, "kitti").world_T_body
 
-    Raises InputError naming the line of a rotation that is off by more than ROTATION_TOLERANCE.
-    """
-    poses = np.tile(np.eye(4), (len(values), 1, 1))
-    poses[:, :3, :] = values.reshape(-1, 3, 4)
-    defect = so3.orthogonality_error(poses[:, :3, :3])
-    wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
-    if len(wrong):
-        i = wrong[0]
-        raise InputError(
-            f"line {line[i]}: the first three columns are not a rotation (off by {defect[i]:.3g}, allowed "
-            f"{ROTATION_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
-        )
-    rough = defect > EXACT
-    poses[rough, :3, :3] = nearest_rotations(poses[rough, :3, :3])
-    return poses
+
+def read_extrinsic(path: FilePath) -> FloatArray:
+    """Pose (4, 4) of the left camera in the IMU frame, from one line of 12 numbers. Raises InputError."""
+    with reading(path):
+        text = regular_file(path).read_text("utf-8-sig", errors="replace")
+        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        n_words = len(lines[0].replace(",", " ").split()) if lines else 0
+        if len(lines) != 1 or n_words != 12:
+            got = plural(len(lines), "line") if len(lines) != 1 else f"a line of {n_words}"
+            raise InputError(f"expected imu_T_cam in one line of 12 numbers, got {got}")
+    poses = read_kitti(path)
+    return np.asarray(poses[0], dtype=np.float64)
 
 
 def read_times(path: FilePath, unit: TimeUnit | None = None) -> FloatArray:
@@ -73,10 +68,3 @@ def write_kitti(path: FilePath, world_T_body: FloatArray) -> None:
     lines = [" ".join(map(repr, row)) for row in poses[:, :3].reshape(-1, NUMBERS).tolist()]
     with atomic_write(path) as file:
         file.write("\n".join([*lines, ""]).encode("ascii"))
-
-
-def nearest_rotations(matrices: FloatArray) -> FloatArray:
-    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
-    U, _, Vt = np.linalg.svd(matrices)
-    result: FloatArray = U @ Vt
-    return result

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
-from fgbaseline.geometry.stereo import PIXEL_COMPONENTS
+from fgbaseline.geometry.stereo_camera import PIXEL_COMPONENTS
 
 from ..observations import IntArray, Observations
 

@@ -14,9 +14,9 @@ from .file_errors import FilePath, reading, regular_file, shown
 from .ground_truth import BodyFrame, attach_truth
 from .imu_attachment import attach_imu, read_imu
 from .imu_yaml import NO_CALIBRATION, calibration_or_assumed
+from .kitti import read_extrinsic
 from .mat_file import MatFile
 from .npz_archive import NpzArchive
-from .trajectory_reader import read_extrinsic
 from .ucsd_ece276a import NO_VELOCITIES, read_course
 from .utias import read_utias
 from .velocity_csv import read_velocity_csv

@@ -9,7 +9,11 @@ from .stamps import Stamps
 
 UNIT_TOLERANCE = 1e-3
 """largest deviation of a quaternion's length from 1: files with four decimals are within it; it is normalized here"""
-ROTATION_TOLERANCE = 1e-6
+READ_TOLERANCE = 1e-3
+"""largest error of orthogonality of a rotation matrix that is read: files with four digits are within it"""
+EXACT = 1e-14
+"""error of orthogonality up to which rotations are left unchanged"""
+WRITTEN_TOLERANCE = 1e-6
 """largest error of orthogonality of a rotation matrix to be written"""
 
 
@@ -44,6 +48,33 @@ def rotations_of_quaternions(xyzw: FloatArray, line: IntArray, expected: str) ->
     return so3.rotation_from_quaternion(xyzw)
 
 
+def poses_of_matrices(values: FloatArray, line: IntArray) -> FloatArray:
+    """Poses (n, 4, 4) of the 12 numbers (n, 12) on the lines (n,), their rotations made exact (the nearest one).
+
+    Raises InputError naming the line of a rotation that is off by more than READ_TOLERANCE.
+    """
+    poses = np.tile(np.eye(4), (len(values), 1, 1))
+    poses[:, :3, :] = values.reshape(-1, 3, 4)
+    defect = so3.orthogonality_error(poses[:, :3, :3])
+    wrong = np.flatnonzero(~(defect <= READ_TOLERANCE))
+    if len(wrong):
+        i = wrong[0]
+        raise InputError(
+            f"line {line[i]}: the first three columns are not a rotation (off by {defect[i]:.3g}, allowed "
+            f"{READ_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
+        )
+    rough = defect > EXACT
+    poses[rough, :3, :3] = nearest_rotations(poses[rough, :3, :3])
+    return poses
+
+
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
+    U, _, Vt = np.linalg.svd(matrices)
+    result: FloatArray = U @ Vt
+    return result
+
+
 def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The stamps (n,), s, and poses (n, 4, 4) that a file can hold: those that are not all NaN.
 
@@ -60,7 +91,7 @@ def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, Float
     finite = np.isfinite(poses).all(axis=(1, 2))
     defect = np.full(len(stamps), np.inf)
     defect[finite] = so3.orthogonality_error(poses[finite, :3, :3])
-    if len(stamps) and defect.max() > ROTATION_TOLERANCE:
+    if len(stamps) and defect.max() > WRITTEN_TOLERANCE:
         i = int(defect.argmax())
         raise InputError(
             f"pose {i} (at {float(stamps[i])!r} s) is not a rigid motion (rotation off by {defect[i]:.3g})"

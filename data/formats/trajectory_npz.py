@@ -15,10 +15,9 @@ from ..observations import BoolArray
 from .atomic_write import atomic_write
 from .file_errors import FilePath
 from .frame_stamps import read_stamps
-from .kitti import EXACT, ROTATION_TOLERANCE, nearest_rotations
 from .npz_archive import NpzArchive
 from .npz_member import write_member
-from .trajectory_checks import writable
+from .trajectory_checks import EXACT, READ_TOLERANCE, nearest_rotations, writable
 
 KEYS = {"t": "world_T_body", "time_stamps": "ground_truth"}
 """stamps and poses: ours, and those of a recording"""
@@ -79,7 +78,7 @@ def _rigid(key: str, poses: FloatArray, known: BoolArray) -> FloatArray:
     finite = defect == 0.0
     defect[finite] = so3.orthogonality_error(chosen[finite, :3, :3])
     defect[(chosen[:, 3] != [0.0, 0.0, 0.0, 1.0]).any(axis=1)] = np.inf
-    wrong = np.flatnonzero(~(defect <= ROTATION_TOLERANCE))
+    wrong = np.flatnonzero(~(defect <= READ_TOLERANCE))
     if len(wrong):
         k = int(np.flatnonzero(known)[wrong[0]])
         raise InputError(

@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry import FloatArray
 
 from ..time_unit import TimeUnit
 from ..trajectory import Trajectory
-from ..wording import plural
 from .bag_trajectory import read_bag_trajectory
-from .file_errors import FilePath, reading, regular_file
+from .file_errors import FilePath, reading
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .stamps import possible_units, stamps_of
 from .trajectory_columns import Order
@@ -59,42 +58,6 @@ def read_pose_covariances(path: FilePath) -> FloatArray | None:
     They are those of the right perturbation [v, w], m and rad, one for each pose that `read_trajectory` returns.
     """
     return read_trajectory_file(path).covariance()
-
-
-def read_tum(path: FilePath) -> tuple[FloatArray, FloatArray]:
-    """Time stamps (n,), s, unchanged and strictly rising, and poses (n, 4, 4) `world_T_body` of a TUM file.
-
-    Raises as `read_trajectory`.
-    """
-    read = read_trajectory_file(path, "tum").trajectory(TimeUnit.S, "xyzw")
-    return read.t, read.world_T_body
-
-
-def read_euroc(path: FilePath) -> tuple[FloatArray, FloatArray]:
-    """Time stamps (n,), s, strictly rising, and poses (n, 4, 4) `world_T_body` of a EuRoC CSV.
-
-    Raises as `read_trajectory`, and for stamps that are no whole nanoseconds.
-    """
-    read = read_trajectory(path, "euroc")
-    return read.t, read.world_T_body
-
-
-def read_kitti(path: FilePath) -> FloatArray:
-    """Poses (n, 4, 4) `world_T_body` of a KITTI file; see `read_trajectory`."""
-    return read_trajectory(path, "kitti").world_T_body
-
-
-def read_extrinsic(path: FilePath) -> FloatArray:
-    """Pose (4, 4) of the left camera in the IMU frame, from one line of 12 numbers. Raises InputError."""
-    with reading(path):
-        text = regular_file(path).read_text("utf-8-sig", errors="replace")
-        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-        n_words = len(lines[0].replace(",", " ").split()) if lines else 0
-        if len(lines) != 1 or n_words != 12:
-            got = plural(len(lines), "line") if len(lines) != 1 else f"a line of {n_words}"
-            raise InputError(f"expected imu_T_cam in one line of 12 numbers, got {got}")
-    poses = read_kitti(path)
-    return np.asarray(poses[0], dtype=np.float64)
 
 
 def read_trajectory_file(

@@ -7,12 +7,11 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..observations import BoolArray, IntArray
-from .kitti import kitti_poses
 from .number_table import Lines
 from .parsed_trajectory import ParsedTrajectory
 from .quaternion_order import xyzw
 from .stamps import equal_stamps, possible_units, stamps_of
-from .trajectory_checks import require_rising, rotations_of_quaternions
+from .trajectory_checks import poses_of_matrices, require_rising, rotations_of_quaternions
 from .trajectory_columns import METERS, Columns
 from .trajectory_opening import TrajectoryText
 
@@ -49,7 +48,7 @@ def parse_text(text: TrajectoryText) -> ParsedTrajectory:
         pose, line = pose[kept], line[kept]
         file = replace(file, line=line)
     if columns.matrix:
-        poses = kitti_poses(pose[:, :12], line)
+        poses = poses_of_matrices(pose[:, :12], line)
         position, rotation = poses[:, :3, 3], poses[:, :3, :3]
         up = _up_of_camera(position, rotation) if file.up is None else file.up
         return replace(file, position=position, rotation=rotation, up=up)

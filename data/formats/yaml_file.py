@@ -8,7 +8,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from .field_checks import extrinsic
 from .file_errors import FilePath, regular_file
-from .kitti import nearest_rotations
+from .trajectory_checks import nearest_rotations
 
 MOST_BYTES = 2**20
 FEW_DIGITS = 1e-3

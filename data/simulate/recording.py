@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
-from fgbaseline.geometry.monocular import left_of
+from fgbaseline.geometry.monocular_camera import left_of
 
 from ..observations import BoolArray, IntArray, Observations
 from ..sequence import Sequence, Truth

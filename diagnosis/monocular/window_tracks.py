@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
-from fgbaseline.geometry.measurement import predict
+from fgbaseline.geometry.linearization import predict
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..inertial_initialization.structureless_factors import KeyframeTracks

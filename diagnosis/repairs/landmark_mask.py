@@ -7,7 +7,7 @@ from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 PIECE = 8

@@ -11,7 +11,7 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.problem.documented import most_observed
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 
 GATE_RANGE = (3.0, 12.0)
 """px"""

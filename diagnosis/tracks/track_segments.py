@@ -8,7 +8,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 
 MIN_DISPARITY = 1.0
 """px"""

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..odometry.stereo_odometry import Odometry

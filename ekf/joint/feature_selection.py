@@ -9,7 +9,7 @@ import numpy as np
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import STEREO_ROWS
+from fgbaseline.geometry.measurement_model import STEREO_ROWS
 
 CELL = 64.0
 """Edge of the square image cells, px."""

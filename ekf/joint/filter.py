@@ -8,7 +8,8 @@ from fgbaseline.data.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import back_projected, predict
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import back_projected
 
 from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features

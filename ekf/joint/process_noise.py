@@ -13,7 +13,7 @@ import numpy as np
 
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import mahalanobis_squared
+from fgbaseline.geometry.measurement_model import mahalanobis_squared
 
 from ..motion_model import POSE, PredictedState
 from .gating import GatedObservations, chi2_quantile

@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray
-from fgbaseline.geometry.measurement import mahalanobis_squared
+from fgbaseline.geometry.measurement_model import mahalanobis_squared
 
 from ..motion_model import POSE
 

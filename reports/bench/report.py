@@ -18,7 +18,7 @@ from ..html.page import Grid, Note, Page, Section, folded, pictures
 from ..html.rendering import render_page
 from ..phrases.bench import FIGURES, TABLE, sentences
 from ..results import bench as statistics
-from ..results.bench import ANSWERED, COSTS, METRICS, OF_THE_RUN, Results
+from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Results
 from ..results.json_files import INFINITE, at
 from ..results.reader import RunFolder
 from ..tables.bench import main_table, ranking_tables, runs_table
@@ -174,12 +174,12 @@ def _planned(one: Planned, *found: object) -> dict[str, Any]:
 
 
 def _row(name: str, estimator: Mapping[str, Any]) -> dict[str, Any]:
-    values = {metric.name: _at(estimator, metric.path) for metric in METRICS}
+    values = {metric.name: _at(estimator, metric.path) for metric in BENCH_METRICS}
     return {"estimator": name, "status": estimator["status"], "reason": estimator["reason"], **values}
 
 
 def _failed(one: Planned, failure: str) -> list[dict[str, Any]]:
-    nothing = {"status": "failed", "reason": failure, **{metric.name: np.nan for metric in METRICS}}
+    nothing = {"status": "failed", "reason": failure, **{metric.name: np.nan for metric in BENCH_METRICS}}
     return [{**_planned(one), "estimator": name, **nothing} for name in one.job.estimators]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
-from fgbaseline.compare.trajectory_comparison.metrics import PairedEntries, compare_paired, pair_entries
+from fgbaseline.compare.trajectory_comparison.computation import PairedEntries, compare_paired, pair_entries
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.dataframes import as_cell_value

@@ -24,7 +24,7 @@ from .style import SCREEN, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results
-    from fgbaseline.reports.results.metric import Metric
+    from fgbaseline.reports.results.metric_record import Metric
 
 MARKERS = "osD^vP*Xh<>p"
 MOST_CASES = 12

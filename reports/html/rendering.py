@@ -19,7 +19,7 @@ from markupsafe import Markup
 from ..figures.palette import DASHES, TRUTH, dark_matrix, on_dark
 from ..formatting import unbroken
 from ..phrases.evidence import FIRST
-from ..results.metric import TERMS, WORDS
+from ..results.glossary import TERMS, WORDS
 from ..results.provenance import creation
 from ..tables.table import Table
 from .page import Block, Folded, Grid, Page

@@ -9,8 +9,8 @@ from fgbaseline.compare.estimate_comparison import SAME_GRAPH
 from fgbaseline.data.wording import plural
 
 from ..formatting import interval, listed, number
-from ..results.bench import ANSWERED, METRICS, Results, consistency, judge, overall, rankings, records
-from ..results.metric import Metric
+from ..results.bench import ANSWERED, BENCH_METRICS, Results, consistency, judge, overall, rankings, records
+from ..results.metric_record import Metric
 from .evidence import MEANING
 
 MOST_CASES = 10
@@ -70,7 +70,7 @@ def _best(results: Results) -> list[str]:
         return []
     text = []
     for case, table in of_case.items():
-        metric = next(metric for metric in METRICS if (table["metric"] == metric.name).any())
+        metric = next(metric for metric in BENCH_METRICS if (table["metric"] == metric.name).any())
         reference = results.references.get(case)
         unranked = frozenset(SAME_GRAPH) - {reference} if reference in SAME_GRAPH else frozenset()
         text.append(winner(case, table[table["metric"] == metric.name], metric, unranked))

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison
-from fgbaseline.compare.trajectory_comparison.metrics import TILT
+from fgbaseline.compare.trajectory_comparison.computation import TILT
 from fgbaseline.compare.trajectory_comparison.sample_sizes import samples
 
 from ..formatting import counted, grouped, listed, number, per_cent

@@ -27,7 +27,7 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import counted, distance, listed, number, per_cent, resolved
-from ..results.metrics import ate_resolution
+from ..results.metric_registry import ate_resolution
 from .evidence import causal_estimate, no_difference, overconfidence_bound
 
 IN_FULL = 3

@@ -10,7 +10,7 @@ from fgbaseline.data.wording import plural
 from ..formatting import meters, number, per_cent
 from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures
 from ..html.rendering import render_page
-from ..results.metric import INERTIAL_TERMS, TERMS
+from ..results.glossary import INERTIAL_TERMS, TERMS
 from ..tables.table import Column, Row, Table, numbers, words
 from .claims import Claim, Verdict
 from .experiments import Outcome, Study

@@ -14,14 +14,13 @@ from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
 from ..bench.job import Planned
-from .metric import Metric
-from .metrics import METRICS as EVERY
-from .metrics import PERCENT
+from .metric_record import Metric
+from .metric_registry import METRICS, PERCENT
 
 OF_THE_RUN = ("run", "case", "sequence", "seed", "reference", "trust", "frames", "features", "observations")
 COSTS = ("run", "case", "estimator", "frames", "observations", "seconds", "memory_mb")
 ANSWERED = ("ok", "recovered")
-METRICS = tuple(metric for metric in EVERY if metric.name)
+BENCH_METRICS = tuple(metric for metric in METRICS if metric.name)
 """those that a bench has a column for in its CSV tables"""
 
 
@@ -80,7 +79,7 @@ def cases(results: Results) -> pd.DataFrame:
             "failed": int((~group["status"].isin(ANSWERED)).sum()),
             "trust": _least(group["trust"]),
         }
-        for metric in METRICS:
+        for metric in BENCH_METRICS:
             mean = compare.mean_interval(group[metric.name].to_numpy(dtype=np.float64))
             low, high = max(mean.low, 0.0), min(mean.high, 1.0 if metric.scale == PERCENT else np.inf)
             row |= {metric.name: mean.value, f"{metric.name}_low": low, f"{metric.name}_high": high}
@@ -94,7 +93,7 @@ def rankings(results: Results) -> pd.DataFrame:
     """Estimators ranked in every case by each metric of accuracy: see `compare.monte_carlo_ranking`."""
     parts = []
     for case in results.cases:
-        for metric in (metric for metric in METRICS if metric.ranked):
+        for metric in (metric for metric in BENCH_METRICS if metric.ranked):
             of_case = results.runs[results.runs["case"] == case]
             ranked = compare.monte_carlo_ranking(_wide(of_case, metric.name, results.estimators)).reset_index()
             if len(ranked):
@@ -156,7 +155,7 @@ def costs(results: Results) -> pd.DataFrame:
 
 def judge(results: Results) -> Metric | None:
     """Metric of accuracy: ATE, else the held-out error, else none."""
-    ranked = (metric for metric in METRICS if metric.ranked)
+    ranked = (metric for metric in BENCH_METRICS if metric.ranked)
     return next((metric for metric in ranked if results.runs[metric.name].notna().any()), None)
 
 

@@ -27,10 +27,11 @@ from .evidence import (
     evidence_notes,
     summarize_evidence,
 )
+from .glossary import TERMS
 from .inertial import QuantityDivergence, QuantityError, StateNees, inertial_notes, summarize_inertial
 from .json_files import INFINITE, nulls
-from .metric import TERMS, Metric
-from .metrics import MEASURED, NOT_MEASURED, measured
+from .metric_record import Metric
+from .metric_registry import MEASURED, NOT_MEASURED, measured
 from .parts import Divergence, Number, Part, PoseSigma, Reprojection, Spread
 
 

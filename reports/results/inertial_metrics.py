@@ -12,22 +12,22 @@ from fgbaseline.compare import Align, Alignment
 from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.geometry.strapdown import BLOCKS
 
-from . import metric as group
-from .metric import EVIDENCE, MAIN, TERMINAL, Metric
+from . import glossary
+from .metric_record import EVIDENCE, MAIN, TERMINAL, Metric
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
 
 LOWER, PERCENT = Better.LOWER, 100.0
-UNITS = {group.VELOCITY: "m/s", group.GYROSCOPE_BIAS: "rad/s", group.ACCELEROMETER_BIAS: "m/s^2"}
+UNITS = {glossary.VELOCITY: "m/s", glossary.GYROSCOPE_BIAS: "rad/s", glossary.ACCELEROMETER_BIAS: "m/s^2"}
 """quantity -> unit; the key of a quantity has _ in place of the space"""
 NO_SCALE = "one camera with ground truth has it"
 
 
 def _of_quantity(quantity: str, unit: str) -> tuple[Metric, ...]:
     key = quantity.replace(" ", "_")
-    aligned = ", aligned" if quantity == group.VELOCITY else ""
-    unaligned = "velocity_unaligned" if quantity == group.VELOCITY else key
+    aligned = ", aligned" if quantity == glossary.VELOCITY else ""
+    unaligned = "velocity_unaligned" if quantity == glossary.VELOCITY else key
     return (
         Metric((key, "rmse"), quantity, f"RMSE{aligned}", unit, LOWER, MAIN | TERMINAL),
         *([Metric((unaligned, "rmse"), quantity, "RMSE, unaligned", unit, LOWER, EVIDENCE)] if aligned else []),
@@ -55,7 +55,7 @@ def _rmse(kind: Align, name: str) -> Metric:
         found = _alignment(run, result, kind)
         return nan if found is None else found[1]
 
-    return Metric((f"ate_{kind}",), group.ATE, f"RMSE, {name}", "m", LOWER, MAIN, absent=NO_SCALE, measure=measure)
+    return Metric((f"ate_{kind}",), glossary.ATE, f"RMSE, {name}", "m", LOWER, MAIN, absent=NO_SCALE, measure=measure)
 
 
 def _scale_error(run: "Run", result: "Result") -> float:
@@ -66,16 +66,16 @@ def _scale_error(run: "Run", result: "Result") -> float:
 VELOCITY_AND_BIASES = tuple(metric for quantity, unit in UNITS.items() for metric in _of_quantity(quantity, unit))
 STATE_NEES = Metric(
     ("nees_state", "median"),
-    group.CONSISTENCY,
+    glossary.CONSISTENCY,
     "NEES of 15",
     tables=MAIN | TERMINAL,
-    term=group.STATE_NEES,
+    term=glossary.STATE_NEES,
     brief="NEES of 15",
 )
 BLOCK_NEES = (
-    Metric(("nees_state", "mean"), group.STATE_NEES, "mean", tables=EVIDENCE),
+    Metric(("nees_state", "mean"), glossary.STATE_NEES, "mean", tables=EVIDENCE),
     *(
-        Metric(("nees_state", block, "mean"), group.STATE_NEES, f"mean, {block.replace('_', ' ')}", tables=EVIDENCE)
+        Metric(("nees_state", block, "mean"), glossary.STATE_NEES, f"mean, {block.replace('_', ' ')}", tables=EVIDENCE)
         for block in BLOCKS
     ),
 )
@@ -84,7 +84,7 @@ SCALE = (
     _rmse(Align.SIM3, "Sim(3)"),
     Metric(
         ("scale_error",),
-        group.SCALE_ERROR,
+        glossary.SCALE_ERROR,
         "by Sim(3)",
         "%",
         tables=MAIN | TERMINAL,

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all, reference_among
+from fgbaseline.compare.trajectory_comparison.computation import matched_poses
 from fgbaseline.compare.trajectory_comparison.conventions import Source, resolve
-from fgbaseline.compare.trajectory_comparison.metrics import matched_poses
 from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory, find_estimator

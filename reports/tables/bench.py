@@ -9,9 +9,10 @@ import pandas as pd
 from fgbaseline.compare.acceptance_limits import Better
 
 from ..formatting import counted, interval, number
-from ..results.bench import METRICS, Results, cases, consistency, costs, overall, rankings, records
-from ..results.metric import ATE, BENCH, DIVERGENCE, HELD_OUT, NEES, Value
-from ..results.metrics import shown_in
+from ..results.bench import BENCH_METRICS, Results, cases, consistency, costs, overall, rankings, records
+from ..results.glossary import ATE, DIVERGENCE, HELD_OUT, NEES
+from ..results.metric_record import BENCH, Value
+from ..results.metric_registry import shown_in
 from .table import Cell, Column, Row, Table, mark_best, numbers, words
 
 Key: TypeAlias = tuple[str, str]
@@ -84,13 +85,13 @@ def _cells(better: Better, values: Mapping[Key, Value], *, above_zero: bool = Fa
 def ranking_tables(results: Results) -> Iterator[Table]:
     """A ranking for each metric of accuracy, and the mean ranks over all cases."""
     ranked = records(rankings(results))
-    for metric in METRICS:
+    for metric in BENCH_METRICS:
         rows = tuple(_ranked(row) for row in ranked if row["metric"] == metric.name)
         if rows:
             names = (*numbers("rank"), *words("estimator"), *numbers("runs"))
             columns = (*names, Column.flat(metric), *numbers("above the first"), *words(""))
             yield Table(columns, rows, name="case", title=f"Ranked by {metric.heading}")
-    headings = {metric.name: metric.heading for metric in METRICS}
+    headings = {metric.name: metric.heading for metric in BENCH_METRICS}
     rows = tuple(
         Row.of(
             row["estimator"],

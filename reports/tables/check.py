@@ -6,7 +6,7 @@ from fgbaseline.compare.acceptance_limits import Outcome
 
 from ..phrases.check import bound, change, number
 from ..results.check import Checked, Line
-from ..results.metrics import METRICS
+from ..results.metric_registry import METRICS
 from .table import Row, Table, numbers, words
 
 NUMBERS = ("value", "bound", "margin", "baseline", "change")

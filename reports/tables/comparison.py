@@ -10,8 +10,9 @@ from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison
 
 from ..formatting import resolution, resolved
-from ..results.metric import COMPARISON, MAP, SEGMENTS, Metric, Value, value_at
-from ..results.metrics import over_deltas, shown_in
+from ..results.glossary import MAP, SEGMENTS
+from ..results.metric_record import COMPARISON, Metric, Value, value_at
+from ..results.metric_registry import over_deltas, shown_in
 from .table import Cell, Column, Row, Table, mark_best
 
 if TYPE_CHECKING:

@@ -11,9 +11,10 @@ import pandas as pd
 from fgbaseline.compare.estimate_comparison import Run, same_frames
 
 from ..formatting import DASH, INFINITY, RESOLUTION, counted, listed, number
+from ..results.glossary import ATE, DIVERGENCE, MAP
 from ..results.json_files import INFINITE, at, leaves
-from ..results.metric import ATE, DIVERGENCE, EVIDENCE, MAIN, MAP, TERMINAL, Metric
-from ..results.metrics import ate_resolution, shown_in
+from ..results.metric_record import EVIDENCE, MAIN, TERMINAL, Metric
+from ..results.metric_registry import ate_resolution, shown_in
 from ..results.reader import DIVERGENCES
 from ..results.run import Summary
 from .table import Cell, Column, Row, Table, best

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Self
 from fgbaseline.compare.acceptance_limits import Better
 
 from ..formatting import DASH, interval, md, tex
-from ..results.metric import Metric, Value
+from ..results.metric_record import Metric, Value
 
 UNWRAPPED = 160
 """columns of a table where no terminal says how many there are"""

@@ -1,6 +1,6 @@
 """GTSAM factors of a problem, with the likelihood of the filters.
 
-`StereoPoint2` has the three rows (uL, uR, v) of `geometry.measurement`, with their variances; one camera has (uL, v).
+`StereoPoint2` has the rows (uL, uR, v) of `geometry.measurement_model`, with their variances; one camera has (uL, v).
 """
 
 from collections.abc import Iterable

@@ -40,7 +40,7 @@ def refine_predicted_pose(
 
 
 class _KnownLandmarks:
-    """Observations of known landmarks in one frame; coordinates are the first axis, as in `geometry.stereo`."""
+    """Observations of known landmarks in one frame; coordinates are the first axis, as in `geometry.stereo_camera`."""
 
     def __init__(self, problem: Problem, points: FloatArray, pixel: FloatArray) -> None:
         self._points, self._model = np.ascontiguousarray(points.T), problem.measurement

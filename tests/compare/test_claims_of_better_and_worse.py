@@ -15,7 +15,7 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences, is_claimed
-from fgbaseline.reports.results.bench import METRICS
+from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table
 
 from ..builders.runs import FRAMES, answer, as_dict, run_of, scene
@@ -130,7 +130,7 @@ def test_values_with_the_same_digits_are_best_together_and_the_same_graph_is_not
     }
 
 
-ATE = next(metric for metric in METRICS if metric.name == "ate")
+ATE = next(metric for metric in BENCH_METRICS if metric.name == "ate")
 
 
 def ranked(**columns: list[float]) -> pd.DataFrame:

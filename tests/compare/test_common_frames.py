@@ -19,7 +19,7 @@ from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.bench import winner
 from fgbaseline.reports.phrases.position_errors import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
-from fgbaseline.reports.results.bench import METRICS
+from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table
 from fgbaseline.reports.tables.table import latex, markdown
 
@@ -189,7 +189,7 @@ def test_a_bench_reports_estimators_with_fewer_answers_and_a_lower_error_than_th
     said = winner(
         "town",
         figures.monte_carlo_ranking(errors).reset_index(),
-        next(m for m in METRICS if m.name == "ate"),
+        next(m for m in BENCH_METRICS if m.name == "ate"),
         frozenset(),
     )
     assert said.startswith("town: ATE sound ")

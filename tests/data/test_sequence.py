@@ -8,7 +8,7 @@ import pytest
 
 from fgbaseline.data import Observations, Sequence, Truth
 from fgbaseline.geometry import InputError, StereoCamera
-from fgbaseline.geometry.monocular import left_of
+from fgbaseline.geometry.monocular_camera import left_of
 
 from ..builders.synthetic import Scene
 

@@ -21,7 +21,7 @@ from fgbaseline.data.tracking.sources.image_files import EightBits
 from fgbaseline.data.tracking.track_file import TrackFile
 from fgbaseline.diagnosis import diagnose, track_statistics
 from fgbaseline.geometry import FloatArray, InputError, MeasurementModel, StereoCamera, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 from ..builders.rendered import CAMERA, IMU_T_CAM, Room

@@ -30,7 +30,7 @@ from fgbaseline.diagnosis.window_adjustment.residuals import (
     pixel_terms,
 )
 from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 
 from ..builders.synthetic import Scene
 

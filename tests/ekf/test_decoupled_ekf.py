@@ -16,7 +16,8 @@ from fgbaseline.ekf.decoupled_ekf import _standard_form_failure
 from fgbaseline.ekf.landmark_mapping import map_landmarks
 from fgbaseline.ekf.landmark_update import IndependentLandmarks
 from fgbaseline.geometry import FloatArray, HuberKernel, se3
-from fgbaseline.geometry.measurement import predict, three_rows
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import three_rows
 
 from ..builders.synthetic import Scene, drive, first_innovation, matched, plain_problem, position_errors
 

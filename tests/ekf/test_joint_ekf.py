@@ -25,7 +25,8 @@ from fgbaseline.ekf.joint.landmark_representation import (
 from fgbaseline.ekf.joint.process_noise import MAX_REJECTED, inflation_factor
 from fgbaseline.ekf.joint.update import Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
 from fgbaseline.geometry import FgbaselineError, FloatArray, MeasurementModel, se3
-from fgbaseline.geometry.measurement import ROW_VARIANCE, back_projected, predict, three_rows
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import ROW_VARIANCE, back_projected, three_rows
 
 from ..builders.synthetic import Scene, drive, matched, plain_problem, position_errors, with_pixels
 

@@ -6,7 +6,7 @@ import pytest
 from fgbaseline.ekf.joint.landmark_representation import LandmarkRepresentation, chart, homogeneous
 from fgbaseline.ekf.joint.second_order import second_order
 from fgbaseline.geometry import FloatArray, MonocularCamera, se3
-from fgbaseline.geometry.measurement import predict
+from fgbaseline.geometry.linearization import predict
 
 CAMERA = MonocularCamera(450.0, 460.0, 320.0, 240.0)
 STEP = 1e-4

@@ -15,8 +15,9 @@ from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.update import Innovation, StackedJacobian
 from fgbaseline.ekf.pose_update import pose_innovation
 from fgbaseline.geometry import se3
-from fgbaseline.geometry.measurement import mahalanobis_squared, predict, three_rows
-from fgbaseline.geometry.stereo import PIXEL_ROWS
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import mahalanobis_squared, three_rows
+from fgbaseline.geometry.stereo_camera import PIXEL_ROWS
 from fgbaseline.geometry.triangulation import triangulate_tracks
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.factors import FactorBuilder

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline.geometry import FgbaselineError, FloatArray, HuberKernel, MeasurementModel, StereoCamera, se3
-from fgbaseline.geometry.measurement import mahalanobis_squared, predict
-from fgbaseline.geometry.monocular import left_of, require_stereo
+from fgbaseline.geometry.linearization import predict
+from fgbaseline.geometry.measurement_model import mahalanobis_squared
+from fgbaseline.geometry.monocular_camera import left_of, require_stereo
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
 PAIR = StereoCamera(fu=552.6, fv=561.3, cu=682.1, cv=238.8, baseline=0.6)

@@ -16,7 +16,7 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
-from fgbaseline.geometry.measurement import Prediction
+from fgbaseline.geometry.linearization import Prediction
 from fgbaseline.reports.results.json_files import SUMMARY
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.problem import RunSettings, build_problem

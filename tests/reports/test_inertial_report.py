@@ -27,8 +27,8 @@ from fgbaseline.reports.figures.style import in_style
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.results.estimator import EstimatorSummary, InertialEstimatorSummary
-from fgbaseline.reports.results.metric import INERTIAL_TERMS
-from fgbaseline.reports.results.metrics import METRICS
+from fgbaseline.reports.results.glossary import INERTIAL_TERMS
+from fgbaseline.reports.results.metric_registry import METRICS
 from fgbaseline.reports.results.reader import INERTIAL, NOT_INERTIAL, read_folder
 from fgbaseline.reports.run.folder import write_numbers
 from fgbaseline.reports.tables.run import evidence_table, main_table, terminal_table

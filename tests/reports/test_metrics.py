@@ -9,10 +9,11 @@ import pytest
 
 from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.reports.html.run_page import render
-from fgbaseline.reports.results import metrics
+from fgbaseline.reports.results import metric_registry
 from fgbaseline.reports.results.comparison import Summary as Comparison
-from fgbaseline.reports.results.metric import COMPARISON, DELTA, MAIN, TERMINAL, TERMS, Metric
-from fgbaseline.reports.results.metrics import METRICS
+from fgbaseline.reports.results.glossary import DELTA, TERMS
+from fgbaseline.reports.results.metric_record import COMPARISON, MAIN, TERMINAL, Metric
+from fgbaseline.reports.results.metric_registry import METRICS
 from fgbaseline.reports.results.run import Summary
 from fgbaseline.reports.tables.run import evidence_table, main_table, terminal_table
 
@@ -54,7 +55,7 @@ def test_a_path_that_leads_nowhere_is_noticed() -> None:
 def test_one_record_adds_a_metric_to_page_and_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     added = Metric(("divergence", "p95"), "divergence", "95th percentile", "m", Better.LOWER, MAIN | TERMINAL)
     added = replace(added, brief="divergence, 95th percentile")
-    monkeypatch.setattr(metrics, "METRICS", (*METRICS, added))
+    monkeypatch.setattr(metric_registry, "METRICS", (*METRICS, added))
     run = standard_run()
     summary = as_dict(run)
     value = added.value(summary["estimators"]["ekf"]).text

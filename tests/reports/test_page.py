@@ -22,8 +22,8 @@ from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
-from fgbaseline.reports.results.metric import MAIN
-from fgbaseline.reports.results.metrics import shown_in
+from fgbaseline.reports.results.metric_record import MAIN
+from fgbaseline.reports.results.metric_registry import shown_in
 from fgbaseline.reports.run.folder import _write_tables
 from fgbaseline.reports.tables.run import evidence_table, main_table
 from fgbaseline.reports.tables.run_details import MAX_EVENTS, events_tables, long_tables

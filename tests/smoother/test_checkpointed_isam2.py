@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key

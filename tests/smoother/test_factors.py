@@ -12,7 +12,7 @@ from fgbaseline import data
 from fgbaseline.data import HuberKernel, Problem
 from fgbaseline.data.velocity_increments import dead_reckoned_path
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.smoother.graph.factors import FactorBuilder
 from fgbaseline.smoother.graph.gtsam_conversions import reorder_tangent
 from fgbaseline.smoother.graph.keys import landmark_key, pose_key

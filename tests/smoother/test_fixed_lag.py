@@ -9,7 +9,7 @@ import pytest
 from fgbaseline import smoother
 from fgbaseline.data import HuberKernel, Observations, Status
 from fgbaseline.geometry import FloatArray, se3
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.smoother import FixedLagSettings
 from fgbaseline.smoother.errors import IndeterminateSystemError
 from fgbaseline.smoother.fixed_lag.checkpointed_fixed_lag import CheckpointedFixedLag

@@ -11,7 +11,7 @@ from fgbaseline import smoother
 from fgbaseline.data import Estimate, Problem, Status
 from fgbaseline.data.estimate import EventKind
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown
-from fgbaseline.geometry.measurement import three_rows
+from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.smoother import FixedLagSettings, ISAM2Settings
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.errors import IndeterminateSystemError

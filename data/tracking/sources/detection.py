@@ -11,7 +11,7 @@ from ...formats.bag_file import METADATA, STORAGE, is_bag
 from ...formats.file_errors import reading, shown
 from ...formats.imu_attachment import read_imu
 from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
-from ...formats.trajectory_reader import read_extrinsic
+from ...formats.kitti import read_extrinsic
 from ...formats.velocity_csv import read_velocity_csv
 from .bags import open_bag
 from .euroc import open_euroc

@@ -16,7 +16,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ...formats.file_errors import reading, regular_file, shown
-from ...formats.kitti import nearest_rotations
+from ...formats.trajectory_checks import nearest_rotations
 from ...observations import IntArray
 from ...sequence import Truth
 from ...wording import plural

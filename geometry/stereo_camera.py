@@ -115,7 +115,7 @@ class StereoCamera:
     def jacobian(self, points: ArrayLike) -> FloatArray:
         """Jacobian (..., 4, 3) of `project` w.r.t. points (..., 3): K_s dpi/dq in equations 11 and 13.
 
-        It is for user-written filters (docs/examples/my-filter.md); the estimators linearize by `measurement.predict`.
+        It is for user-written filters (docs/examples/my-filter.md); estimators use `linearization.predict`.
         """
         q = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         identity = np.eye(3).reshape(3, 3, *([1] * (q.ndim - 1)))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .errors import FgbaselineError
 from .so3 import FloatArray
-from .stereo import MIN_DEPTH, PredictedRows, StereoCamera
+from .stereo_camera import MIN_DEPTH, PredictedRows, StereoCamera
 
 UNIT_LENGTH = 0.1
 """m, in place of a baseline, as the unit of tolerances: the baseline of a small stereo rig"""

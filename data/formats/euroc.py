@@ -1,4 +1,4 @@
-"""Writes trajectories as TUM (`timestamp tx ty tz qx qy qz qw` a line, s and m) or EuRoC CSV (ns, q w x y z)."""
+"""EuRoC trajectories are read and written: CSV of stamps (ns), positions (m) and quaternions w x y z."""
 
 from itertools import pairwise
 
@@ -9,28 +9,19 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .atomic_write import atomic_write
 from .file_errors import FilePath
 from .trajectory_checks import writable
-
-
-def write_tum(path: FilePath, t: FloatArray, world_T_imu: FloatArray, up: FloatArray | None = None) -> None:
-    """Writes stamps (n,), s, and poses (n, 4, 4) as a TUM file, all or nothing; all-NaN poses are left out.
-
-    `up` (3,), the unit vector that points up in the world, is written as the comment `# up x y z`, which a comparison
-    reads. `read_tum` gives the stamps and positions back bit by bit, the rotations to 1e-14. Raises InputError when a
-    stamp does not rise, a pose is no rigid motion, or the file cannot be written.
-    """
-    stamps, poses = writable(t, world_T_imu)
-    rows = np.concatenate([stamps[:, None], poses[:, :3, 3], so3.quaternion_xyzw(poses[:, :3, :3])], axis=1)
-    lines = [" ".join(map(repr, row)) for row in rows.tolist()]
-    with atomic_write(path) as file:
-        file.write("\n".join(["# timestamp [s] tx ty tz qx qy qz qw", *_up_comment(up), *lines, ""]).encode("ascii"))
-
-
-def _up_comment(up: FloatArray | None) -> list[str]:
-    return [] if up is None else [" ".join(["# up", *map(repr, np.asarray(up, dtype=np.float64).tolist())])]
-
+from .trajectory_reader import read_trajectory
 
 HEADER = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []"
 NANOSECONDS = 10**9
+
+
+def read_euroc(path: FilePath) -> tuple[FloatArray, FloatArray]:
+    """Time stamps (n,), s, strictly rising, and poses (n, 4, 4) `world_T_body` of a EuRoC CSV.
+
+    Raises as `read_trajectory`, and for stamps that are no whole nanoseconds.
+    """
+    read = read_trajectory(path, "euroc")
+    return read.t, read.world_T_body
 
 
 def write_euroc(path: FilePath, t: FloatArray, world_T_body: FloatArray) -> None:

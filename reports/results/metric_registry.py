@@ -1,7 +1,7 @@
 """Definitions of the metrics: where each stands in the results, and how tables, files and glossary show it.
 
 One `Metric` in `METRICS` adds a value to every table that its `tables` name. With `measure` it is a new key of an
-estimator in `summary.json` or `comparison.json` as well. The glossary's terms stand beside the record (`metric.TERMS`).
+estimator in `summary.json` or `comparison.json` as well. `metric_record` has the record, `glossary` the terms.
 """
 
 from collections.abc import Iterable
@@ -16,9 +16,9 @@ from fgbaseline.compare.acceptance_limits import Better
 from fgbaseline.compare.trajectory_comparison.decimal_resolution import truth_resolution
 
 from ..formatting import RESOLUTION
-from . import metric as group
+from . import glossary
 from .inertial_metrics import BLOCK_NEES, SCALE, STATE_NEES, VELOCITY_AND_BIASES
-from .metric import BENCH, COMPARISON, EVIDENCE, MAIN, TERMINAL, Metric, Tables
+from .metric_record import BENCH, COMPARISON, EVIDENCE, MAIN, TERMINAL, Metric, Tables
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Result, Run
@@ -50,11 +50,11 @@ METRICS = (
         uneven_only=True,
         measure=_coverage,
     ),
-    Metric(("ate", "rmse"), group.ATE, "RMSE, aligned", "m", LOWER, MAIN | TERMINAL, brief="ATE, aligned"),
-    Metric(("ate_unaligned", "rmse"), group.ATE, "RMSE, unaligned", "m", LOWER, MAIN | TERMINAL, brief="unaligned"),
+    Metric(("ate", "rmse"), glossary.ATE, "RMSE, aligned", "m", LOWER, MAIN | TERMINAL, brief="ATE, aligned"),
+    Metric(("ate_unaligned", "rmse"), glossary.ATE, "RMSE, unaligned", "m", LOWER, MAIN | TERMINAL, brief="unaligned"),
     Metric(
         ("ate_common", "rmse"),
-        group.ATE,
+        glossary.ATE,
         COMMON,
         "m",
         LOWER,
@@ -64,21 +64,21 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("ate", "max"), group.ATE, "max, aligned", "m", LOWER, EVIDENCE),
-    Metric(("ate_unaligned", "final"), group.ATE, "final, unaligned", "m", LOWER, EVIDENCE),
-    Metric(("translation", "rmse"), group.ATE, "RMSE", "m", LOWER, COMPARISON),
-    Metric(("common", "rmse"), group.ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
-    Metric(("behind",), group.ATE, "RMSE above the smallest", "m", tables=COMPARISON),
-    Metric(("translation", "mean"), group.ATE, "mean", "m", LOWER, COMPARISON),
-    Metric(("translation", "median"), group.ATE, "median", "m", LOWER, COMPARISON),
-    Metric(("translation", "std"), group.ATE, "standard deviation", "m", tables=COMPARISON),
-    Metric(("translation", "min"), group.ATE, "min", "m", tables=COMPARISON),
-    Metric(("translation", "max"), group.ATE, "max", "m", LOWER, COMPARISON),
-    Metric(("rotation_deg", "rmse"), group.ATE, "rotation RMSE", "°", LOWER, COMPARISON),
-    Metric(("divergence", "rmse"), group.DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
+    Metric(("ate", "max"), glossary.ATE, "max, aligned", "m", LOWER, EVIDENCE),
+    Metric(("ate_unaligned", "final"), glossary.ATE, "final, unaligned", "m", LOWER, EVIDENCE),
+    Metric(("translation", "rmse"), glossary.ATE, "RMSE", "m", LOWER, COMPARISON),
+    Metric(("common", "rmse"), glossary.ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
+    Metric(("behind",), glossary.ATE, "RMSE above the smallest", "m", tables=COMPARISON),
+    Metric(("translation", "mean"), glossary.ATE, "mean", "m", LOWER, COMPARISON),
+    Metric(("translation", "median"), glossary.ATE, "median", "m", LOWER, COMPARISON),
+    Metric(("translation", "std"), glossary.ATE, "standard deviation", "m", tables=COMPARISON),
+    Metric(("translation", "min"), glossary.ATE, "min", "m", tables=COMPARISON),
+    Metric(("translation", "max"), glossary.ATE, "max", "m", LOWER, COMPARISON),
+    Metric(("rotation_deg", "rmse"), glossary.ATE, "rotation RMSE", "°", LOWER, COMPARISON),
+    Metric(("divergence", "rmse"), glossary.DIVERGENCE, "RMSE", "m", LOWER, MAIN | TERMINAL),
     Metric(
         ("divergence_common", "rmse"),
-        group.DIVERGENCE,
+        glossary.DIVERGENCE,
         COMMON,
         "m",
         LOWER,
@@ -87,35 +87,40 @@ METRICS = (
         same_data=True,
         uneven_only=True,
     ),
-    Metric(("divergence", "max"), group.DIVERGENCE, "max", "m", LOWER, MAIN),
-    Metric(("divergence", "final"), group.DIVERGENCE, "final", "m", LOWER, EVIDENCE),
-    Metric(("divergence", "rotation_rmse_deg"), group.DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
+    Metric(("divergence", "max"), glossary.DIVERGENCE, "max", "m", LOWER, MAIN),
+    Metric(("divergence", "final"), glossary.DIVERGENCE, "final", "m", LOWER, EVIDENCE),
+    Metric(("divergence", "rotation_rmse_deg"), glossary.DIVERGENCE, "rotation RMSE", "°", LOWER, EVIDENCE),
     *SCALE,
     *VELOCITY_AND_BIASES,
     Metric(
-        ("sigma", "position_rmse"), group.SIGMA, "claimed, RMS", "m", tables=MAIN | TERMINAL, brief="claimed sigma (3D)"
+        ("sigma", "position_rmse"),
+        glossary.SIGMA,
+        "claimed, RMS",
+        "m",
+        tables=MAIN | TERMINAL,
+        brief="claimed sigma (3D)",
     ),
-    Metric(("sigma", "position_final"), group.SIGMA, "claimed, final", "m", tables=EVIDENCE),
-    Metric(("sigma_ratio", "position"), group.CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
-    Metric(("nees", "median"), group.CONSISTENCY, "NEES, median (5.35 expected)", tables=MAIN, term=group.NEES),
+    Metric(("sigma", "position_final"), glossary.SIGMA, "claimed, final", "m", tables=EVIDENCE),
+    Metric(("sigma_ratio", "position"), glossary.CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
+    Metric(("nees", "median"), glossary.CONSISTENCY, "NEES, median (5.35 expected)", tables=MAIN, term=glossary.NEES),
     STATE_NEES,
     Metric(
         ("nees_reference", "median"),
-        group.CONSISTENCY,
+        glossary.CONSISTENCY,
         "reference NEES, median (5.35 expected)",
         tables=MAIN,
-        term=group.REFERENCE_NEES,
+        term=glossary.REFERENCE_NEES,
         name="nees_reference",
     ),
-    Metric(("relative", group.DELTA, "translation", "rmse"), group.RPE, "RMSE", "m", LOWER, COMPARISON),
-    Metric(("relative", group.DELTA, "rotation_deg", "rmse"), group.RPE, "rotation RMSE", "°", LOWER, COMPARISON),
+    Metric(("relative", glossary.DELTA, "translation", "rmse"), glossary.RPE, "RMSE", "m", LOWER, COMPARISON),
+    Metric(("relative", glossary.DELTA, "rotation_deg", "rmse"), glossary.RPE, "rotation RMSE", "°", LOWER, COMPARISON),
     Metric(("drift", "translation"), "drift", "translation", "%", LOWER, COMPARISON),
     Metric(("drift", "rotation"), "drift", "rotation", "°/m", LOWER, COMPARISON),
-    Metric(("segments", "intervals", "translation_percent"), group.SEGMENTS, "translation", "%", LOWER, COMPARISON),
-    Metric(("segments", "intervals", "rotation_deg_per_m"), group.SEGMENTS, "rotation", "°/m", LOWER, COMPARISON),
+    Metric(("segments", "intervals", "translation_percent"), glossary.SEGMENTS, "translation", "%", LOWER, COMPARISON),
+    Metric(("segments", "intervals", "rotation_deg_per_m"), glossary.SEGMENTS, "rotation", "°/m", LOWER, COMPARISON),
     Metric(
         ("reprojection", "median"),
-        group.REPROJECTION,
+        glossary.REPROJECTION,
         "median",
         "px",
         LOWER,
@@ -123,10 +128,10 @@ METRICS = (
         brief="median reprojection error",
         name="reprojection",
     ),
-    Metric(("reprojection", "p95"), group.REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE),
+    Metric(("reprojection", "p95"), glossary.REPROJECTION, "95th percentile", "px", LOWER, EVIDENCE),
     Metric(
         ("reprojection", "under_3px"),
-        group.REPROJECTION,
+        glossary.REPROJECTION,
         "under 3\N{NO-BREAK SPACE}px",
         "%",
         HIGHER,
@@ -137,7 +142,7 @@ METRICS = (
     ),
     Metric(
         ("reprojection_common", "median"),
-        group.REPROJECTION,
+        glossary.REPROJECTION,
         "median over common",
         "px",
         LOWER,
@@ -148,7 +153,7 @@ METRICS = (
     ),
     Metric(
         ("reprojection_along", "median"),
-        group.REPROJECTION,
+        glossary.REPROJECTION,
         "median, triangulated along the trajectory",
         "px",
         LOWER,
@@ -156,7 +161,7 @@ METRICS = (
     ),
     Metric(
         ("observations", "share"),
-        group.OBSERVATIONS,
+        glossary.OBSERVATIONS,
         "used, of unmasked",
         "%",
         tables=MAIN | BENCH,
@@ -164,10 +169,10 @@ METRICS = (
         brief="observations used",
         name="used",
     ),
-    Metric(("seconds",), group.RUNTIME, "time", "s", LOWER, MAIN | TERMINAL, brief="time", same_data=True),
+    Metric(("seconds",), glossary.RUNTIME, "time", "s", LOWER, MAIN | TERMINAL, brief="time", same_data=True),
     Metric(
         ("frames_per_second",),
-        group.RUNTIME,
+        glossary.RUNTIME,
         "rate",
         "frames/s",
         HIGHER,
@@ -178,7 +183,7 @@ METRICS = (
     ),
     Metric(
         ("held_out", "median"),
-        group.HELD_OUT,
+        glossary.HELD_OUT,
         "median",
         "px",
         LOWER,
@@ -187,36 +192,38 @@ METRICS = (
         ranked=True,
         same_data=True,
     ),
-    Metric(("held_out", "behind"), group.HELD_OUT, "above the best", "px", tables=EVIDENCE),
-    Metric(("held_out", "behind_low"), group.HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
-    Metric(("nees", "mean"), group.NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
+    Metric(("held_out", "behind"), glossary.HELD_OUT, "above the best", "px", tables=EVIDENCE),
+    Metric(("held_out", "behind_low"), glossary.HELD_OUT, "above the best by at least", "px", tables=EVIDENCE),
+    Metric(("nees", "mean"), glossary.NEES, "mean", tables=EVIDENCE | COMPARISON, name="nees"),
     *BLOCK_NEES,
-    Metric(("nees_reference", "mean"), group.REFERENCE_NEES, "mean", tables=EVIDENCE),
-    Metric(("nees_reference", "left_out"), group.REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
+    Metric(("nees_reference", "mean"), glossary.REFERENCE_NEES, "mean", tables=EVIDENCE),
+    Metric(("nees_reference", "left_out"), glossary.REFERENCE_NEES, "frames left out", tables=EVIDENCE, count=True),
     Metric(
         ("nis", "per_degree"),
-        group.CONSISTENCY,
+        glossary.CONSISTENCY,
         "NIS per degree of freedom",
         tables=EVIDENCE,
         term="NIS per degree of freedom",
     ),
     Metric(
-        ("sigma_ratio", "rotation"), group.CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"
+        ("sigma_ratio", "rotation"), glossary.CONSISTENCY, "sigma ratio, rotation", tables=EVIDENCE, term="sigma ratio"
     ),
     Metric(
         ("covariance", "not_positive_definite"),
-        group.CONSISTENCY,
+        glossary.CONSISTENCY,
         "covariances not positive definite",
         tables=EVIDENCE,
-        term=group.NEES,
+        term=glossary.NEES,
         nonzero_only=True,
         count=True,
     ),
-    Metric(("whitened", "ratio"), group.RESIDUALS, "chi-square per degree of freedom", tables=EVIDENCE),
-    Metric(("moved_points", "share"), group.RESIDUALS, "tracks of dynamic points", "%", tables=EVIDENCE, scale=PERCENT),
-    Metric(("map", "median"), group.MAP, "median", "m", LOWER, EVIDENCE | COMPARISON),
-    Metric(("map", "median_seen"), group.MAP, "median in the camera frame", "m", LOWER, EVIDENCE | COMPARISON),
-    Metric(("map", "median_sigmas"), group.MAP, "median in sigmas", tables=EVIDENCE),
+    Metric(("whitened", "ratio"), glossary.RESIDUALS, "chi-square per degree of freedom", tables=EVIDENCE),
+    Metric(
+        ("moved_points", "share"), glossary.RESIDUALS, "tracks of dynamic points", "%", tables=EVIDENCE, scale=PERCENT
+    ),
+    Metric(("map", "median"), glossary.MAP, "median", "m", LOWER, EVIDENCE | COMPARISON),
+    Metric(("map", "median_seen"), glossary.MAP, "median in the camera frame", "m", LOWER, EVIDENCE | COMPARISON),
+    Metric(("map", "median_sigmas"), glossary.MAP, "median in sigmas", tables=EVIDENCE),
 )
 
 
@@ -228,7 +235,7 @@ def shown_in(tables: Tables) -> list[Metric]:
 def over_deltas(metrics: Iterable[Metric], deltas: Iterable[str]) -> list[Metric]:
     """Metrics with one of each delta in place of those of relative errors."""
     every, expanded = list(metrics), list[Metric]()
-    relative = [metric for metric in every if group.DELTA in metric.path]
+    relative = [metric for metric in every if glossary.DELTA in metric.path]
     for metric in every:
         if metric not in relative:
             expanded.append(metric)
